@@ -1,0 +1,8 @@
+//! The stereo rig, rigid motion and projection. Camera axes are KITTI's: x right, y down, z forward.
+
+mod motion;
+mod rig;
+pub mod scalar;
+
+pub use motion::{Transform, exp, renormalised};
+pub use rig::{RigProblem, StereoRig};

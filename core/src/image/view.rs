@@ -1,0 +1,97 @@
+//! Row-major image views over borrowed slices.
+
+/// A read-only image. Rows are `stride` items apart.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a, T> {
+    data: &'a [T],
+    width: usize,
+    height: usize,
+    stride: usize,
+}
+
+/// Items a view of this shape spans, or nothing when the shape is absurd.
+fn span(width: usize, height: usize, stride: usize) -> Option<usize> {
+    if width == 0 || height == 0 || stride < width {
+        return None;
+    }
+    (height - 1).checked_mul(stride)?.checked_add(width)
+}
+
+impl<'a, T> View<'a, T> {
+    /// Views `data` as `width` x `height`, rows `width` apart. `None` when empty or when `data` is too short.
+    pub fn new(data: &'a [T], width: usize, height: usize) -> Option<Self> {
+        Self::with_stride(data, width, height, width)
+    }
+
+    /// As [`View::new`] with rows `stride` items apart.
+    pub fn with_stride(data: &'a [T], width: usize, height: usize, stride: usize) -> Option<Self> {
+        (data.len() >= span(width, height, stride)?).then_some(Self { data, width, height, stride })
+    }
+
+    /// Width, px.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height, px.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Row `v`; empty beyond the image.
+    pub fn row(&self, v: usize) -> &'a [T] {
+        if v >= self.height {
+            return &[];
+        }
+        self.data.get(v * self.stride..v * self.stride + self.width).unwrap_or(&[])
+    }
+
+    /// All rows, top to bottom.
+    pub fn rows(&self) -> impl Iterator<Item = &'a [T]> + use<'a, T> {
+        let this = (self.data, self.width, self.stride);
+        (0..self.height).map(move |v| this.0.get(v * this.2..v * this.2 + this.1).unwrap_or(&[]))
+    }
+}
+
+impl<'a, T: Copy> View<'a, T> {
+    /// Pixel at column `u`, row `v`; `None` beyond the image.
+    pub fn get(&self, u: usize, v: usize) -> Option<T> {
+        self.row(v).get(u).copied()
+    }
+}
+
+/// A writable image without padding.
+#[derive(Debug)]
+pub struct ViewMut<'a, T> {
+    data: &'a mut [T],
+    width: usize,
+    height: usize,
+}
+
+impl<'a, T> ViewMut<'a, T> {
+    /// Views the first `width` x `height` items of `data`. `None` when empty or when `data` is too short.
+    pub fn new(data: &'a mut [T], width: usize, height: usize) -> Option<Self> {
+        let len = span(width, height, width)?;
+        Some(Self { data: data.get_mut(..len)?, width, height })
+    }
+
+    /// Width, px.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height, px.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The pixels, row by row.
+    pub fn pixels_mut(&mut self) -> &mut [T] {
+        self.data
+    }
+
+    /// The same image, read-only.
+    pub fn as_view(&self) -> View<'_, T> {
+        View { data: self.data, width: self.width, height: self.height, stride: self.width }
+    }
+}

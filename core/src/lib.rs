@@ -1,0 +1,23 @@
+//! Stereo dense mapping for streets full of moving cars, for machines without a heap.
+//!
+//! The caller hands over one slab of bytes; the core never uses other memory, never panics on what the world sends it and gives the
+//! same bits on every machine. The pipeline is that of Bârsan, Liu, Pollefeys, Geiger, *Robust Dense Mapping for Large-Scale Dynamic
+//! Environments* (ICRA 2018).
+//!
+//! Data flows one way: [`memory`], [`image`] and [`geometry`] are the ground; [`stereo`] and [`scene_flow`] stand on them;
+//! [`egomotion`] on `scene_flow`; [`volume`] on the ground alone; [`mapper`] is the roof and the only one that knows them all.
+#![no_std]
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod config;
+pub mod executor;
+pub mod geometry;
+pub mod image;
+pub mod memory;
+pub mod random;
+
+pub use executor::{Executor, Serial, Stage};
+pub use memory::{Capacity, Footprint, Slab};

@@ -1,0 +1,54 @@
+//! What each region of the slab holds, uses now and has used at most.
+
+use heapless::Vec;
+
+/// Most regions one slab can be cut into.
+const MAX_REGIONS: usize = 96;
+
+/// One named region of the slab. All figures in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// `room.what`, as `volume.sdf`.
+    pub name: &'static str,
+    /// Bytes cut for it, padding to the next region included.
+    pub bytes: usize,
+    /// Bytes in use now. Working images count as used throughout.
+    pub used: usize,
+    /// The most bytes ever in use at once.
+    pub peak: usize,
+}
+
+/// The list of all regions, in the order in which they were cut.
+#[derive(Clone, Debug, Default)]
+pub struct Footprint {
+    regions: Vec<Region, MAX_REGIONS>,
+}
+
+impl Footprint {
+    pub(super) fn add(&mut self, region: Region) -> Result<(), Region> {
+        self.regions.push(region)
+    }
+
+    /// All regions, in slab order.
+    pub fn regions(&self) -> &[Region] {
+        &self.regions
+    }
+
+    /// The region of that name.
+    pub fn region(&self, name: &str) -> Option<&Region> {
+        self.regions.iter().find(|region| region.name == name)
+    }
+
+    /// Bytes cut in all.
+    pub fn bytes(&self) -> usize {
+        self.regions.iter().map(|region| region.bytes).sum()
+    }
+
+    /// Sets the use of a region, as `items` of `T` now and `peak_items` at most.
+    pub fn set_use<T>(&mut self, name: &str, items: usize, peak_items: usize) {
+        if let Some(region) = self.regions.iter_mut().find(|region| region.name == name) {
+            region.used = items * size_of::<T>();
+            region.peak = peak_items * size_of::<T>();
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! The slab and what is cut from it.
+//!
+//! A caller owns all memory: one aligned byte slab, cut once into named, typed regions ([`Carver`]), counted to the byte
+//! ([`Footprint`]) and sized by one table of bounds ([`Capacity`]). Nothing here grows; full is a value.
+
+mod capacity;
+mod footprint;
+mod one_shot;
+mod pool;
+mod slab;
+
+pub use capacity::Capacity;
+pub use footprint::{Footprint, Region};
+pub use one_shot::OneShot;
+pub use pool::{Full, Handle, SlotPool};
+pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, region_bytes};
