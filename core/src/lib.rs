@@ -18,6 +18,7 @@ pub mod geometry;
 pub mod image;
 pub mod memory;
 pub mod random;
+pub mod volume;
 
 pub use executor::{Executor, Serial, Stage};
 pub use memory::{Capacity, Footprint, Slab};

@@ -25,6 +25,8 @@ pub enum SlabError {
     },
     /// The slab does not begin at a multiple of [`SLAB_ALIGN`] bytes.
     Misaligned,
+    /// The block index did not fit the region computed for it: a bug of the core, not of the caller.
+    IndexRegion,
     /// More regions than the footprint can name: a bug of the core, not of the caller.
     TooManyRegions,
 }

@@ -1,0 +1,78 @@
+//! How depth becomes a map.
+
+use crate::config::{Problems, require};
+
+/// Semantic classes that can carry a weight of their own.
+pub const CLASS_COUNT: usize = 32;
+
+/// What one observation of a voxel weighs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum ObservationWeight {
+    /// 1, wherever it is.
+    #[default]
+    One,
+    /// `100 / depth_m`, held within 1 and 10: near observations are more precise (the original's option).
+    Depth,
+}
+
+/// Parameters of the map. Defaults are the original's published ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct VolumeConfig {
+    /// Distance between lattice points, m. Above 0; 0.05 in the paper.
+    pub voxel_size_m: f32,
+    /// Distance from the surface up to which voxels are kept, m. At least two voxels; 0.75 (the paper's experiments: 0.50).
+    pub truncation_m: f32,
+    /// Nearest depth fused, m. Above 0; 0.5.
+    pub near_m: f32,
+    /// Farthest depth fused, m. Above `near_m`; 20.
+    pub far_m: f32,
+    /// Weight at which the average stops forgetting less, 1 to 255; 50.
+    pub max_weight: u8,
+    /// What one observation weighs.
+    pub observation_weight: ObservationWeight,
+    /// Factor on an observation's weight by semantic class (Vineet et al., *Incremental Dense Semantic Stereo Fusion*, 2015);
+    /// 0 keeps a class out of the map. All 1.
+    pub class_weight: [u8; CLASS_COUNT],
+    /// Share of the truncation on either side of the surface within which colour is averaged, 0 to 1; 0.25.
+    pub colour_band: f32,
+}
+
+impl Default for VolumeConfig {
+    fn default() -> Self {
+        Self {
+            voxel_size_m: 0.05,
+            truncation_m: 0.75,
+            near_m: 0.5,
+            far_m: 20.0,
+            max_weight: 50,
+            observation_weight: ObservationWeight::One,
+            class_weight: [1; CLASS_COUNT],
+            colour_band: 0.25,
+        }
+    }
+}
+
+impl VolumeConfig {
+    /// Notes everything wrong with the figures.
+    pub fn validate(&self, problems: &mut Problems) {
+        let positive = |value: f32| value.is_finite() && value > 0.0;
+        require(
+            problems,
+            positive(self.voxel_size_m) && (0.001..=10.0).contains(&self.voxel_size_m),
+            "volume.voxel_size_m",
+            "must be from 0.001 to 10 m",
+        );
+        require(
+            problems,
+            positive(self.truncation_m) && (2.0..=64.0).contains(&(self.truncation_m / self.voxel_size_m)),
+            "volume.truncation_m",
+            "must be from 2 to 64 voxels",
+        );
+        require(problems, positive(self.near_m), "volume.near_m", "must be above 0");
+        require(problems, positive(self.far_m) && self.far_m > self.near_m, "volume.far_m", "must be above volume.near_m");
+        require(problems, self.max_weight >= 1, "volume.max_weight", "must be from 1 to 255");
+        require(problems, (0.0..=1.0).contains(&self.colour_band), "volume.colour_band", "must be from 0 to 1");
+    }
+}

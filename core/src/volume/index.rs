@@ -1,0 +1,134 @@
+//! From block coordinates to the block's slot: a hash table whose entries are integers.
+//!
+//! The table is `hashbrown::HashTable<u32>`: entries are slots of the block pool, keys stay in the pool. It is built once, in the slab,
+//! for twice the blocks it will ever hold, so that deletion debris is cleaned in place and no second allocation is asked for; one that
+//! was would be refused and reported as [`Full`]. Nothing iterates the table, so its order is never observable.
+//!
+//! Memory: 5 bytes a bucket; buckets are the power of two at or above 16/7 of the blocks.
+
+use super::BlockCoord;
+use crate::memory::{Carver, Full, OneShot, SlabError, region_bytes};
+use hashbrown::HashTable;
+
+/// Room for the control group that hashbrown appends, and for aligning the control bytes.
+const GROUP_BYTES: usize = 64;
+
+/// The index.
+pub struct BlockIndex<'s> {
+    table: HashTable<u32, OneShot<'s>>,
+}
+
+impl core::fmt::Debug for BlockIndex<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("BlockIndex").field("len", &self.table.len()).field("capacity", &self.table.capacity()).finish()
+    }
+}
+
+/// Coordinates mixed by constants (the multipliers of Teschner et al., 2003, then a 64-bit finaliser: hashbrown looks at both ends).
+fn hash(coord: BlockCoord) -> u64 {
+    let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
+    let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
+    let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    mixed ^ (mixed >> 29)
+}
+
+/// Where the block in `slot` lies, for a slot that may be stale.
+fn coord_of(coords: &[[i16; 4]], slot: u32) -> Option<BlockCoord> {
+    coords.get(slot as usize).copied().map(BlockCoord::unpacked)
+}
+
+impl<'s> BlockIndex<'s> {
+    const fn buckets(blocks: usize) -> usize {
+        let wanted = 2 * blocks;
+        let buckets = if wanted < 8 { 8 } else { wanted * 8 / 7 };
+        if buckets < 16 { 16 } else { buckets.next_power_of_two() }
+    }
+
+    /// Bytes of the slab for `blocks` blocks.
+    pub const fn bytes(blocks: usize) -> usize {
+        region_bytes::<u8>(Self::buckets(blocks) * 5 + GROUP_BYTES)
+    }
+
+    /// Cuts an index for `blocks` blocks.
+    pub fn carve(blocks: usize, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        let region = carver.cut::<u8>("volume.index", Self::buckets(blocks) * 5 + GROUP_BYTES)?;
+        let mut table = HashTable::new_in(OneShot::new(region));
+        // The one allocation: an empty table hashes nothing.
+        table.try_reserve(2 * blocks, |_| 0).map_err(|_| SlabError::IndexRegion)?;
+        Ok(Self { table })
+    }
+
+    /// Blocks indexed.
+    pub fn len(&self) -> usize {
+        self.table.len()
+    }
+
+    /// Whether no block is indexed.
+    pub fn is_empty(&self) -> bool {
+        self.table.is_empty()
+    }
+
+    /// The slot of the block at `coord`; `coords` are the pool's.
+    #[inline]
+    pub fn find(&self, coords: &[[i16; 4]], coord: BlockCoord) -> Option<u32> {
+        self.table.find(hash(coord), |&slot| coord_of(coords, slot) == Some(coord)).copied()
+    }
+
+    /// Enters `slot`, which must hold the coordinates `coord` in `coords` and not be entered yet.
+    pub fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32) -> Result<(), Full> {
+        let rehash = |&slot: &u32| coord_of(coords, slot).map_or(0, hash);
+        self.table.try_reserve(1, rehash).map_err(|_| Full)?;
+        self.table.insert_unique(hash(coord), slot, rehash);
+        Ok(())
+    }
+
+    /// Strikes the block at `coord`. Whether it was there.
+    pub fn remove(&mut self, coords: &[[i16; 4]], coord: BlockCoord) -> bool {
+        match self.table.find_entry(hash(coord), |&slot| coord_of(coords, slot) == Some(coord)) {
+            Ok(entry) => {
+                entry.remove();
+                true
+            }
+            Err(_) => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::{collections::BTreeMap, vec, vec::Vec};
+
+    const BLOCKS: usize = 700;
+
+    #[test]
+    fn agrees_with_a_tree_through_two_hundred_thousand_insertions_and_removals_in_one_allocation() {
+        let mut slab = vec![[0u8; 64]; BlockIndex::bytes(BLOCKS) / 64 + 1];
+        let start = (64 - slab.as_ptr() as usize % 64) % 64;
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
+        let mut carver = Carver::new(&mut bytes[start..], BlockIndex::bytes(BLOCKS)).unwrap();
+        let mut index = BlockIndex::carve(BLOCKS, &mut carver).unwrap();
+        let mut coords = [[0i16; 4]; BLOCKS];
+        let mut free: Vec<u32> = (0..BLOCKS as u32).collect();
+        let mut model = BTreeMap::new();
+        let mut random = Random::new(5);
+        for _ in 0..200_000 {
+            let [x, y, z] = [(); 3].map(|()| random.below(14) as i32 - 7);
+            let coord = BlockCoord::new(x, y, z).unwrap();
+            if let Some(slot) = model.remove(&coord) {
+                assert_eq!(index.find(&coords, coord), Some(slot));
+                assert!(index.remove(&coords, coord));
+                free.push(slot);
+            } else if let Some(slot) = free.pop() {
+                coords[slot as usize] = coord.packed();
+                index.insert(&coords, coord, slot).unwrap();
+                model.insert(coord, slot);
+            }
+            assert_eq!(index.len(), model.len());
+        }
+        for (&coord, &slot) in &model {
+            assert_eq!(index.find(&coords, coord), Some(slot));
+        }
+    }
+}
