@@ -13,6 +13,7 @@
 extern crate std;
 
 pub mod config;
+pub mod digest;
 pub mod executor;
 pub mod geometry;
 pub mod image;

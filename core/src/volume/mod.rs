@@ -2,16 +2,109 @@
 //!
 //! Space is a lattice of points `voxel_size_m` apart; lattice point (i, j, k) lies at `voxel_size_m * (i, j, k)` in the map's frame.
 //! 8 x 8 x 8 of them are a block. Each point keeps a signed distance, how often it was seen and, where the profile has it, a colour.
-//! A depth image is fused in three steps: blocks within the truncation of its surface are made (allocation), every visible block is
-//! updated by integer averages (fusion), and on demand the map is looked at from a pose (raycast) or turned into triangles
-//! (marching cubes).
+//! A depth image is fused in two steps: blocks within the truncation of its surface are made ([`Volume::allocate`]), then every visible
+//! block is updated by integer averages ([`Volume::fuse`]).
 
+mod allocate;
 mod block;
 mod config;
+mod fuse;
 mod index;
 mod sampler;
+#[cfg(test)]
+mod tests;
+mod viewpoint;
+mod visible;
 
+pub use allocate::{AllocationReport, MAX_BLOCKS_PER_RAY};
 pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, Blocks};
 pub use config::{CLASS_COUNT, ObservationWeight, VolumeConfig};
+pub use fuse::Observation;
 pub use index::BlockIndex;
 pub use sampler::{Sampler, VoxelSample};
+pub use viewpoint::Viewpoint;
+pub use visible::VisibleList;
+
+use crate::memory::{Capacity, Carver, Footprint, SlabError, SlotPool};
+
+/// A map of blocks.
+#[derive(Debug)]
+pub struct Volume<'s> {
+    config: VolumeConfig,
+    index: BlockIndex<'s>,
+    pool: SlotPool<'s>,
+    blocks: Blocks<'s>,
+    visible: VisibleList<'s>,
+    seen: allocate::Seen<'s>,
+    digest: u64,
+}
+
+impl<'s> Volume<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        BlockIndex::bytes(capacity.blocks)
+            + SlotPool::bytes(capacity.blocks)
+            + Blocks::bytes(capacity.blocks, capacity.colour)
+            + VisibleList::bytes(capacity)
+            + allocate::Seen::bytes()
+    }
+
+    /// Cuts an empty map.
+    pub fn carve(capacity: &Capacity, config: &VolumeConfig, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        Ok(Self {
+            config: *config,
+            index: BlockIndex::carve(capacity.blocks, carver)?,
+            pool: SlotPool::carve(carver, capacity.blocks, ["volume.generation", "volume.free"])?,
+            blocks: Blocks::carve(capacity, carver)?,
+            visible: VisibleList::carve(capacity, carver)?,
+            seen: allocate::Seen::carve(carver)?,
+            digest: 0,
+        })
+    }
+
+    /// The parameters the map was made with.
+    pub fn config(&self) -> &VolumeConfig {
+        &self.config
+    }
+
+    /// The pool of slots: how many blocks there are, and which slots hold one.
+    pub fn pool(&self) -> &SlotPool<'s> {
+        &self.pool
+    }
+
+    /// The payload of all blocks.
+    pub fn blocks(&self) -> &Blocks<'s> {
+        &self.blocks
+    }
+
+    /// The blocks visible in the last frame.
+    pub fn visible(&self) -> &VisibleList<'s> {
+        &self.visible
+    }
+
+    /// The block at `coord`.
+    pub fn find(&self, coord: BlockCoord) -> Option<u32> {
+        self.index.find(self.blocks.coord, coord)
+    }
+
+    /// A reader of single voxels.
+    pub fn sampler(&self) -> Sampler<'_, 's> {
+        Sampler::new(&self.index, &self.blocks)
+    }
+
+    /// Digest of the places and contents of all blocks, whatever the order they were made in: the wrapping sum of theirs.
+    pub fn digest(&self) -> u64 {
+        self.digest
+    }
+
+    /// Enters what is in use into a footprint.
+    pub fn note_use(&self, footprint: &mut Footprint) {
+        let (now, peak) = (self.pool.len(), self.pool.peak());
+        footprint.set_use::<[i16; 4]>("volume.coord", now, peak);
+        footprint.set_use::<[i16; BLOCK_VOXELS]>("volume.sdf", now, peak);
+        footprint.set_use::<[u8; BLOCK_VOXELS]>("volume.weight", now, peak);
+        footprint.set_use::<[[u8; BLOCK_VOXELS]; 3]>("volume.colour", now, peak);
+        footprint.set_use::<u64>("volume.digest", now, peak);
+        footprint.set_use::<u32>("volume.visible", self.visible.slots().len(), self.visible.peak());
+    }
+}

@@ -1,0 +1,33 @@
+//! Depth from disparity.
+
+use super::StereoRig;
+use crate::image::{DISPARITY_ONE_PX, View, ViewMut};
+
+/// Turns disparity (1/256 px, 0 none) into depth in metres, 0 where there is none or it lies outside `near_m..=far_m`.
+/// Images of different sizes are turned as far as both reach.
+pub fn depth_from_disparity(rig: &StereoRig, near_m: f32, far_m: f32, disparity_q8: View<'_, u16>, depth_m: &mut ViewMut<'_, f32>) {
+    let scale = (rig.focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX)) as f32;
+    let width = depth_m.width();
+    for (depths, disparities) in depth_m.pixels_mut().chunks_exact_mut(width).zip(disparity_q8.rows()) {
+        for (depth, &disparity) in depths.iter_mut().zip(disparities) {
+            // Disparity 0 gives infinity, which is beyond far.
+            let value = scale / f32::from(disparity);
+            *depth = if value >= near_m && value <= far_m { value } else { 0.0 };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keeps_near_and_far_and_knows_nothing_without_disparity() {
+        let rig = StereoRig { focal_px: 100.0, center_u_px: 0.0, center_v_px: 0.0, baseline_m: 0.5 };
+        let disparities = [0, 10 * DISPARITY_ONE_PX, DISPARITY_ONE_PX, 101 * DISPARITY_ONE_PX];
+        let mut depths = [9.0; 4];
+        let mut view = ViewMut::new(&mut depths, 4, 1).unwrap();
+        depth_from_disparity(&rig, 0.5, 20.0, View::new(&disparities, 4, 1).unwrap(), &mut view);
+        assert_eq!(depths, [0.0, 5.0, 0.0, 0.0]);
+    }
+}

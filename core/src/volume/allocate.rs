@@ -1,0 +1,229 @@
+//! Making the blocks that a depth image runs through, and finding which are visible.
+//!
+//! Along the ray of every pixel with depth, each block between `depth - truncation` and `depth + truncation` is visited exactly once, by
+//! walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray Tracing*, 1987). A point belongs to the block of its
+//! nearest lattice point: a block's lattice points are its centre of mass, so nothing is shifted by half a voxel.
+//!
+//! Memory: 128 KiB for the blocks seen in this frame, a direct-mapped cache that spares the index most look-ups. Time: linear in pixels
+//! times blocks per ray, at most [`MAX_BLOCKS_PER_RAY`].
+
+use super::{BLOCK_SIDE, BlockCoord, Viewpoint, Volume};
+use crate::{
+    geometry::scalar::{floor_i32, max_f32},
+    image::View,
+    memory::{Carver, SlabError, region_bytes},
+};
+use nalgebra::Vector3;
+
+/// Most blocks one ray visits: 2 x 64 voxels of truncation are 16 blocks, diagonally across three axes, and one at either end.
+pub const MAX_BLOCKS_PER_RAY: usize = 16 * 2 + 3;
+
+/// Entries of the cache of blocks seen in this frame: a power of two.
+const SEEN_ENTRIES: usize = 1 << 14;
+
+/// What one frame's allocation did. Requests refused repeat when several rays ask for the same block.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AllocationReport {
+    /// Blocks made.
+    pub made: u32,
+    /// Requests refused because the pool or the index was full.
+    pub refused: u32,
+    /// Requests refused because they lie beyond 16-bit block coordinates.
+    pub beyond: u32,
+    /// Visible blocks left out of the list because it was full.
+    pub unlisted: u32,
+}
+
+/// The cache of blocks already visited in this frame.
+#[derive(Debug)]
+pub(super) struct Seen<'s> {
+    entries: &'s mut [u64],
+}
+
+impl<'s> Seen<'s> {
+    pub(super) const fn bytes() -> usize {
+        region_bytes::<u64>(SEEN_ENTRIES)
+    }
+
+    pub(super) fn carve(carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        Ok(Self { entries: carver.cut("volume.seen", SEEN_ENTRIES)? })
+    }
+
+    fn clear(&mut self) {
+        self.entries.fill(0);
+    }
+
+    /// Enters a block; `true` when it was entered last at its place. A street is wide and long, hardly high: hence the split of bits.
+    #[inline]
+    fn enter(&mut self, [x, y, z]: [i32; 3]) -> bool {
+        let place = (x & 63) | (z & 63) << 6 | (y & 3) << 12;
+        let tag = 1 << 63 | (x as u64 & 0x1F_FFFF) << 42 | (y as u64 & 0x1F_FFFF) << 21 | (z as u64 & 0x1F_FFFF);
+        match self.entries.get_mut(place as usize) {
+            Some(entry) if *entry == tag => true,
+            Some(entry) => {
+                *entry = tag;
+                false
+            }
+            None => false,
+        }
+    }
+}
+
+/// A walk through the block grid from one point to another, in block units.
+struct Walk {
+    at: [i32; 3],
+    step: [i32; 3],
+    left: [u32; 3],
+    /// Ray parameter at which the next block begins, and its growth per block, on each axis.
+    next: [f32; 3],
+    growth: [f32; 3],
+}
+
+impl Walk {
+    fn new(from: [f32; 3], to: [f32; 3]) -> Self {
+        let mut walk = Self { at: [0; 3], step: [0; 3], left: [0; 3], next: [f32::MAX; 3], growth: [0.0; 3] };
+        let axes = walk.at.iter_mut().zip(&mut walk.step).zip(&mut walk.left).zip(&mut walk.next).zip(&mut walk.growth);
+        for (((((at, step), left), next), growth), (from, to)) in axes.zip(from.into_iter().zip(to)) {
+            *at = floor_i32(from);
+            let last = floor_i32(to);
+            *step = if last >= *at { 1 } else { -1 };
+            *left = last.abs_diff(*at);
+            if *left > 0 {
+                let across = to - from;
+                let border = *at as f32 + if last > *at { 1.0 } else { 0.0 };
+                *next = (border - from) / across;
+                *growth = *step as f32 / across;
+            }
+        }
+        walk
+    }
+
+    /// Visits every block once, in order.
+    #[inline]
+    fn visit(mut self, mut visit: impl FnMut([i32; 3])) {
+        visit(self.at);
+        for _ in 1..MAX_BLOCKS_PER_RAY {
+            let [x, y, z] = self.next;
+            let axis = if x <= y && x <= z { 0 } else { 1 + usize::from(z < y) };
+            let (Some(at), Some(step), Some(left), Some(next), Some(growth)) =
+                (self.at.get_mut(axis), self.step.get(axis), self.left.get_mut(axis), self.next.get_mut(axis), self.growth.get(axis))
+            else {
+                return;
+            };
+            if *left == 0 {
+                return;
+            }
+            *at += step;
+            *left -= 1;
+            *next = if *left == 0 { f32::MAX } else { *next + growth };
+            visit(self.at);
+        }
+    }
+}
+
+impl Volume<'_> {
+    /// Makes the blocks around the surface that `depth_m` (0 none) shows from `view`, and lists what is visible.
+    pub fn allocate(&mut self, view: &Viewpoint, depth_m: View<'_, f32>) -> AllocationReport {
+        let mut report = AllocationReport::default();
+        self.visible.begin_frame();
+        self.seen.clear();
+
+        // Block coordinates relative to the camera's block keep their precision however far the camera has come.
+        let block_m = f64::from(self.config.voxel_size_m) * BLOCK_SIDE as f64;
+        let half_voxel = 0.5 / BLOCK_SIDE as f64;
+        let camera = view.t_world_camera.translation.vector / block_m + Vector3::repeat(half_voxel);
+        let Some(base) = base_block(&camera) else {
+            report.beyond = depth_m.rows().flatten().filter(|&&depth| depth > 0.0).count() as u32;
+            return report;
+        };
+        let start = (camera - Vector3::new(f64::from(base[0]), f64::from(base[1]), f64::from(base[2]))).cast::<f32>();
+        let [corner, per_column, per_row] = view.rays_world().map(|ray| (ray / block_m).cast::<f32>());
+        let truncation_m = self.config.truncation_m;
+
+        for (v, row) in depth_m.rows().enumerate() {
+            let first = corner + per_row * v as f32;
+            for (u, &depth) in row.iter().enumerate() {
+                if !(depth > 0.0 && depth <= self.config.far_m) {
+                    continue;
+                }
+                let ray = first + per_column * u as f32;
+                let from = start + ray * max_f32(depth - truncation_m, 0.0);
+                let to = start + ray * (depth + truncation_m);
+                Walk::new(from.into(), to.into()).visit(|block| {
+                    if !self.seen.enter(block) {
+                        self.request(block, base, &mut report);
+                    }
+                });
+            }
+        }
+        self.keep_in_view(view, &mut report);
+        self.visible.sort();
+        report
+    }
+
+    /// Finds or makes the block `base + block` and lists it.
+    fn request(&mut self, block: [i32; 3], base: [i32; 3], report: &mut AllocationReport) {
+        let Some(coord) = BlockCoord::new(base[0] + block[0], base[1] + block[1], base[2] + block[2]) else {
+            report.beyond += 1;
+            return;
+        };
+        let slot = match self.index.find(self.blocks.coord, coord) {
+            Some(slot) => slot,
+            None => match self.make(coord) {
+                Some(slot) => {
+                    report.made += 1;
+                    slot
+                }
+                None => {
+                    report.refused += 1;
+                    return;
+                }
+            },
+        };
+        if self.visible.mark(slot).is_err() {
+            report.unlisted += 1;
+        }
+    }
+
+    /// Takes a slot for a new, empty block.
+    fn make(&mut self, coord: BlockCoord) -> Option<u32> {
+        let handle = self.pool.take().ok()?;
+        self.blocks.clear(handle.slot, coord);
+        if self.index.insert(self.blocks.coord, coord, handle.slot).is_err() {
+            self.pool.free(handle);
+            return None;
+        }
+        Some(handle.slot)
+    }
+
+    /// Lists the blocks visible in the last frame that still lie in the picture.
+    fn keep_in_view(&mut self, view: &Viewpoint, report: &mut AllocationReport) {
+        let (camera_from_world, camera) = view.camera_from_world();
+        let voxel_m = f64::from(self.config.voxel_size_m);
+        let [width, height] = [view.width as f64, view.height as f64];
+        let farthest = f64::from(self.config.far_m + self.config.truncation_m);
+        for i in 0.. {
+            let Some(slot) = self.visible.before(i) else { break };
+            if self.visible.is_marked(slot) || self.pool.handle(slot).is_none() {
+                continue;
+            }
+            let Some(coord) = self.blocks.coord(slot) else { continue };
+            let center = Vector3::from(coord.origin().map(|c| (f64::from(c) + 3.5) * voxel_m));
+            let at = camera_from_world * (center - camera.coords);
+            let u = view.rig.focal_px * at.x + view.rig.center_u_px * at.z;
+            let v = view.rig.focal_px * at.y + view.rig.center_v_px * at.z;
+            // Inside the picture, without dividing by a depth that may be 0.
+            let inside = at.z > 0.0 && at.z <= farthest && u >= 0.0 && v >= 0.0 && u < width * at.z && v < height * at.z;
+            if inside && self.visible.mark(slot).is_err() {
+                report.unlisted += 1;
+            }
+        }
+    }
+}
+
+/// The block the camera is in; `None` beyond the map.
+fn base_block(camera: &Vector3<f64>) -> Option<[i32; 3]> {
+    let bound = f64::from(i16::MAX);
+    let inside = camera.iter().all(|c| *c > -bound && *c < bound);
+    inside.then(|| [camera.x, camera.y, camera.z].map(|c| libm::floor(c) as i32))
+}

@@ -1,0 +1,90 @@
+//! The blocks visible in the current frame.
+//!
+//! A block is visible when the frame's depth runs through it, or when it was visible in the frame before and still lies in the picture:
+//! the second is what carves free space where noise once put a surface.
+//!
+//! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
+
+use crate::memory::{Capacity, Carver, Full, SlabError, region_bytes};
+
+/// This frame's visible slots, each once.
+#[derive(Debug)]
+pub struct VisibleList<'s> {
+    slots: &'s mut [u32],
+    len: usize,
+    before: &'s mut [u32],
+    before_len: usize,
+    last_visible: &'s mut [u32],
+    frame: u32,
+    peak: usize,
+}
+
+impl<'s> VisibleList<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        2 * region_bytes::<u32>(capacity.visible_blocks) + region_bytes::<u32>(capacity.blocks)
+    }
+
+    /// Cuts the lists.
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        Ok(Self {
+            slots: carver.cut("volume.visible", capacity.visible_blocks)?,
+            len: 0,
+            before: carver.cut("volume.visible_before", capacity.visible_blocks)?,
+            before_len: 0,
+            last_visible: carver.cut("volume.last_visible", capacity.blocks)?,
+            frame: 0,
+            peak: 0,
+        })
+    }
+
+    /// Begins a frame: the list of the last one is set aside.
+    pub(super) fn begin_frame(&mut self) {
+        core::mem::swap(&mut self.slots, &mut self.before);
+        self.before_len = self.len;
+        self.len = 0;
+        self.frame = self.frame.wrapping_add(1);
+    }
+
+    /// Enters a slot unless it is entered already.
+    pub(super) fn mark(&mut self, slot: u32) -> Result<(), Full> {
+        let last = self.last_visible.get_mut(slot as usize).ok_or(Full)?;
+        if *last == self.frame {
+            return Ok(());
+        }
+        *self.slots.get_mut(self.len).ok_or(Full)? = slot;
+        *last = self.frame;
+        self.len += 1;
+        if self.len > self.peak {
+            self.peak = self.len;
+        }
+        Ok(())
+    }
+
+    /// Whether a slot is entered for this frame.
+    pub(super) fn is_marked(&self, slot: u32) -> bool {
+        self.last_visible.get(slot as usize) == Some(&self.frame)
+    }
+
+    /// Entry `i` of the last frame's list.
+    pub(super) fn before(&self, i: usize) -> Option<u32> {
+        self.before.get(..self.before_len)?.get(i).copied()
+    }
+
+    /// Orders the list by slot, which is the order of fusion and of memory.
+    pub(super) fn sort(&mut self) {
+        if let Some(list) = self.slots.get_mut(..self.len) {
+            list.sort_unstable();
+        }
+    }
+
+    /// The slots visible in this frame, ascending.
+    pub fn slots(&self) -> &[u32] {
+        self.slots.get(..self.len).unwrap_or(&[])
+    }
+
+    /// The most entries a frame ever had.
+    pub fn peak(&self) -> usize {
+        self.peak
+    }
+}
