@@ -1,1 +1,303 @@
+//! Analytic scenes with closed answers, and slow twins of the fast kernels.
 
+use super::*;
+use crate::{
+    executor::{Executor, Serial},
+    geometry::{StereoRig, exp},
+    image::View,
+};
+use nalgebra::{Point3, Vector3};
+use std::{collections::BTreeSet, thread, vec, vec::Vec};
+
+const WIDTH: usize = 96;
+const HEIGHT: usize = 64;
+const RIG: StereoRig = StereoRig { focal_px: 80.0, center_u_px: 47.5, center_v_px: 31.5, baseline_m: 0.5 };
+const CAPACITY: Capacity = Capacity { blocks: 6_000, visible_blocks: 6_000, colour: true, ..Capacity::TINY };
+
+/// Runs `test` with a volume of that capacity.
+fn with_volume(capacity: &Capacity, config: &VolumeConfig, test: impl FnOnce(&mut Volume<'_>)) {
+    let bytes = Volume::bytes(capacity);
+    let mut slab = vec![0u8; bytes + 64];
+    let start = slab.as_ptr().align_offset(64);
+    let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
+    let mut volume = Volume::carve(capacity, config, &mut carver).unwrap();
+    assert_eq!(carver.footprint().bytes(), bytes, "the formula and the cutting agree to the byte");
+    test(&mut volume);
+}
+
+fn view(rotation_rad: [f64; 3], translation_m: [f64; 3]) -> Viewpoint {
+    Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: exp(Vector3::from(rotation_rad), Vector3::from(translation_m)) }
+}
+
+/// A depth image with steps, a slope and holes.
+fn bumpy_depth() -> Vec<f32> {
+    (0..WIDTH * HEIGHT)
+        .map(|i| match (i % WIDTH, i / WIDTH) {
+            (u, v) if (u / 7 + v / 5) % 6 == 0 => 0.0,
+            (u, v) if u > 60 => 2.0 + v as f32 * 0.02,
+            (u, v) => 4.0 + u as f32 * 0.013 + v as f32 * 0.007,
+        })
+        .collect()
+}
+
+fn observation<'a>(depth_m: &'a [f32], grey: &'a [u8]) -> Observation<'a> {
+    let depth_m = View::new(depth_m, WIDTH, HEIGHT).unwrap();
+    Observation { depth_m, grey: View::new(grey, WIDTH, HEIGHT).unwrap(), colour: None, class: None }
+}
+
+fn fuse_once(volume: &mut Volume<'_>, view: &Viewpoint, depth_m: &[f32], grey: &[u8]) -> AllocationReport {
+    let seen = observation(depth_m, grey);
+    let report = volume.allocate(view, seen.depth_m);
+    volume.fuse(view, seen, &Serial);
+    report
+}
+
+#[test]
+fn a_wall_ahead_is_stored_at_its_distance() {
+    let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![77; WIDTH * HEIGHT]);
+    let config = VolumeConfig { truncation_m: 0.4, ..VolumeConfig::default() };
+    with_volume(&CAPACITY, &config, |volume| {
+        for _ in 0..3 {
+            fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
+        }
+        let mut sampler = volume.sampler();
+        for k in 53..=67 {
+            let expected = (3.0 - f64::from(k) * 0.05) / 0.4 * 32_767.0;
+            let voxel = sampler.voxel([0, 0, k]).unwrap();
+            assert!((f64::from(voxel.sdf) - expected).abs() <= 1.5, "at {k}: {} for {expected}", voxel.sdf);
+            assert_eq!(voxel.weight, 3);
+        }
+        assert_eq!(sampler.voxel([0, 0, 51]).map(|voxel| voxel.sdf), Some(32_767), "free space within the block");
+        assert_eq!(sampler.voxel([0, 0, 69]), None, "behind the truncation nothing was observed");
+        let slot = volume.find(BlockCoord::of_lattice([0, 0, 60]).unwrap()).unwrap();
+        assert_eq!(volume.blocks().colour(slot).unwrap()[1][4 << 6], 77);
+    });
+}
+
+#[test]
+fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
+    let depth_m = bumpy_depth();
+    let view = view([0.1, -0.2, 0.05], [1.0, -0.3, 2.0]);
+    with_volume(&CAPACITY, &VolumeConfig::default(), |volume| {
+        let report = volume.allocate(&view, View::new(&depth_m, WIDTH, HEIGHT).unwrap());
+        let mut fine = BTreeSet::new();
+        let block_m = 0.4;
+        for (i, &depth) in depth_m.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+            let direction = Vector3::new(((i % WIDTH) as f64 - RIG.center_u_px) / 80.0, ((i / WIDTH) as f64 - RIG.center_v_px) / 80.0, 1.0);
+            for step in 0..=3_000 {
+                let at = f64::from(depth) - 0.75 + 1.5 * f64::from(step) / 3_000.0;
+                let point = view.t_world_camera.transform_point(&Point3::from(direction * at)).coords / block_m;
+                let block = [point.x, point.y, point.z].map(|c| (c + 1.0 / 16.0).floor() as i32);
+                fine.insert(BlockCoord::new(block[0], block[1], block[2]).unwrap());
+            }
+        }
+        let made: BTreeSet<_> = volume.visible().slots().iter().map(|&slot| volume.blocks().coord(slot).unwrap()).collect();
+        assert_eq!(report.made as usize, made.len());
+        assert!(fine.is_subset(&made), "no block a ray runs through is missed");
+        // The sampled twin steps over corners of less than half a millimetre; hardly any block hangs on one.
+        assert!(made.len() - fine.len() <= made.len() / 100, "{} made, {} found by small steps", made.len(), fine.len());
+    });
+}
+
+/// Fusion as its module states it, one voxel after the other.
+fn fuse_slowly(
+    config: &VolumeConfig,
+    view: &Viewpoint,
+    seen: &Observation<'_>,
+    coord: BlockCoord,
+    sdf: &mut [i16; BLOCK_VOXELS],
+    weight: &mut [u8; BLOCK_VOXELS],
+) {
+    let (camera_from_world, camera) = view.camera_from_world();
+    let voxel_m = f64::from(config.voxel_size_m);
+    let corner = (camera_from_world * (Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m)) - camera.coords)).cast::<f32>();
+    let step = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>());
+    for voxel in 0..BLOCK_VOXELS {
+        let (x, y, z) = (voxel & 7, voxel >> 3 & 7, voxel >> 6);
+        let first = corner + step[1] * y as f32 + step[2] * z as f32;
+        let at = Vector3::new(first.x + step[0].x * x as f32, first.y + step[0].y * x as f32, first.z + step[0].z * x as f32);
+        if at.z <= 0.0 {
+            continue;
+        }
+        let scale = RIG.focal_px as f32 / at.z;
+        let column = libm::rintf(at.x * scale + RIG.center_u_px as f32);
+        let row = libm::rintf(at.y * scale + RIG.center_v_px as f32);
+        if column < 0.0 || row < 0.0 || column >= WIDTH as f32 || row >= HEIGHT as f32 {
+            continue;
+        }
+        let depth = seen.depth_m.get(column as usize, row as usize).unwrap();
+        let distance = depth - at.z;
+        if depth <= 0.0 || distance < -config.truncation_m {
+            continue;
+        }
+        let observed =
+            if distance < config.truncation_m { libm::rintf(distance * (32_767.0 / config.truncation_m)) as i32 } else { 32_767 };
+        let w = i32::from(weight[voxel]);
+        let share = (((1 << 23) + (w + 1) / 2) / (w + 1) + 128) >> 8;
+        let old = i32::from(sdf[voxel]);
+        sdf[voxel] = (old + (((observed - old) * share + (1 << 14)) >> 15)) as i16;
+        weight[voxel] = (w + 1).min(i32::from(config.max_weight)) as u8;
+    }
+}
+
+#[test]
+fn equals_the_plain_twin_bit_for_bit() {
+    let config = VolumeConfig { max_weight: 3, ..VolumeConfig::default() };
+    let (depth_m, grey) = (bumpy_depth(), vec![50; WIDTH * HEIGHT]);
+    with_volume(&CAPACITY, &config, |volume| {
+        for i in 0..5 {
+            let view = view([0.02 * f64::from(i), 0.1, -0.3], [0.1 * f64::from(i), 0.0, 0.2]);
+            let seen = observation(&depth_m, &grey);
+            volume.allocate(&view, seen.depth_m);
+            let mut twins: Vec<_> = volume
+                .visible()
+                .slots()
+                .iter()
+                .map(|&slot| (slot, *volume.blocks().sdf(slot).unwrap(), *volume.blocks().weight(slot).unwrap()))
+                .collect();
+            volume.fuse(&view, seen, &Serial);
+            for (slot, sdf, weight) in &mut twins {
+                fuse_slowly(&config, &view, &seen, volume.blocks().coord(*slot).unwrap(), sdf, weight);
+                assert!(volume.blocks().sdf(*slot).unwrap() == sdf && volume.blocks().weight(*slot).unwrap() == weight);
+            }
+        }
+    });
+}
+
+/// Two threads.
+struct Threads;
+
+impl Executor for Threads {
+    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
+    where
+        A: FnOnce() -> RA + Send,
+        B: FnOnce() -> RB + Send,
+        RA: Send,
+        RB: Send,
+    {
+        thread::scope(|scope| {
+            let b = scope.spawn(b);
+            (a(), b.join().unwrap())
+        })
+    }
+}
+
+#[test]
+fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
+    let (depth_m, grey) = (bumpy_depth(), vec![50; WIDTH * HEIGHT]);
+    let run = |threads: bool| {
+        let mut digests = Vec::new();
+        with_volume(&CAPACITY, &VolumeConfig::default(), |volume| {
+            for i in 0..4 {
+                let view = view([0.0, 0.05 * f64::from(i), 0.0], [0.0, 0.0, 0.3 * f64::from(i)]);
+                let seen = observation(&depth_m, &grey);
+                volume.allocate(&view, seen.depth_m);
+                if threads {
+                    volume.fuse(&view, seen, &Threads)
+                } else {
+                    volume.fuse(&view, seen, &Serial)
+                }
+                digests.push(volume.digest());
+            }
+            let of_content = (0..volume.pool().high_water() as u32)
+                .filter(|&slot| volume.blocks().weight(slot).unwrap().iter().any(|&weight| weight > 0))
+                .map(|slot| {
+                    let blocks = volume.blocks();
+                    let coord = blocks.coord(slot).unwrap();
+                    fuse::block_digest(coord, blocks.sdf(slot).unwrap(), blocks.weight(slot).unwrap(), blocks.colour(slot))
+                })
+                .fold(0u64, u64::wrapping_add);
+            assert_eq!(volume.digest(), of_content);
+        });
+        digests
+    };
+    let serial = run(false);
+    assert_eq!(serial, run(true));
+    assert!(serial.windows(2).all(|pair| pair[0] != pair[1]));
+}
+
+#[test]
+fn a_full_pool_refuses_and_counts_and_keeps_what_it_has() {
+    let (depth_m, grey) = (bumpy_depth(), vec![50; WIDTH * HEIGHT]);
+    for blocks in [1, 2, 17] {
+        with_volume(&Capacity { blocks, ..CAPACITY }, &VolumeConfig::default(), |volume| {
+            for _ in 0..3 {
+                let report = fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
+                assert!(report.refused > 0);
+                assert_eq!(volume.pool().len(), blocks);
+                assert_eq!(volume.visible().slots().len(), blocks);
+            }
+            let seen = (0..blocks as u32).filter(|&slot| volume.blocks().weight(slot).unwrap().iter().any(|&weight| weight == 3)).count();
+            assert!(seen > 0, "the blocks there are keep being fused");
+        });
+    }
+}
+
+#[test]
+fn a_full_visible_list_leaves_blocks_out_and_counts() {
+    let (depth_m, grey) = (bumpy_depth(), vec![50; WIDTH * HEIGHT]);
+    with_volume(&Capacity { visible_blocks: 10, ..CAPACITY }, &VolumeConfig::default(), |volume| {
+        let report = fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
+        assert_eq!(volume.visible().slots().len(), 10);
+        assert!(report.unlisted > 0);
+    });
+}
+
+#[test]
+fn beyond_the_map_is_refused_and_counted() {
+    let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
+    with_volume(&CAPACITY, &VolumeConfig::default(), |volume| {
+        for far in [13_106.0, 1e9, -1e300] {
+            let report = fuse_once(volume, &view([0.0; 3], [0.0, 0.0, far]), &depth_m, &grey);
+            assert!(report.beyond > 0 && report.made == 0, "at {far} m: {report:?}");
+        }
+    });
+}
+
+#[test]
+fn near_observations_weigh_more_when_asked_and_weight_stops_at_its_maximum() {
+    for (depth, expected) in [(10.0, 10), (15.0, 6), (19.9, 5), (5.0, 10)] {
+        let config = VolumeConfig { observation_weight: ObservationWeight::Depth, max_weight: 25, ..VolumeConfig::default() };
+        with_volume(&Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY }, &config, |volume| {
+            let (depth_m, grey) = (vec![depth; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
+            let point = [0, 0, (depth / 0.05) as i32];
+            fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
+            assert_eq!(volume.sampler().voxel(point).unwrap().weight, expected);
+            for _ in 0..6 {
+                fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
+            }
+            assert_eq!(volume.sampler().voxel(point).unwrap().weight, 25);
+        });
+    }
+}
+
+#[test]
+fn a_class_of_weight_zero_stays_out_of_the_map_and_another_counts_thrice() {
+    let mut config = VolumeConfig::default();
+    config.class_weight[7] = 0;
+    config.class_weight[8] = 3;
+    let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
+    let class: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| if i % WIDTH < WIDTH / 2 { 7 } else { 8 }).collect();
+    with_volume(&CAPACITY, &config, |volume| {
+        let mut seen = observation(&depth_m, &grey);
+        seen.class = View::new(&class, WIDTH, HEIGHT);
+        volume.allocate(&view([0.0; 3], [0.0; 3]), seen.depth_m);
+        volume.fuse(&view([0.0; 3], [0.0; 3]), seen, &Serial);
+        assert_eq!(volume.sampler().voxel([-10, 0, 60]), None);
+        assert_eq!(volume.sampler().voxel([10, 0, 60]).unwrap().weight, 3);
+    });
+}
+
+#[test]
+fn free_space_is_carved_where_noise_once_put_a_surface() {
+    let grey = vec![50; WIDTH * HEIGHT];
+    let config = VolumeConfig { truncation_m: 0.3, ..VolumeConfig::default() };
+    with_volume(&CAPACITY, &config, |volume| {
+        fuse_once(volume, &view([0.0; 3], [0.0; 3]), &vec![2.0; WIDTH * HEIGHT], &grey);
+        assert!(volume.sampler().voxel([0, 0, 42]).unwrap().sdf < 0);
+        for _ in 0..8 {
+            fuse_once(volume, &view([0.0; 3], [0.0; 3]), &vec![8.0; WIDTH * HEIGHT], &grey);
+        }
+        assert!(volume.sampler().voxel([0, 0, 42]).unwrap().sdf > 20_000);
+    });
+}
