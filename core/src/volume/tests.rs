@@ -227,7 +227,7 @@ fn a_full_pool_refuses_and_counts_and_keeps_what_it_has() {
                 assert_eq!(volume.pool().len(), blocks);
                 assert_eq!(volume.visible().slots().len(), blocks);
             }
-            let seen = (0..blocks as u32).filter(|&slot| volume.blocks().weight(slot).unwrap().iter().any(|&weight| weight == 3)).count();
+            let seen = (0..blocks as u32).filter(|&slot| volume.blocks().weight(slot).unwrap().contains(&3)).count();
             assert!(seen > 0, "the blocks there are keep being fused");
         });
     }
