@@ -1,6 +1,8 @@
 //! Allocation and fusion at KITTI size: 5 cm, truncation 0.75 m, 20 m, colour. On odometry 06 with given disparities and true poses where
 //! the clip is there (`DYNVOX_DATA`, else `../shared/data`), else on a plain synthetic street canyon.
 
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a bench may stop at what it does not expect")]
+
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     Capacity, Serial,
