@@ -53,7 +53,7 @@ fn canyon() -> Vec<Frame> {
         let (x, y) = (((i % width) as f32 - 601.0) / 707.0, ((i / width) as f32 - 183.0) / 707.0);
         let road = if y > 0.0 { 1.65 / y } else { 99.0 };
         let wall = if x > 0.0 { 6.0 / x } else { -8.0 / x };
-        let nearest = road.min(wall);
+        let nearest = if road < wall { road } else { wall };
         *depth = if nearest < 20.0 { nearest } else { 0.0 };
     }
     let view = |z| Viewpoint { rig, width, height, t_world_camera: exp(Vector3::zeros(), Vector3::new(0.0, 0.0, z)) };
