@@ -46,6 +46,11 @@ impl<'a, T> View<'a, T> {
         self.data.get(v * self.stride..v * self.stride + self.width).unwrap_or(&[])
     }
 
+    /// The pixels row by row, of an image without padding; empty for one with.
+    pub fn pixels(&self) -> &'a [T] {
+        if self.stride == self.width { self.data.get(..self.width * self.height).unwrap_or(&[]) } else { &[] }
+    }
+
     /// All rows, top to bottom.
     pub fn rows(&self) -> impl Iterator<Item = &'a [T]> + use<'a, T> {
         let this = (self.data, self.width, self.stride);
