@@ -1,1 +1,1 @@
-//! Shared ground of the integration tests.
+//! Shared ground of the integration tests: a slab for a mapper, and small clips of the synthetic street.
