@@ -27,7 +27,12 @@ fn data() -> PathBuf {
 fn kitti() -> Option<Vec<Frame>> {
     let root = data().join("kitti-odometry");
     let poses = std::fs::read_to_string(root.join("poses/06.txt")).ok()?;
-    let rig = StereoRig { focal_px: 707.0912, center_u_px: 601.8873, center_v_px: 183.1104, baseline_m: 379.8145 / 707.0912 };
+    let rig = StereoRig {
+        focal_px: 707.0912,
+        center_u_px: 601.8873,
+        center_v_px: 183.1104,
+        baseline_m: 379.8145 / 707.0912,
+    };
     let mut frames = Vec::new();
     for (i, line) in poses.lines().enumerate() {
         let disparity = image::open(root.join(format!("sequences/06/disp_elas/{i:06}.png"))).ok()?.into_luma16();
@@ -39,7 +44,11 @@ fn kitti() -> Option<Vec<Frame>> {
         let mut depth_m = vec![0.0; width * height];
         let disparity = View::new(disparity.as_raw(), width, height)?;
         depth_from_disparity(&rig, 0.5, 20.0, disparity, &mut ViewMut::new(&mut depth_m, width, height)?);
-        frames.push(Frame { depth_m, grey: grey.into_raw(), view: Viewpoint { rig, width, height, t_world_camera } });
+        frames.push(Frame {
+            depth_m,
+            grey: grey.into_raw(),
+            view: Viewpoint { rig, width, height, t_world_camera },
+        });
     }
     Some(frames)
 }
@@ -56,8 +65,19 @@ fn canyon() -> Vec<Frame> {
         let nearest = if road < wall { road } else { wall };
         *depth = if nearest < 20.0 { nearest } else { 0.0 };
     }
-    let view = |z| Viewpoint { rig, width, height, t_world_camera: exp(Vector3::zeros(), Vector3::new(0.0, 0.0, z)) };
-    (0..20).map(|i| Frame { depth_m: depth_m.clone(), grey: vec![128; width * height], view: view(f64::from(i)) }).collect()
+    let view = |z| Viewpoint {
+        rig,
+        width,
+        height,
+        t_world_camera: exp(Vector3::zeros(), Vector3::new(0.0, 0.0, z)),
+    };
+    (0..20)
+        .map(|i| Frame {
+            depth_m: depth_m.clone(),
+            grey: vec![128; width * height],
+            view: view(f64::from(i)),
+        })
+        .collect()
 }
 
 fn bench(criterion: &mut Criterion) {

@@ -15,14 +15,24 @@ pub struct Capacity {
     pub blocks: usize,
     /// Blocks visible in one frame. Further ones are not fused in that frame, and counted.
     pub visible_blocks: usize,
+    /// Frames the visible history spans. A longer `prune_lag` is cut to this, and each frame pruned early is counted.
+    pub history_frames: usize,
     /// Whether voxels have colour: 3,072 bytes a block with, 1,536 without.
     pub colour: bool,
 }
 
 impl Capacity {
     /// Below 8 MiB: a microcontroller with external memory.
-    pub const TINY: Self =
-        Self { image_width: 320, image_height: 96, features: 2_000, matches: 1_000, blocks: 2_500, visible_blocks: 2_000, colour: false };
+    pub const TINY: Self = Self {
+        image_width: 320,
+        image_height: 96,
+        features: 2_000,
+        matches: 1_000,
+        blocks: 2_500,
+        visible_blocks: 2_000,
+        history_frames: 64,
+        colour: false,
+    };
     /// Below 64 MiB: KITTI at half size.
     pub const SMALL: Self = Self {
         image_width: 640,
@@ -31,6 +41,7 @@ impl Capacity {
         matches: 4_000,
         blocks: 30_000,
         visible_blocks: 12_000,
+        history_frames: 64,
         colour: false,
     };
     /// Below 256 MiB: KITTI at full size, in colour.
@@ -41,6 +52,7 @@ impl Capacity {
         matches: 10_000,
         blocks: 62_000,
         visible_blocks: 24_000,
+        history_frames: 200,
         colour: true,
     };
     /// Below 2 GiB: a drive of some hundred metres at full size, in colour.
@@ -51,6 +63,7 @@ impl Capacity {
         matches: 20_000,
         blocks: 550_000,
         visible_blocks: 60_000,
+        history_frames: 200,
         colour: true,
     };
 

@@ -31,7 +31,12 @@ unsafe impl Sync for OneShot<'_> {}
 impl<'s> OneShot<'s> {
     /// Takes over a region of the slab.
     pub fn new(region: &'s mut [u8]) -> Self {
-        Self { len: region.len(), start: NonNull::from(region).cast(), taken: AtomicBool::new(false), region: PhantomData }
+        Self {
+            len: region.len(),
+            start: NonNull::from(region).cast(),
+            taken: AtomicBool::new(false),
+            region: PhantomData,
+        }
     }
 }
 

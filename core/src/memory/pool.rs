@@ -40,7 +40,13 @@ impl<'s> SlotPool<'s> {
     /// Cuts a pool of `slots` slots. `names` are those of its two regions: generations, free list.
     pub fn carve(carver: &mut Carver<'s>, slots: usize, names: [&'static str; 2]) -> Result<Self, SlabError> {
         let [generations, free_list] = names;
-        Ok(Self { generation: carver.cut(generations, slots)?, freed: carver.cut(free_list, slots)?, freed_len: 0, fresh: 0, peak: 0 })
+        Ok(Self {
+            generation: carver.cut(generations, slots)?,
+            freed: carver.cut(free_list, slots)?,
+            freed_len: 0,
+            fresh: 0,
+            peak: 0,
+        })
     }
 
     /// Slots in all.

@@ -186,13 +186,14 @@ impl Volume<'_> {
     }
 
     /// Takes a slot for a new, empty block.
-    fn make(&mut self, coord: BlockCoord) -> Option<u32> {
+    pub(super) fn make(&mut self, coord: BlockCoord) -> Option<u32> {
         let handle = self.pool.take().ok()?;
         self.blocks.clear(handle.slot, coord);
         if self.index.insert(self.blocks.coord, coord, handle.slot).is_err() {
             self.pool.free(handle);
             return None;
         }
+        self.history.born(handle.slot, self.visible.frame());
         Some(handle.slot)
     }
 

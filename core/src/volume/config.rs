@@ -37,6 +37,14 @@ pub struct VolumeConfig {
     pub class_weight: [u8; CLASS_COUNT],
     /// Share of the truncation on either side of the surface within which colour is averaged, 0 to 1; 0.25.
     pub colour_band: f32,
+    /// Voxels seen at most this often are reset when their block leaves the window; 0 is off, below `max_weight`; 1.
+    pub prune_weight: u8,
+    /// Length of the window, frames. At least 1; 200 (the paper's text: 300, its pruning experiment: 40).
+    pub prune_lag: u32,
+    /// A block whose smallest |distance| is above this share of the truncation goes as a whole, 0 to 1; 0 is off.
+    pub prune_distance: f32,
+    /// Most blocks visited in one frame; the rest follows in the next. At least 1; 20,000.
+    pub prune_blocks_per_frame: u32,
 }
 
 impl Default for VolumeConfig {
@@ -50,6 +58,10 @@ impl Default for VolumeConfig {
             observation_weight: ObservationWeight::One,
             class_weight: [1; CLASS_COUNT],
             colour_band: 0.25,
+            prune_weight: 1,
+            prune_lag: 200,
+            prune_distance: 0.0,
+            prune_blocks_per_frame: 20_000,
         }
     }
 }
@@ -74,5 +86,9 @@ impl VolumeConfig {
         require(problems, positive(self.far_m) && self.far_m > self.near_m, "volume.far_m", "must be above volume.near_m");
         require(problems, self.max_weight >= 1, "volume.max_weight", "must be from 1 to 255");
         require(problems, (0.0..=1.0).contains(&self.colour_band), "volume.colour_band", "must be from 0 to 1");
+        require(problems, self.prune_weight < self.max_weight, "volume.prune_weight", "must be below volume.max_weight");
+        require(problems, self.prune_lag >= 1, "volume.prune_lag", "must be at least 1 frame");
+        require(problems, (0.0..=1.0).contains(&self.prune_distance), "volume.prune_distance", "must be from 0 to 1");
+        require(problems, self.prune_blocks_per_frame >= 1, "volume.prune_blocks_per_frame", "must be at least 1");
     }
 }

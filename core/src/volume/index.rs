@@ -25,7 +25,7 @@ impl core::fmt::Debug for BlockIndex<'_> {
 }
 
 /// Coordinates mixed by constants (the multipliers of Teschner et al., 2003, then a 64-bit finaliser: hashbrown looks at both ends).
-fn hash(coord: BlockCoord) -> u64 {
+pub(super) fn hash(coord: BlockCoord) -> u64 {
     let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
     let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);

@@ -3,13 +3,15 @@
 //! Space is a lattice of points `voxel_size_m` apart; lattice point (i, j, k) lies at `voxel_size_m * (i, j, k)` in the map's frame.
 //! 8 x 8 x 8 of them are a block. Each point keeps a signed distance, how often it was seen and, where the profile has it, a colour.
 //! A depth image is fused in two steps: blocks within the truncation of its surface are made ([`Volume::allocate`]), then every visible
-//! block is updated by integer averages ([`Volume::fuse`]).
+//! block is updated by integer averages ([`Volume::fuse`]); what was visible a fixed lag ago is rid of noise ([`Volume::prune`]).
 
 mod allocate;
 mod block;
 mod config;
 mod fuse;
+mod history;
 mod index;
+mod prune;
 mod sampler;
 #[cfg(test)]
 mod tests;
@@ -20,7 +22,9 @@ pub use allocate::{AllocationReport, MAX_BLOCKS_PER_RAY};
 pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, Blocks};
 pub use config::{CLASS_COUNT, ObservationWeight, VolumeConfig};
 pub use fuse::Observation;
+pub use history::VisibleHistory;
 pub use index::BlockIndex;
+pub use prune::PruneReport;
 pub use sampler::{Sampler, VoxelSample};
 pub use viewpoint::Viewpoint;
 pub use visible::VisibleList;
@@ -36,6 +40,7 @@ pub struct Volume<'s> {
     blocks: Blocks<'s>,
     visible: VisibleList<'s>,
     seen: allocate::Seen<'s>,
+    history: VisibleHistory<'s>,
     digest: u64,
 }
 
@@ -47,6 +52,7 @@ impl<'s> Volume<'s> {
             + Blocks::bytes(capacity.blocks, capacity.colour)
             + VisibleList::bytes(capacity)
             + allocate::Seen::bytes()
+            + VisibleHistory::bytes(capacity)
     }
 
     /// Cuts an empty map.
@@ -58,6 +64,7 @@ impl<'s> Volume<'s> {
             blocks: Blocks::carve(capacity, carver)?,
             visible: VisibleList::carve(capacity, carver)?,
             seen: allocate::Seen::carve(carver)?,
+            history: VisibleHistory::carve(capacity, carver)?,
             digest: 0,
         })
     }
@@ -80,6 +87,11 @@ impl<'s> Volume<'s> {
     /// The blocks visible in the last frame.
     pub fn visible(&self) -> &VisibleList<'s> {
         &self.visible
+    }
+
+    /// Which blocks were visible in the frames of the window.
+    pub fn history(&self) -> &VisibleHistory<'s> {
+        &self.history
     }
 
     /// The block at `coord`.

@@ -46,6 +46,11 @@ impl<'s> VisibleList<'s> {
         self.frame = self.frame.wrapping_add(1);
     }
 
+    /// Number of the frame begun last, from 1.
+    pub(super) fn frame(&self) -> u32 {
+        self.frame
+    }
+
     /// Enters a slot unless it is entered already.
     pub(super) fn mark(&mut self, slot: u32) -> Result<(), Full> {
         let last = self.last_visible.get_mut(slot as usize).ok_or(Full)?;

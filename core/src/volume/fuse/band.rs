@@ -16,7 +16,15 @@ pub(super) struct Band<'b> {
 impl<'b> Band<'b> {
     /// All listed blocks.
     pub(super) fn whole(slots: &'b [u32], blocks: &'b mut Blocks<'_>) -> Self {
-        Self { slots, first: 0, coord: blocks.coord, sdf: blocks.sdf, weight: blocks.weight, colour: blocks.colour, digest: blocks.digest }
+        Self {
+            slots,
+            first: 0,
+            coord: blocks.coord,
+            sdf: blocks.sdf,
+            weight: blocks.weight,
+            colour: blocks.colour,
+            digest: blocks.digest,
+        }
     }
 
     /// Splits before the block in the middle of the list.

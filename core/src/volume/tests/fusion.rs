@@ -1,56 +1,8 @@
-//! Analytic scenes with closed answers, and slow twins of the fast kernels.
+//! Allocation and fusion.
 
 use super::*;
-use crate::{
-    executor::{Executor, Serial},
-    geometry::{StereoRig, exp},
-    image::View,
-};
-use nalgebra::{Point3, Vector3};
-use std::{collections::BTreeSet, thread, vec, vec::Vec};
-
-const WIDTH: usize = 96;
-const HEIGHT: usize = 64;
-const RIG: StereoRig = StereoRig { focal_px: 80.0, center_u_px: 47.5, center_v_px: 31.5, baseline_m: 0.5 };
-const CAPACITY: Capacity = Capacity { blocks: 6_000, visible_blocks: 6_000, colour: true, ..Capacity::TINY };
-
-/// Runs `test` with a volume of that capacity.
-fn with_volume(capacity: &Capacity, config: &VolumeConfig, test: impl FnOnce(&mut Volume<'_>)) {
-    let bytes = Volume::bytes(capacity);
-    let mut slab = vec![0u8; bytes + 64];
-    let start = slab.as_ptr().align_offset(64);
-    let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
-    let mut volume = Volume::carve(capacity, config, &mut carver).unwrap();
-    assert_eq!(carver.footprint().bytes(), bytes, "the formula and the cutting agree to the byte");
-    test(&mut volume);
-}
-
-fn view(rotation_rad: [f64; 3], translation_m: [f64; 3]) -> Viewpoint {
-    Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: exp(Vector3::from(rotation_rad), Vector3::from(translation_m)) }
-}
-
-/// A depth image with steps, a slope and holes.
-fn bumpy_depth() -> Vec<f32> {
-    (0..WIDTH * HEIGHT)
-        .map(|i| match (i % WIDTH, i / WIDTH) {
-            (u, v) if (u / 7 + v / 5) % 6 == 0 => 0.0,
-            (u, v) if u > 60 => 2.0 + v as f32 * 0.02,
-            (u, v) => 4.0 + u as f32 * 0.013 + v as f32 * 0.007,
-        })
-        .collect()
-}
-
-fn observation<'a>(depth_m: &'a [f32], grey: &'a [u8]) -> Observation<'a> {
-    let depth_m = View::new(depth_m, WIDTH, HEIGHT).unwrap();
-    Observation { depth_m, grey: View::new(grey, WIDTH, HEIGHT).unwrap(), colour: None, class: None }
-}
-
-fn fuse_once(volume: &mut Volume<'_>, view: &Viewpoint, depth_m: &[f32], grey: &[u8]) -> AllocationReport {
-    let seen = observation(depth_m, grey);
-    let report = volume.allocate(view, seen.depth_m);
-    volume.fuse(view, seen, &Serial);
-    report
-}
+use nalgebra::Point3;
+use std::collections::BTreeSet;
 
 #[test]
 fn a_wall_ahead_is_stored_at_its_distance() {
@@ -164,24 +116,6 @@ fn equals_the_plain_twin_bit_for_bit() {
     });
 }
 
-/// Two threads.
-struct Threads;
-
-impl Executor for Threads {
-    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
-    where
-        A: FnOnce() -> RA + Send,
-        B: FnOnce() -> RB + Send,
-        RA: Send,
-        RB: Send,
-    {
-        thread::scope(|scope| {
-            let b = scope.spawn(b);
-            (a(), b.join().unwrap())
-        })
-    }
-}
-
 #[test]
 fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
     let (depth_m, grey) = (bumpy_depth(), vec![50; WIDTH * HEIGHT]);
@@ -257,7 +191,11 @@ fn beyond_the_map_is_refused_and_counted() {
 #[test]
 fn near_observations_weigh_more_when_asked_and_weight_stops_at_its_maximum() {
     for (depth, expected) in [(10.0, 10), (15.0, 6), (19.9, 5), (5.0, 10)] {
-        let config = VolumeConfig { observation_weight: ObservationWeight::Depth, max_weight: 25, ..VolumeConfig::default() };
+        let config = VolumeConfig {
+            observation_weight: ObservationWeight::Depth,
+            max_weight: 25,
+            ..VolumeConfig::default()
+        };
         with_volume(&Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY }, &config, |volume| {
             let (depth_m, grey) = (vec![depth; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
             let point = [0, 0, (depth / 0.05) as i32];

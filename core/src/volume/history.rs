@@ -1,0 +1,163 @@
+//! Which blocks were visible in each of the last frames: the paper's fixed-lag window (Section III-F).
+//!
+//! A ring of bit sets over the pool's slots, one per frame. A slot that was freed and given out again since is told apart by the frame its
+//! block was born in. Walking a set visits slots in ascending order, on every machine.
+//!
+//! Memory: `frames * ceil(blocks / 64) * 8` bytes, one more set for what a frame could not finish, and 4 bytes a block: 1.7 MiB for 200
+//! frames of 70,000 blocks, where lists of coordinates would take 13.7 MiB (docs/decisions/0005-history-of-bit-sets.md). Time: one bit
+//! per visible block to enter a frame; a pass over one set to take one out.
+
+use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+
+/// Frames, as bit sets over slots, oldest first out.
+#[derive(Debug)]
+pub struct VisibleHistory<'s> {
+    /// `frames` sets of `words` words each.
+    sets: &'s mut [u64],
+    words: usize,
+    /// What has been taken out of the ring and not been visited yet.
+    due: &'s mut [u64],
+    /// The frame each slot's block was made in.
+    born: &'s mut [u32],
+    /// Frame number of the oldest set, and how many there are.
+    oldest: u32,
+    len: usize,
+    peak: usize,
+}
+
+impl<'s> VisibleHistory<'s> {
+    const fn words(capacity: &Capacity) -> usize {
+        capacity.blocks.div_ceil(64)
+    }
+
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        region_bytes::<u64>(capacity.history_frames * Self::words(capacity))
+            + region_bytes::<u64>(Self::words(capacity))
+            + region_bytes::<u32>(capacity.blocks)
+    }
+
+    /// Cuts an empty history.
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        let words = Self::words(capacity);
+        Ok(Self {
+            sets: carver.cut("volume.history", capacity.history_frames * words)?,
+            words,
+            due: carver.cut("volume.history_due", words)?,
+            born: carver.cut("volume.born", capacity.blocks)?,
+            oldest: 0,
+            len: 0,
+            peak: 0,
+        })
+    }
+
+    /// Frames the ring can hold.
+    pub fn capacity(&self) -> usize {
+        self.sets.len().checked_div(self.words).unwrap_or(0)
+    }
+
+    /// Frames in the ring.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether no frame is in the ring.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The most frames ever in the ring.
+    pub fn peak(&self) -> usize {
+        self.peak
+    }
+
+    /// Notes that the block in `slot` was made in `frame`.
+    pub(super) fn born(&mut self, slot: u32, frame: u32) {
+        if let Some(born) = self.born.get_mut(slot as usize) {
+            *born = frame;
+        }
+    }
+
+    /// Notes that the block in `slot` is gone: it is no longer due, and what the ring says of it is void.
+    pub(super) fn gone(&mut self, slot: u32) {
+        self.born(slot, u32::MAX);
+        if let Some(word) = self.due.get_mut(slot as usize / 64) {
+            *word &= !(1 << (slot % 64));
+        }
+    }
+
+    /// Enters the slots visible in `frame`, which must follow the last one entered. The ring must not be full.
+    pub(super) fn enter(&mut self, frame: u32, visible: &[u32]) {
+        if self.len == 0 {
+            self.oldest = frame;
+        }
+        let Some(set) = self.set_mut(frame) else { return };
+        set.fill(0);
+        for &slot in visible {
+            if let Some(word) = set.get_mut(slot as usize / 64) {
+                *word |= 1 << (slot % 64);
+            }
+        }
+        self.len += 1;
+        if self.len > self.peak {
+            self.peak = self.len;
+        }
+    }
+
+    /// Takes the oldest frame out of the ring: its blocks are due. Returns the frame.
+    pub(super) fn expire(&mut self) -> Option<u32> {
+        self.len = self.len.checked_sub(1)?;
+        let frame = self.oldest;
+        self.oldest = frame.wrapping_add(1);
+        let at = self.set_range(frame)?;
+        let set = self.sets.get(at)?;
+        for (i, (due, seen)) in self.due.iter_mut().zip(set).enumerate() {
+            let mut bits = *seen;
+            // Of the seen slots only those whose block is as old as the frame.
+            while bits != 0 {
+                let bit = bits.trailing_zeros();
+                bits &= bits - 1;
+                let slot = i * 64 + bit as usize;
+                if self.born.get(slot).is_some_and(|&born| born <= frame) {
+                    *due |= 1 << bit;
+                }
+            }
+        }
+        Some(frame)
+    }
+
+    /// The oldest frame in the ring.
+    pub fn oldest(&self) -> Option<u32> {
+        (self.len > 0).then_some(self.oldest)
+    }
+
+    /// The next slot that is due, at or after `from`; it is due no longer.
+    pub(super) fn take_due(&mut self, from: u32) -> Option<u32> {
+        let first = from as usize / 64;
+        for (i, word) in self.due.iter_mut().enumerate().skip(first) {
+            let below = if i == first { (1 << (from % 64)) - 1 } else { 0 };
+            let bits = *word & !below;
+            if bits != 0 {
+                let bit = bits.trailing_zeros();
+                *word &= !(1 << bit);
+                return Some(i as u32 * 64 + bit);
+            }
+        }
+        None
+    }
+
+    /// Slots that are due and wait for a later frame.
+    pub fn due(&self) -> u32 {
+        self.due.iter().map(|word| word.count_ones()).sum()
+    }
+
+    fn set_range(&self, frame: u32) -> Option<core::ops::Range<usize>> {
+        let at = (frame as usize).checked_rem(self.capacity())? * self.words;
+        Some(at..at + self.words)
+    }
+
+    fn set_mut(&mut self, frame: u32) -> Option<&mut [u64]> {
+        let range = self.set_range(frame)?;
+        self.sets.get_mut(range)
+    }
+}

@@ -1,0 +1,143 @@
+//! Pruning: what noise left behind goes, a fixed lag after it was last looked at (Section III-F of the paper).
+//!
+//! After frame n the blocks visible in frame n - lag are visited. Each voxel with 0 < weight <= `prune_weight` is reset; a block without
+//! a seen voxel left, or one whose smallest |distance| exceeds `prune_distance` (Nießner et al., 2013, Section 5.3; off by default), goes
+//! back to the pool. At most `prune_blocks_per_frame` blocks are visited per frame; the rest stays due and comes first in the next.
+//!
+//! Weight 0 is off, bit for bit.
+
+use super::{BLOCK_VOXELS, BlockCoord, Volume, fuse::block_digest};
+
+/// What pruning did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PruneReport {
+    /// Blocks visited.
+    pub visited: u32,
+    /// Voxels reset to never seen.
+    pub voxels_reset: u32,
+    /// Blocks given back.
+    pub blocks_freed: u32,
+    /// Blocks due that wait for a later frame.
+    pub carried_over: u32,
+    /// Frames taken out of the history before their time, because it was full.
+    pub early: u32,
+}
+
+impl PruneReport {
+    fn add(&mut self, reset: u32, freed: bool) {
+        self.visited += 1;
+        self.voxels_reset += reset;
+        self.blocks_freed += u32::from(freed);
+    }
+}
+
+impl Volume<'_> {
+    /// Remembers what is visible in this frame and prunes what was visible `prune_lag` frames ago.
+    pub fn prune(&mut self) -> PruneReport {
+        let mut report = PruneReport::default();
+        if self.config.prune_weight == 0 {
+            return report;
+        }
+        let frame = self.visible.frame();
+        if self.history.len() == self.history.capacity() && self.history.expire().is_some() {
+            report.early += u32::from(self.history.capacity() < self.config.prune_lag as usize);
+        }
+        self.history.enter(frame, self.visible.slots());
+        while self.history.oldest().is_some_and(|oldest| frame.wrapping_sub(oldest) >= self.config.prune_lag) {
+            self.history.expire();
+        }
+        self.visit_due(self.config.prune_blocks_per_frame, &mut report);
+        report
+    }
+
+    /// Prunes everything still in the window, as at the end of a drive.
+    pub fn finish(&mut self) -> PruneReport {
+        let mut report = PruneReport::default();
+        while self.history.expire().is_some() {}
+        self.visit_due(u32::MAX, &mut report);
+        report
+    }
+
+    /// Prunes every block of the map by `prune_weight`, whenever it was seen.
+    pub fn prune_whole(&mut self, prune_weight: u8) -> PruneReport {
+        let mut report = PruneReport::default();
+        for slot in 0..self.pool.high_water() as u32 {
+            if self.pool.handle(slot).is_some() {
+                let (reset, freed) = self.prune_block(slot, prune_weight);
+                report.add(reset, freed);
+            }
+        }
+        report
+    }
+
+    fn visit_due(&mut self, most: u32, report: &mut PruneReport) {
+        let mut from = 0;
+        while report.visited < most
+            && let Some(slot) = self.history.take_due(from)
+        {
+            let (reset, freed) = self.prune_block(slot, self.config.prune_weight);
+            report.add(reset, freed);
+            from = slot + 1;
+        }
+        report.carried_over = self.history.due();
+    }
+
+    /// Resets the faint voxels of a block, and frees it when nothing is left. How many were reset, and whether it was freed.
+    fn prune_block(&mut self, slot: u32, prune_weight: u8) -> (u32, bool) {
+        let at = slot as usize;
+        let (Some(&coord), Some(sdf), Some(weight), Some(digest)) =
+            (self.blocks.coord.get(at), self.blocks.sdf.get_mut(at), self.blocks.weight.get_mut(at), self.blocks.digest.get_mut(at))
+        else {
+            return (0, false);
+        };
+        let mut planes = self.blocks.colour.get_mut(at);
+        let reset = reset_faint(prune_weight, sdf, weight, planes.as_deref_mut());
+        let empty = weight.iter().all(|&weight| weight == 0);
+        let far = self.config.prune_distance > 0.0 && nearest(sdf, weight) > self.config.prune_distance;
+        if empty || far {
+            self.free_block(slot);
+        } else if reset > 0 {
+            let new = block_digest(BlockCoord::unpacked(coord), sdf, weight, planes.as_deref());
+            self.digest = self.digest.wrapping_sub(*digest).wrapping_add(new);
+            *digest = new;
+        }
+        (reset, empty || far)
+    }
+
+    /// Takes a block out of the map.
+    pub(super) fn free_block(&mut self, slot: u32) {
+        let (Some(handle), Some(coord)) = (self.pool.handle(slot), self.blocks.coord(slot)) else { return };
+        self.index.remove(self.blocks.coord, coord);
+        self.digest = self.digest.wrapping_sub(self.blocks.digest.get(slot as usize).copied().unwrap_or(0));
+        self.history.gone(slot);
+        self.pool.free(handle);
+    }
+}
+
+/// Resets voxels seen at most `prune_weight` times; how many.
+fn reset_faint(
+    prune_weight: u8,
+    sdf: &mut [i16; BLOCK_VOXELS],
+    weight: &mut [u8; BLOCK_VOXELS],
+    planes: Option<&mut [[u8; BLOCK_VOXELS]; 3]>,
+) -> u32 {
+    let faint = |weight: u8| weight.wrapping_sub(1) < prune_weight;
+    let count = weight.iter().map(|&weight| u16::from(faint(weight))).sum::<u16>();
+    if count == 0 {
+        return 0;
+    }
+    if let Some(planes) = planes {
+        for plane in planes {
+            plane.iter_mut().zip(weight.iter()).for_each(|(channel, &weight)| *channel = if faint(weight) { 0 } else { *channel });
+        }
+    }
+    sdf.iter_mut().zip(weight.iter()).for_each(|(sdf, &weight)| *sdf = if faint(weight) { 0 } else { *sdf });
+    weight.iter_mut().for_each(|weight| *weight = if faint(*weight) { 0 } else { *weight });
+    u32::from(count)
+}
+
+/// Smallest |distance| of the seen voxels, as a share of the truncation.
+fn nearest(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS]) -> f32 {
+    let seen = sdf.iter().zip(weight).filter(|(_, weight)| **weight > 0);
+    seen.map(|(sdf, _)| sdf.unsigned_abs()).min().map_or(0.0, |units| f32::from(units) / 32_767.0)
+}

@@ -1,0 +1,84 @@
+//! Analytic scenes with closed answers, and slow twins of the fast kernels.
+
+mod fusion;
+mod pruning;
+
+use super::*;
+use crate::{
+    executor::{Executor, Serial},
+    geometry::{StereoRig, exp},
+    image::View,
+};
+use nalgebra::Vector3;
+use std::{thread, vec, vec::Vec};
+
+const WIDTH: usize = 96;
+const HEIGHT: usize = 64;
+const RIG: StereoRig = StereoRig { focal_px: 80.0, center_u_px: 47.5, center_v_px: 31.5, baseline_m: 0.5 };
+const CAPACITY: Capacity = Capacity { blocks: 6_000, visible_blocks: 6_000, colour: true, ..Capacity::TINY };
+
+/// Runs `test` with a volume of that capacity.
+fn with_volume(capacity: &Capacity, config: &VolumeConfig, test: impl FnOnce(&mut Volume<'_>)) {
+    let bytes = Volume::bytes(capacity);
+    let mut slab = vec![0u8; bytes + 64];
+    let start = slab.as_ptr().align_offset(64);
+    let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
+    let mut volume = Volume::carve(capacity, config, &mut carver).unwrap();
+    assert_eq!(carver.footprint().bytes(), bytes, "the formula and the cutting agree to the byte");
+    test(&mut volume);
+}
+
+fn view(rotation_rad: [f64; 3], translation_m: [f64; 3]) -> Viewpoint {
+    Viewpoint {
+        rig: RIG,
+        width: WIDTH,
+        height: HEIGHT,
+        t_world_camera: exp(Vector3::from(rotation_rad), Vector3::from(translation_m)),
+    }
+}
+
+/// A depth image with steps, a slope and holes.
+fn bumpy_depth() -> Vec<f32> {
+    (0..WIDTH * HEIGHT)
+        .map(|i| match (i % WIDTH, i / WIDTH) {
+            (u, v) if (u / 7 + v / 5) % 6 == 0 => 0.0,
+            (u, v) if u > 60 => 2.0 + v as f32 * 0.02,
+            (u, v) => 4.0 + u as f32 * 0.013 + v as f32 * 0.007,
+        })
+        .collect()
+}
+
+fn observation<'a>(depth_m: &'a [f32], grey: &'a [u8]) -> Observation<'a> {
+    let depth_m = View::new(depth_m, WIDTH, HEIGHT).unwrap();
+    Observation {
+        depth_m,
+        grey: View::new(grey, WIDTH, HEIGHT).unwrap(),
+        colour: None,
+        class: None,
+    }
+}
+
+fn fuse_once(volume: &mut Volume<'_>, view: &Viewpoint, depth_m: &[f32], grey: &[u8]) -> AllocationReport {
+    let seen = observation(depth_m, grey);
+    let report = volume.allocate(view, seen.depth_m);
+    volume.fuse(view, seen, &Serial);
+    report
+}
+
+/// Two threads.
+struct Threads;
+
+impl Executor for Threads {
+    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
+    where
+        A: FnOnce() -> RA + Send,
+        B: FnOnce() -> RB + Send,
+        RA: Send,
+        RB: Send,
+    {
+        thread::scope(|scope| {
+            let b = scope.spawn(b);
+            (a(), b.join().unwrap())
+        })
+    }
+}
