@@ -9,7 +9,7 @@ use dynvox_core::{
     geometry::{StereoRig, Transform, depth_from_disparity, exp},
     image::{View, ViewMut},
     memory::Carver,
-    volume::{Observation, Viewpoint, Volume, VolumeConfig},
+    volume::{NoStore, Observation, Viewpoint, Volume, VolumeConfig},
 };
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::path::PathBuf;
@@ -101,7 +101,7 @@ fn bench(criterion: &mut Criterion) {
                     let grey = View::new(&frame.grey, frame.view.width, frame.view.height).unwrap();
                     let seen = Observation { depth_m, grey, colour: None, class: None };
                     let begin = std::time::Instant::now();
-                    volume.allocate(&frame.view, depth_m);
+                    volume.allocate(&frame.view, depth_m, &mut NoStore);
                     let middle = std::time::Instant::now();
                     volume.fuse(&frame.view, seen, &Serial);
                     spent += if only_fuse { middle.elapsed() } else { middle - begin };

@@ -64,6 +64,11 @@ impl<'s> SlotPool<'s> {
         self.len() == 0
     }
 
+    /// Whether every slot is taken.
+    pub fn is_full(&self) -> bool {
+        self.len() == self.capacity()
+    }
+
     /// The most slots ever taken at once.
     pub fn peak(&self) -> usize {
         self.peak

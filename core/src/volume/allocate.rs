@@ -7,7 +7,7 @@
 //! Memory: 128 KiB for the blocks seen in this frame, a direct-mapped cache that spares the index most look-ups. Time: linear in pixels
 //! times blocks per ray, at most [`MAX_BLOCKS_PER_RAY`].
 
-use super::{BLOCK_SIDE, BlockCoord, Viewpoint, Volume};
+use super::{BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Viewpoint, Volume};
 use crate::{
     geometry::scalar::{floor_i32, max_f32},
     image::View,
@@ -32,6 +32,8 @@ pub struct AllocationReport {
     pub beyond: u32,
     /// Visible blocks left out of the list because it was full.
     pub unlisted: u32,
+    /// Blocks that left to make room, and such that came back.
+    pub eviction: EvictionReport,
 }
 
 /// The cache of blocks already visited in this frame.
@@ -122,8 +124,9 @@ impl Walk {
 }
 
 impl Volume<'_> {
-    /// Makes the blocks around the surface that `depth_m` (0 none) shows from `view`, and lists what is visible.
-    pub fn allocate(&mut self, view: &Viewpoint, depth_m: View<'_, f32>) -> AllocationReport {
+    /// Makes the blocks around the surface that `depth_m` (0 none) shows from `view`, and lists what is visible. Blocks that must leave go
+    /// to `store`, and those it kept come back.
+    pub fn allocate<S: BlockStore>(&mut self, view: &Viewpoint, depth_m: View<'_, f32>, store: &mut S) -> AllocationReport {
         let mut report = AllocationReport::default();
         self.visible.begin_frame();
         self.seen.clear();
@@ -151,7 +154,7 @@ impl Volume<'_> {
                 let to = start + ray * (depth + truncation_m);
                 Walk::new(from.into(), to.into()).visit(|block| {
                     if !self.seen.enter(block) {
-                        self.request(block, base, &mut report);
+                        self.request(block, base, store, &mut report);
                     }
                 });
             }
@@ -162,27 +165,36 @@ impl Volume<'_> {
     }
 
     /// Finds or makes the block `base + block` and lists it.
-    fn request(&mut self, block: [i32; 3], base: [i32; 3], report: &mut AllocationReport) {
+    pub(super) fn request<S: BlockStore>(&mut self, block: [i32; 3], base: [i32; 3], store: &mut S, report: &mut AllocationReport) {
         let Some(coord) = BlockCoord::new(base[0] + block[0], base[1] + block[1], base[2] + block[2]) else {
             report.beyond += 1;
             return;
         };
         let slot = match self.index.find(self.blocks.coord, coord) {
             Some(slot) => slot,
-            None => match self.make(coord) {
-                Some(slot) => {
-                    report.made += 1;
-                    slot
-                }
-                None => {
+            None => {
+                if self.pool.is_full() && !self.evict(store, &mut report.eviction) {
                     report.refused += 1;
                     return;
                 }
-            },
+                let Some(slot) = self.make(coord) else {
+                    report.refused += 1;
+                    return;
+                };
+                report.made += 1;
+                report.eviction.returned += u32::from(self.bring_back(slot, coord, store));
+                slot
+            }
         };
+        self.list(slot, report);
+    }
+
+    /// Enters a slot into the visible list.
+    fn list(&mut self, slot: u32, report: &mut AllocationReport) {
         if self.visible.mark(slot).is_err() {
             report.unlisted += 1;
         }
+        self.recency.touch(slot);
     }
 
     /// Takes a slot for a new, empty block.
@@ -215,8 +227,8 @@ impl Volume<'_> {
             let v = view.rig.focal_px * at.y + view.rig.center_v_px * at.z;
             // Inside the picture, without dividing by a depth that may be 0.
             let inside = at.z > 0.0 && at.z <= farthest && u >= 0.0 && v >= 0.0 && u < width * at.z && v < height * at.z;
-            if inside && self.visible.mark(slot).is_err() {
-                report.unlisted += 1;
+            if inside {
+                self.list(slot, report);
             }
         }
     }

@@ -16,6 +16,17 @@ pub enum ObservationWeight {
     Depth,
 }
 
+/// What happens when a block is to be made and the pool is full.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum WhenFull {
+    /// The block unseen for longest leaves: the map follows the camera.
+    #[default]
+    Evict,
+    /// The new block is refused: the map stays where it is.
+    Refuse,
+}
+
 /// Parameters of the map. Defaults are the original's published ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
@@ -37,6 +48,8 @@ pub struct VolumeConfig {
     pub class_weight: [u8; CLASS_COUNT],
     /// Share of the truncation on either side of the surface within which colour is averaged, 0 to 1; 0.25.
     pub colour_band: f32,
+    /// What happens when a block is to be made and the pool is full.
+    pub when_full: WhenFull,
     /// Voxels seen at most this often are reset when their block leaves the window; 0 is off, below `max_weight`; 1.
     pub prune_weight: u8,
     /// Length of the window, frames. At least 1; 200 (the paper's text: 300, its pruning experiment: 40).
@@ -58,6 +71,7 @@ impl Default for VolumeConfig {
             observation_weight: ObservationWeight::One,
             class_weight: [1; CLASS_COUNT],
             colour_band: 0.25,
+            when_full: WhenFull::Evict,
             prune_weight: 1,
             prune_lag: 200,
             prune_distance: 0.0,

@@ -131,6 +131,11 @@ impl<'s> VisibleHistory<'s> {
         (self.len > 0).then_some(self.oldest)
     }
 
+    /// Whether a frame is still in the ring.
+    pub(super) fn covers(&self, frame: u32) -> bool {
+        (frame.wrapping_sub(self.oldest) as usize) < self.len
+    }
+
     /// The next slot that is due, at or after `from`; it is due no longer.
     pub(super) fn take_due(&mut self, from: u32) -> Option<u32> {
         let first = from as usize / 64;

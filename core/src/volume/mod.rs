@@ -12,7 +12,9 @@ mod fuse;
 mod history;
 mod index;
 mod prune;
+mod recency;
 mod sampler;
+mod store;
 #[cfg(test)]
 mod tests;
 mod viewpoint;
@@ -20,12 +22,14 @@ mod visible;
 
 pub use allocate::{AllocationReport, MAX_BLOCKS_PER_RAY};
 pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, Blocks};
-pub use config::{CLASS_COUNT, ObservationWeight, VolumeConfig};
+pub use config::{CLASS_COUNT, ObservationWeight, VolumeConfig, WhenFull};
 pub use fuse::Observation;
 pub use history::VisibleHistory;
 pub use index::BlockIndex;
 pub use prune::PruneReport;
+pub use recency::Recency;
 pub use sampler::{Sampler, VoxelSample};
+pub use store::{BlockStore, EvictionReport, LeavingBlock, NoStore, ReturningBlock};
 pub use viewpoint::Viewpoint;
 pub use visible::VisibleList;
 
@@ -41,6 +45,7 @@ pub struct Volume<'s> {
     visible: VisibleList<'s>,
     seen: allocate::Seen<'s>,
     history: VisibleHistory<'s>,
+    recency: Recency<'s>,
     digest: u64,
 }
 
@@ -53,6 +58,7 @@ impl<'s> Volume<'s> {
             + VisibleList::bytes(capacity)
             + allocate::Seen::bytes()
             + VisibleHistory::bytes(capacity)
+            + Recency::bytes(capacity.blocks)
     }
 
     /// Cuts an empty map.
@@ -65,6 +71,7 @@ impl<'s> Volume<'s> {
             visible: VisibleList::carve(capacity, carver)?,
             seen: allocate::Seen::carve(carver)?,
             history: VisibleHistory::carve(capacity, carver)?,
+            recency: Recency::carve(capacity.blocks, carver)?,
             digest: 0,
         })
     }
@@ -107,6 +114,19 @@ impl<'s> Volume<'s> {
     /// Digest of the places and contents of all blocks, whatever the order they were made in: the wrapping sum of theirs.
     pub fn digest(&self) -> u64 {
         self.digest
+    }
+
+    /// Computes a block's digest anew and corrects the map's by the difference.
+    fn refresh_digest(&mut self, slot: u32) {
+        let at = slot as usize;
+        let (Some(coord), Some(sdf), Some(weight), Some(digest)) =
+            (self.blocks.coord(slot), self.blocks.sdf.get(at), self.blocks.weight.get(at), self.blocks.digest.get_mut(at))
+        else {
+            return;
+        };
+        let new = fuse::block_digest(coord, sdf, weight, self.blocks.colour.get(at));
+        self.digest = self.digest.wrapping_sub(*digest).wrapping_add(new);
+        *digest = new;
     }
 
     /// Enters what is in use into a footprint.

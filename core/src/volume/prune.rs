@@ -6,7 +6,7 @@
 //!
 //! Weight 0 is off, bit for bit.
 
-use super::{BLOCK_VOXELS, BlockCoord, Volume, fuse::block_digest};
+use super::{BLOCK_VOXELS, Volume};
 
 /// What pruning did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -83,23 +83,18 @@ impl Volume<'_> {
     }
 
     /// Resets the faint voxels of a block, and frees it when nothing is left. How many were reset, and whether it was freed.
-    fn prune_block(&mut self, slot: u32, prune_weight: u8) -> (u32, bool) {
+    pub(super) fn prune_block(&mut self, slot: u32, prune_weight: u8) -> (u32, bool) {
         let at = slot as usize;
-        let (Some(&coord), Some(sdf), Some(weight), Some(digest)) =
-            (self.blocks.coord.get(at), self.blocks.sdf.get_mut(at), self.blocks.weight.get_mut(at), self.blocks.digest.get_mut(at))
-        else {
+        let (Some(sdf), Some(weight)) = (self.blocks.sdf.get_mut(at), self.blocks.weight.get_mut(at)) else {
             return (0, false);
         };
-        let mut planes = self.blocks.colour.get_mut(at);
-        let reset = reset_faint(prune_weight, sdf, weight, planes.as_deref_mut());
+        let reset = reset_faint(prune_weight, sdf, weight, self.blocks.colour.get_mut(at));
         let empty = weight.iter().all(|&weight| weight == 0);
         let far = self.config.prune_distance > 0.0 && nearest(sdf, weight) > self.config.prune_distance;
         if empty || far {
             self.free_block(slot);
         } else if reset > 0 {
-            let new = block_digest(BlockCoord::unpacked(coord), sdf, weight, planes.as_deref());
-            self.digest = self.digest.wrapping_sub(*digest).wrapping_add(new);
-            *digest = new;
+            self.refresh_digest(slot);
         }
         (reset, empty || far)
     }
@@ -110,6 +105,7 @@ impl Volume<'_> {
         self.index.remove(self.blocks.coord, coord);
         self.digest = self.digest.wrapping_sub(self.blocks.digest.get(slot as usize).copied().unwrap_or(0));
         self.history.gone(slot);
+        self.recency.strike(slot);
         self.pool.free(handle);
     }
 }

@@ -71,6 +71,16 @@ impl<'s> VisibleList<'s> {
         self.last_visible.get(slot as usize) == Some(&self.frame)
     }
 
+    /// The frame a slot was last entered in.
+    pub(super) fn last_visible(&self, slot: u32) -> u32 {
+        self.last_visible.get(slot as usize).copied().unwrap_or(0)
+    }
+
+    /// Whether a slot was entered in this frame or the last.
+    pub(super) fn was_lately(&self, slot: u32) -> bool {
+        self.frame.wrapping_sub(self.last_visible(slot)) <= 1
+    }
+
     /// Entry `i` of the last frame's list.
     pub(super) fn before(&self, i: usize) -> Option<u32> {
         self.before.get(..self.before_len)?.get(i).copied()

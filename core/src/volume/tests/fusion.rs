@@ -31,7 +31,7 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
     let depth_m = bumpy_depth();
     let view = view([0.1, -0.2, 0.05], [1.0, -0.3, 2.0]);
     with_volume(&CAPACITY, &VolumeConfig::default(), |volume| {
-        let report = volume.allocate(&view, View::new(&depth_m, WIDTH, HEIGHT).unwrap());
+        let report = volume.allocate(&view, View::new(&depth_m, WIDTH, HEIGHT).unwrap(), &mut NoStore);
         let mut fine = BTreeSet::new();
         let block_m = 0.4;
         for (i, &depth) in depth_m.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
@@ -100,7 +100,7 @@ fn equals_the_plain_twin_bit_for_bit() {
         for i in 0..5 {
             let view = view([0.02 * f64::from(i), 0.1, -0.3], [0.1 * f64::from(i), 0.0, 0.2]);
             let seen = observation(&depth_m, &grey);
-            volume.allocate(&view, seen.depth_m);
+            volume.allocate(&view, seen.depth_m, &mut NoStore);
             let mut twins: Vec<_> = volume
                 .visible()
                 .slots()
@@ -125,7 +125,7 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
             for i in 0..4 {
                 let view = view([0.0, 0.05 * f64::from(i), 0.0], [0.0, 0.0, 0.3 * f64::from(i)]);
                 let seen = observation(&depth_m, &grey);
-                volume.allocate(&view, seen.depth_m);
+                volume.allocate(&view, seen.depth_m, &mut NoStore);
                 if threads {
                     volume.fuse(&view, seen, &Threads)
                 } else {
@@ -219,7 +219,7 @@ fn a_class_of_weight_zero_stays_out_of_the_map_and_another_counts_thrice() {
     with_volume(&CAPACITY, &config, |volume| {
         let mut seen = observation(&depth_m, &grey);
         seen.class = View::new(&class, WIDTH, HEIGHT);
-        volume.allocate(&view([0.0; 3], [0.0; 3]), seen.depth_m);
+        volume.allocate(&view([0.0; 3], [0.0; 3]), seen.depth_m, &mut NoStore);
         volume.fuse(&view([0.0; 3], [0.0; 3]), seen, &Serial);
         assert_eq!(volume.sampler().voxel([-10, 0, 60]), None);
         assert_eq!(volume.sampler().voxel([10, 0, 60]).unwrap().weight, 3);

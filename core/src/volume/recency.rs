@@ -1,0 +1,110 @@
+//! Which block was seen last when: a doubly linked list through the slots, so that the one unseen for longest is at hand in constant time.
+//!
+//! Memory: 8 bytes a block.
+
+use crate::memory::{Carver, SlabError, region_bytes};
+
+/// The list. Links are slot + 1; 0 is none.
+#[derive(Debug)]
+pub struct Recency<'s> {
+    /// Towards blocks unseen for longer, and towards those seen later.
+    links: &'s mut [[u32; 2]],
+    /// Slot + 1 of the block unseen for longest and of the one seen last.
+    ends: [u32; 2],
+}
+
+const OLDER: usize = 0;
+const NEWER: usize = 1;
+
+impl<'s> Recency<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(blocks: usize) -> usize {
+        region_bytes::<[u32; 2]>(blocks)
+    }
+
+    /// Cuts an empty list for `blocks` slots.
+    pub fn carve(blocks: usize, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        Ok(Self { links: carver.cut("volume.recency", blocks)?, ends: [0; 2] })
+    }
+
+    /// The slot unseen for longest.
+    pub fn oldest(&self) -> Option<u32> {
+        self.ends[OLDER].checked_sub(1)
+    }
+
+    /// Makes `slot` the one seen last; it need not be in the list yet.
+    pub(super) fn touch(&mut self, slot: u32) {
+        if self.ends[NEWER] == slot + 1 {
+            return;
+        }
+        self.strike(slot);
+        let last = self.ends[NEWER];
+        self.link(slot + 1, [last, 0]);
+        self.set(last, NEWER, slot + 1);
+        self.ends[NEWER] = slot + 1;
+    }
+
+    /// Takes `slot` out of the list; nothing happens when it is not in it.
+    pub(super) fn strike(&mut self, slot: u32) {
+        let Some(&[older, newer]) = self.links.get(slot as usize) else { return };
+        let alone = self.ends == [slot + 1; 2];
+        if [older, newer] == [0; 2] && !alone {
+            return;
+        }
+        self.set(older, NEWER, newer);
+        self.set(newer, OLDER, older);
+        self.link(slot + 1, [0; 2]);
+    }
+
+    fn link(&mut self, entry: u32, links: [u32; 2]) {
+        if let Some(place) = entry.checked_sub(1).and_then(|slot| self.links.get_mut(slot as usize)) {
+            *place = links;
+        }
+    }
+
+    /// Sets the link of `entry` on one side; beyond the list lie its ends.
+    fn set(&mut self, entry: u32, side: usize, to: u32) {
+        let place = match entry.checked_sub(1) {
+            Some(slot) => self.links.get_mut(slot as usize).and_then(|links| links.get_mut(side)),
+            // What follows the missing newer neighbour of the oldest is the oldest end, and the other way round.
+            None => self.ends.get_mut(1 - side),
+        };
+        if let Some(place) = place {
+            *place = to;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{memory::Slab, random::Random};
+    use std::{boxed::Box, vec::Vec};
+
+    #[test]
+    fn keeps_the_order_of_last_touch_through_a_hundred_thousand_operations() {
+        const SLOTS: u32 = 40;
+        let mut slab = Box::new(Slab([0u8; Recency::bytes(SLOTS as usize)]));
+        let len = slab.0.len();
+        let mut recency = Recency::carve(SLOTS as usize, &mut Carver::new(&mut slab.0, len).unwrap()).unwrap();
+        let (mut model, mut random) = (Vec::<u32>::new(), Random::new(1));
+        for _ in 0..100_000 {
+            let slot = random.below(SLOTS);
+            model.retain(|&other| other != slot);
+            if random.below(3) == 0 {
+                recency.strike(slot);
+            } else {
+                recency.touch(slot);
+                model.push(slot);
+            }
+            assert_eq!(recency.oldest(), model.first().copied());
+            let mut walked = Vec::new();
+            let mut at = recency.ends[OLDER];
+            while let Some(slot) = at.checked_sub(1) {
+                walked.push(slot);
+                at = recency.links[slot as usize][NEWER];
+            }
+            assert_eq!(walked, model);
+        }
+    }
+}

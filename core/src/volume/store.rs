@@ -1,0 +1,132 @@
+//! Where blocks go when the pool is full, and where they come back from.
+//!
+//! When a block is to be made and no slot is free, the block unseen for longest leaves, unless it was visible in this frame or the last:
+//! then the pool is too small for what is in view, and the new block is refused. What is still within the pruning window when it leaves is
+//! pruned first, as it would have been had it stayed. Constant work per block made, whatever the size of the map.
+
+use super::{BLOCK_VOXELS, BlockCoord, Volume, config::WhenFull};
+
+/// A block as it leaves the map.
+#[derive(Clone, Copy, Debug)]
+pub struct LeavingBlock<'b> {
+    /// Its place.
+    pub coord: BlockCoord,
+    /// Signed distances.
+    pub sdf: &'b [i16; BLOCK_VOXELS],
+    /// Weights.
+    pub weight: &'b [u8; BLOCK_VOXELS],
+    /// Colour planes, where the map has colour.
+    pub colour: Option<&'b [[u8; BLOCK_VOXELS]; 3]>,
+}
+
+/// A block to be filled with what was kept of it. All zero as it comes.
+#[derive(Debug)]
+pub struct ReturningBlock<'b> {
+    /// Its place.
+    pub coord: BlockCoord,
+    /// Signed distances.
+    pub sdf: &'b mut [i16; BLOCK_VOXELS],
+    /// Weights.
+    pub weight: &'b mut [u8; BLOCK_VOXELS],
+    /// Colour planes, where the map has colour.
+    pub colour: Option<&'b mut [[u8; BLOCK_VOXELS]; 3]>,
+}
+
+/// A caller's memory for blocks: the sink they leave into and the source they come back from.
+pub trait BlockStore {
+    /// Keeps a block that leaves the map; keeping it again replaces what was kept. `false` when it cannot be kept: then it is lost, and counted.
+    fn keep(&mut self, block: LeavingBlock<'_>) -> bool;
+
+    /// Fills in a block that is made again; `false` when nothing was kept of it, and then it must be left as it came.
+    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool;
+}
+
+/// Keeps nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoStore;
+
+impl BlockStore for NoStore {
+    fn keep(&mut self, _: LeavingBlock<'_>) -> bool {
+        false
+    }
+
+    fn bring_back(&mut self, _: ReturningBlock<'_>) -> bool {
+        false
+    }
+}
+
+/// Blocks that left and came back.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EvictionReport {
+    /// Blocks that left and were kept.
+    pub kept: u32,
+    /// Blocks that left and are lost.
+    pub lost: u32,
+    /// Blocks that left with nothing in them, or nothing that pruning would have spared.
+    pub empty: u32,
+    /// Blocks that came back.
+    pub returned: u32,
+}
+
+impl Volume<'_> {
+    /// Makes room by letting the block unseen for longest leave. Whether there is room now.
+    pub(super) fn evict<S: BlockStore>(&mut self, store: &mut S, report: &mut EvictionReport) -> bool {
+        let Some(slot) = self.recency.oldest() else { return false };
+        if self.config.when_full == WhenFull::Refuse || self.visible.was_lately(slot) {
+            return false;
+        }
+        if self.config.prune_weight > 0 && self.history.covers(self.visible.last_visible(slot)) {
+            let (_, freed) = self.prune_block(slot, self.config.prune_weight);
+            if freed {
+                report.empty += 1;
+                return true;
+            }
+        }
+        match self.leaving(slot) {
+            Some(block) if block.weight.iter().all(|&weight| weight == 0) => report.empty += 1,
+            Some(block) if store.keep(block) => report.kept += 1,
+            _ => report.lost += 1,
+        }
+        self.free_block(slot);
+        true
+    }
+
+    /// What a slot holds.
+    fn leaving(&self, slot: u32) -> Option<LeavingBlock<'_>> {
+        Some(LeavingBlock {
+            coord: self.blocks.coord(slot)?,
+            sdf: self.blocks.sdf(slot)?,
+            weight: self.blocks.weight(slot)?,
+            colour: self.blocks.colour(slot),
+        })
+    }
+
+    /// Lets every block leave, in slot order, as at the end of a drive.
+    pub fn stream_out<S: BlockStore>(&mut self, store: &mut S) -> EvictionReport {
+        let mut report = EvictionReport::default();
+        for slot in 0..self.pool.high_water() as u32 {
+            if self.pool.handle(slot).is_none() {
+                continue;
+            }
+            match self.leaving(slot) {
+                Some(block) if block.weight.iter().all(|&weight| weight == 0) => report.empty += 1,
+                Some(block) if store.keep(block) => report.kept += 1,
+                _ => report.lost += 1,
+            }
+            self.free_block(slot);
+        }
+        report
+    }
+
+    /// Fills a block that was just made with what the store kept of it.
+    pub(super) fn bring_back<S: BlockStore>(&mut self, slot: u32, coord: BlockCoord, store: &mut S) -> bool {
+        let at = slot as usize;
+        let (Some(sdf), Some(weight)) = (self.blocks.sdf.get_mut(at), self.blocks.weight.get_mut(at)) else { return false };
+        let colour = self.blocks.colour.get_mut(at);
+        let returned = store.bring_back(ReturningBlock { coord, sdf, weight, colour });
+        if returned {
+            self.refresh_digest(slot);
+        }
+        returned
+    }
+}

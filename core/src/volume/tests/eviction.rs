@@ -1,0 +1,186 @@
+//! A pool too small for the drive, and a store beside it.
+
+use super::*;
+use crate::random::Random;
+use std::collections::BTreeMap;
+
+/// What a block holds.
+#[derive(Clone, Debug, PartialEq)]
+struct Content {
+    sdf: Vec<i16>,
+    weight: Vec<u8>,
+    colour: Vec<u8>,
+}
+
+/// A store that keeps everything, or refuses everything.
+#[derive(Default)]
+struct Shelf {
+    blocks: BTreeMap<BlockCoord, Content>,
+    is_shut: bool,
+}
+
+impl BlockStore for Shelf {
+    fn keep(&mut self, block: LeavingBlock<'_>) -> bool {
+        if !self.is_shut {
+            let colour = block.colour.map_or(vec![], |planes| planes.as_flattened().to_vec());
+            self.blocks.insert(block.coord, Content { sdf: block.sdf.to_vec(), weight: block.weight.to_vec(), colour });
+        }
+        !self.is_shut
+    }
+
+    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
+        let Some(kept) = self.blocks.remove(&block.coord) else { return false };
+        block.sdf.copy_from_slice(&kept.sdf);
+        block.weight.copy_from_slice(&kept.weight);
+        if let Some(planes) = block.colour {
+            planes.as_flattened_mut().copy_from_slice(&kept.colour);
+        }
+        true
+    }
+}
+
+/// Drives a corridor with a bumpy end wall to the given places, then lets everything out. The map, and the reports of all frames summed.
+fn drive(blocks: usize, config: &VolumeConfig, places_m: &[f64], shelf: &mut Shelf) -> EvictionReport {
+    let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i % 251) as u8).collect();
+    let mut sum = EvictionReport::default();
+    with_volume(&Capacity { blocks, ..CAPACITY }, config, |volume| {
+        let add = |sum: &mut EvictionReport, report: EvictionReport| {
+            *sum = EvictionReport {
+                kept: sum.kept + report.kept,
+                lost: sum.lost + report.lost,
+                empty: sum.empty + report.empty,
+                returned: sum.returned + report.returned,
+            };
+        };
+        for (i, &z) in places_m.iter().enumerate() {
+            let depth_m: Vec<f32> = bumpy_depth().iter().map(|depth| depth * 0.5 + 0.01 * (i % 3) as f32).collect();
+            let view = view([0.0; 3], [0.0, 0.0, z]);
+            let seen = observation(&depth_m, &grey);
+            let report = volume.allocate(&view, seen.depth_m, shelf);
+            assert_eq!(report.refused, 0);
+            add(&mut sum, report.eviction);
+            volume.fuse(&view, seen, &Serial);
+            volume.prune();
+            assert_eq!(volume.pool.len(), volume.index.len());
+        }
+        volume.finish();
+        add(&mut sum, volume.stream_out(shelf));
+        assert_eq!((volume.pool.len(), volume.digest()), (0, 0), "nothing left, nothing miscounted");
+    });
+    sum
+}
+
+fn config(prune_weight: u8) -> VolumeConfig {
+    VolumeConfig {
+        truncation_m: 0.3,
+        far_m: 4.0,
+        prune_weight,
+        prune_lag: 12,
+        ..VolumeConfig::default()
+    }
+}
+
+#[test]
+fn a_drive_that_needs_five_pools_leaves_the_same_map_as_an_unbounded_one() {
+    let ahead: Vec<f64> = (0..120).map(|i| f64::from(i) * 0.4).collect();
+    let (mut unbounded, mut streamed) = (Shelf::default(), Shelf::default());
+    drive(6_000, &config(0), &ahead, &mut unbounded);
+    let pool = unbounded.blocks.len() / 5;
+    let report = drive(pool, &config(0), &ahead, &mut streamed);
+    assert!(unbounded.blocks.len() >= 5 * pool && report.kept as usize >= unbounded.blocks.len());
+    assert_eq!((report.lost, report.returned), (0, 0));
+    assert!(unbounded.blocks == streamed.blocks, "bit for bit");
+}
+
+#[test]
+fn there_and_back_again_is_the_same_map_too() {
+    let way: Vec<f64> = (0..80).chain((0..80).rev()).map(|i| f64::from(i) * 0.4).collect();
+    let (mut unbounded, mut streamed) = (Shelf::default(), Shelf::default());
+    drive(6_000, &config(0), &way, &mut unbounded);
+    let report = drive(unbounded.blocks.len() * 2 / 5, &config(0), &way, &mut streamed);
+    assert!(report.returned > 0 && report.lost == 0);
+    assert!(unbounded.blocks == streamed.blocks, "bit for bit");
+}
+
+#[test]
+fn pruning_catches_what_leaves_within_the_window() {
+    let ahead: Vec<f64> = (0..120).map(|i| f64::from(i) * 0.4).collect();
+    let (mut unbounded, mut streamed) = (Shelf::default(), Shelf::default());
+    drive(6_000, &config(2), &ahead, &mut unbounded);
+    drive(unbounded.blocks.len() / 5, &config(2), &ahead, &mut streamed);
+    assert!(unbounded.blocks == streamed.blocks, "bit for bit");
+    assert!(unbounded.blocks.values().all(|kept| kept.weight.iter().all(|&weight| weight == 0 || weight > 2)));
+}
+
+#[test]
+fn what_a_shut_store_cannot_keep_is_counted_as_lost() {
+    let ahead: Vec<f64> = (0..60).map(|i| f64::from(i) * 0.4).collect();
+    let mut shut = Shelf { is_shut: true, ..Shelf::default() };
+    let report = drive(900, &config(0), &ahead, &mut shut);
+    assert!(report.lost > 900 && report.kept == 0);
+}
+
+#[test]
+fn a_map_told_to_refuse_stays_where_it_is() {
+    let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
+    let config = VolumeConfig { when_full: WhenFull::Refuse, ..config(0) };
+    with_volume(&Capacity { blocks: 300, ..CAPACITY }, &config, |volume| {
+        let mut refused = 0;
+        for i in 0..20 {
+            let seen = observation(&depth_m, &grey);
+            let report = volume.allocate(&view([0.0; 3], [0.0, 0.0, f64::from(i)]), seen.depth_m, &mut NoStore);
+            assert_eq!(report.eviction, EvictionReport::default());
+            refused += report.refused;
+        }
+        assert!(refused > 0);
+        assert!(volume.find(BlockCoord::of_lattice([0, 0, 60]).unwrap()).is_some(), "the first wall is still there");
+    });
+}
+
+#[test]
+fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() {
+    const BLOCKS: usize = 60;
+    let capacity = Capacity { blocks: BLOCKS, visible_blocks: BLOCKS, colour: false, ..CAPACITY };
+    let config = VolumeConfig { prune_weight: 1, prune_lag: 3, ..VolumeConfig::default() };
+    with_volume(&capacity, &config, |volume| {
+        let (mut shelf, mut random) = (Shelf::default(), Random::new(9));
+        // Per block its weight everywhere and the frame it was last seen in; on the shelf or in the map.
+        let mut model: BTreeMap<BlockCoord, u8> = BTreeMap::new();
+        let mut operations = 0;
+        while operations < 1_000_000 {
+            volume.visible.begin_frame();
+            let mut report = AllocationReport::default();
+            for _ in 0..random.below(25) {
+                operations += 1;
+                let coord = BlockCoord::new(random.below(8) as i32, random.below(8) as i32, 3).unwrap();
+                let (refused, empty) = (report.refused, report.eviction.empty);
+                volume.request(coord.origin().map(|c| c >> 3), [0; 3], &mut shelf, &mut report);
+                if report.eviction.empty > empty {
+                    // A block of weight 1 left within the window and was pruned on its way.
+                    model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || shelf.blocks.contains_key(coord));
+                }
+                let Some(slot) = volume.find(coord) else {
+                    assert!(report.refused > refused);
+                    continue;
+                };
+                let old = model.get(&coord).copied().unwrap_or(0);
+                assert_eq!(volume.blocks.weight[slot as usize][7], old, "a block is as it was left, in the map or brought back");
+                if random.below(4) > 0 {
+                    volume.blocks.weight[slot as usize].fill(old.saturating_add(1));
+                    volume.refresh_digest(slot);
+                    model.insert(coord, old.saturating_add(1));
+                }
+            }
+            volume.visible.sort();
+            volume.prune();
+            model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || shelf.blocks.contains_key(coord));
+            assert_eq!(volume.pool.len(), volume.index.len());
+        }
+        let stored = shelf.blocks.iter().map(|(&coord, kept)| (coord, kept.weight[7]));
+        let live = (0..volume.pool.high_water() as u32)
+            .filter(|&slot| volume.pool.handle(slot).is_some())
+            .map(|slot| (volume.blocks.coord(slot).unwrap(), volume.blocks.weight[slot as usize][7]));
+        let all: BTreeMap<_, _> = stored.chain(live).filter(|(_, weight)| *weight > 0).collect();
+        assert_eq!(all, model);
+    });
+}
