@@ -14,13 +14,15 @@ pub enum Stage {
     Allocate,
     /// Depth and colour averaged into voxels.
     Fuse,
+    /// Noise taken out of blocks that leave the window.
+    Prune,
     /// The map seen from a pose.
     Raycast,
 }
 
 impl Stage {
     /// All stages, in pipeline order.
-    pub const ALL: [Self; 6] = [Self::Stereo, Self::SceneFlow, Self::Egomotion, Self::Allocate, Self::Fuse, Self::Raycast];
+    pub const ALL: [Self; 7] = [Self::Stereo, Self::SceneFlow, Self::Egomotion, Self::Allocate, Self::Fuse, Self::Prune, Self::Raycast];
 
     /// Name in tables and files.
     pub const fn name(self) -> &'static str {
@@ -30,6 +32,7 @@ impl Stage {
             Self::Egomotion => "egomotion",
             Self::Allocate => "allocate",
             Self::Fuse => "fuse",
+            Self::Prune => "prune",
             Self::Raycast => "raycast",
         }
     }
