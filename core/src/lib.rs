@@ -19,6 +19,7 @@ pub mod geometry;
 pub mod image;
 pub mod memory;
 pub mod random;
+pub mod scene_flow;
 pub mod volume;
 
 pub use executor::{Executor, Serial, Stage};

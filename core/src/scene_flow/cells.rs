@@ -1,0 +1,90 @@
+//! Matches sorted into square cells of the previous left image, for the stages that ask who is near.
+//!
+//! Memory: 4 bytes per match and per cell of [`CELL_MIN_PX`].
+
+use super::matches::Match;
+use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+
+/// Side of the smallest cells, px.
+pub(super) const CELL_MIN_PX: usize = 16;
+
+/// The index. Within a cell matches keep their order.
+#[derive(Debug)]
+pub(super) struct Cells<'s> {
+    start: &'s mut [u32],
+    order: &'s mut [u32],
+}
+
+/// The shape of one use of the index.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    pub cell_px: usize,
+    pub columns: usize,
+    pub rows: usize,
+}
+
+impl Shape {
+    pub(super) fn new(width: usize, height: usize, cell_px: usize) -> Self {
+        Self { cell_px, columns: width.div_ceil(cell_px), rows: height.div_ceil(cell_px) }
+    }
+
+    /// Column and row of the cell a match lies in.
+    pub(super) fn cell(&self, m: &Match) -> [usize; 2] {
+        // Previous left positions are inside the image, so the cast is exact.
+        let [column, row] = m.previous_left.map(|x| x as usize / self.cell_px);
+        [column.min(self.columns.saturating_sub(1)), row.min(self.rows.saturating_sub(1))]
+    }
+}
+
+const fn table(capacity: &Capacity) -> usize {
+    capacity.image_width.div_ceil(CELL_MIN_PX) * capacity.image_height.div_ceil(CELL_MIN_PX) + 1
+}
+
+impl<'s> Cells<'s> {
+    pub(super) const fn bytes(capacity: &Capacity) -> usize {
+        region_bytes::<u32>(table(capacity)) + region_bytes::<u32>(capacity.matches)
+    }
+
+    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        Ok(Self {
+            start: carver.cut("scene_flow.match_cell", table(capacity))?,
+            order: carver.cut("scene_flow.match_order", capacity.matches)?,
+        })
+    }
+
+    /// Sorts. Returns the cells' starts (one more than cells) and the matches' positions, cell by cell.
+    pub(super) fn sort(&mut self, matches: &[Match], shape: Shape) -> (&[u32], &mut [u32]) {
+        let cells = shape.columns * shape.rows;
+        let (Some(start), Some(order)) = (self.start.get_mut(..=cells), self.order.get_mut(..matches.len())) else {
+            return (&[], &mut []);
+        };
+        let key = |m: &Match| {
+            let [column, row] = shape.cell(m);
+            row * shape.columns + column
+        };
+        start.fill(0);
+        for m in matches {
+            if let Some(count) = start.get_mut(key(m) + 1) {
+                *count += 1;
+            }
+        }
+        let mut sum = 0;
+        for entry in start.iter_mut() {
+            sum += *entry;
+            *entry = sum;
+        }
+        for (index, m) in (0..).zip(matches) {
+            if let Some(cursor) = start.get_mut(key(m)) {
+                if let Some(slot) = order.get_mut(*cursor as usize) {
+                    *slot = index;
+                }
+                *cursor += 1;
+            }
+        }
+        start.copy_within(..cells, 1);
+        if let Some(first) = start.first_mut() {
+            *first = 0;
+        }
+        (start, order)
+    }
+}

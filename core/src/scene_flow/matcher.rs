@@ -1,0 +1,275 @@
+//! The scene flow of a running stereo camera.
+
+use super::{
+    SceneFlowConfig,
+    bucket::select,
+    camera::{Camera, Names},
+    cells::{CELL_MIN_PX, Cells, Shape},
+    circle::{Corners, Reach},
+    matches::Match,
+    prior::{BIN_PX, bins, learn},
+    refine::{Images, Pixels, refine},
+    report::{FlowReport, FlowStatus, PassCount},
+    support::{Motion, support},
+};
+use crate::{
+    executor::Executor,
+    image::View,
+    memory::{Capacity, Carver, SlabError, region_bytes},
+};
+
+/// Cells in which sparse matches look for support, px; those of the dense pass are [`CELL_MIN_PX`].
+const SPARSE_CELL_PX: usize = 48;
+
+/// Features and matches over the last two frames.
+#[derive(Debug)]
+pub struct FlowMatcher<'s> {
+    left: Camera<'s>,
+    right: Camera<'s>,
+    /// Width and height of the last frame, if there is one.
+    last: Option<[usize; 2]>,
+    capacity: [usize; 2],
+    traced: &'s mut [[u32; 3]],
+    reach: &'s mut [Reach],
+    cells: Cells<'s>,
+    motion: &'s mut [Motion],
+    keep: &'s mut [u8],
+    sparse: &'s mut [Match],
+    sparse_len: usize,
+    refined: &'s mut [Match],
+    refined_len: usize,
+    score: &'s mut [f32],
+    selection: &'s mut [u32],
+    selection_len: usize,
+}
+
+const LEFT: Names = Names {
+    pixels: ["scene_flow.left0.pixels", "scene_flow.left1.pixels"],
+    dense: [
+        ["scene_flow.left0.dense_at", "scene_flow.left0.dense_descriptor", "scene_flow.left0.dense_cell"],
+        ["scene_flow.left1.dense_at", "scene_flow.left1.dense_descriptor", "scene_flow.left1.dense_cell"],
+    ],
+    sparse: [
+        ["scene_flow.left0.sparse_at", "scene_flow.left0.sparse_descriptor", "scene_flow.left0.sparse_cell"],
+        ["scene_flow.left1.sparse_at", "scene_flow.left1.sparse_descriptor", "scene_flow.left1.sparse_cell"],
+    ],
+    scratch: [
+        "scene_flow.left.gradient",
+        "scene_flow.left.blob",
+        "scene_flow.left.corner",
+        "scene_flow.left.rows",
+        "scene_flow.left.candidate",
+    ],
+};
+
+const RIGHT: Names = Names {
+    pixels: ["scene_flow.right0.pixels", "scene_flow.right1.pixels"],
+    dense: [
+        ["scene_flow.right0.dense_at", "scene_flow.right0.dense_descriptor", "scene_flow.right0.dense_cell"],
+        ["scene_flow.right1.dense_at", "scene_flow.right1.dense_descriptor", "scene_flow.right1.dense_cell"],
+    ],
+    sparse: [
+        ["scene_flow.right0.sparse_at", "scene_flow.right0.sparse_descriptor", "scene_flow.right0.sparse_cell"],
+        ["scene_flow.right1.sparse_at", "scene_flow.right1.sparse_descriptor", "scene_flow.right1.sparse_cell"],
+    ],
+    scratch: [
+        "scene_flow.right.gradient",
+        "scene_flow.right.blob",
+        "scene_flow.right.corner",
+        "scene_flow.right.rows",
+        "scene_flow.right.candidate",
+    ],
+};
+
+/// Sparse matches kept.
+const fn sparse_matches(capacity: &Capacity) -> usize {
+    capacity.matches / 4
+}
+
+impl<'s> FlowMatcher<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        let matches = capacity.matches;
+        2 * Camera::bytes(capacity)
+            + region_bytes::<[u32; 3]>(capacity.features)
+            + region_bytes::<Reach>(bins(capacity))
+            + Cells::bytes(capacity)
+            + region_bytes::<Motion>(matches)
+            + region_bytes::<u8>(matches)
+            + region_bytes::<Match>(sparse_matches(capacity))
+            + region_bytes::<Match>(matches)
+            + region_bytes::<f32>(matches)
+            + region_bytes::<u32>(matches)
+    }
+
+    /// Cuts its regions.
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        let matches = capacity.matches;
+        Ok(Self {
+            left: Camera::carve(capacity, carver, &LEFT)?,
+            right: Camera::carve(capacity, carver, &RIGHT)?,
+            last: None,
+            capacity: [capacity.image_width, capacity.image_height],
+            traced: carver.cut("scene_flow.circle", capacity.features)?,
+            reach: carver.cut("scene_flow.reach", bins(capacity))?,
+            cells: Cells::carve(capacity, carver)?,
+            motion: carver.cut("scene_flow.motion", matches)?,
+            keep: carver.cut("scene_flow.keep", matches)?,
+            sparse: carver.cut("scene_flow.sparse", sparse_matches(capacity))?,
+            sparse_len: 0,
+            refined: carver.cut("scene_flow.refined", matches)?,
+            refined_len: 0,
+            score: carver.cut("scene_flow.score", matches)?,
+            selection: carver.cut("scene_flow.selection", matches)?,
+            selection_len: 0,
+        })
+    }
+
+    /// The sparse pass' matches of the last frame: whole pixels, outliers included.
+    pub fn sparse(&self) -> &[Match] {
+        self.sparse.get(..self.sparse_len).unwrap_or(&[])
+    }
+
+    /// The dense pass' matches of the last frame that are supported by their neighbours, refined below the pixel.
+    pub fn refined(&self) -> &[Match] {
+        self.refined.get(..self.refined_len).unwrap_or(&[])
+    }
+
+    /// Positions in [`FlowMatcher::refined`] of the matches selected for egomotion: the best of each cell, cell by cell.
+    pub fn selection(&self) -> &[u32] {
+        self.selection.get(..self.selection_len).unwrap_or(&[])
+    }
+
+    /// The matches selected for egomotion.
+    pub fn bucketed(&self) -> impl Iterator<Item = &Match> + Clone {
+        self.selection().iter().filter_map(|&index| self.refined().get(index as usize))
+    }
+
+    /// Forgets the last frame: the next one is a first one.
+    pub fn reset(&mut self) {
+        self.last = None;
+        self.clear();
+    }
+
+    fn clear(&mut self) {
+        (self.sparse_len, self.refined_len, self.selection_len) = (0, 0, 0);
+    }
+
+    /// Takes in a stereo frame and matches it with the one before.
+    pub fn push<E: Executor>(&mut self, config: &SceneFlowConfig, left: View<'_, u8>, right: View<'_, u8>, executor: &E) -> FlowReport {
+        self.clear();
+        let size = [left.width(), left.height()];
+        if size != [right.width(), right.height()] || size[0] > self.capacity[0] || size[1] > self.capacity[1] {
+            self.last = None;
+            return FlowReport { status: FlowStatus::Refused, ..FlowReport::default() };
+        }
+        let response_min = config.response_min.min(i16::MAX as u16) as i16;
+        let (left, right) = executor.join(|| self.left.take(left, response_min), || self.right.take(right, response_min));
+        let mut report = FlowReport { left, right, ..FlowReport::default() };
+        if self.last.replace(size) != Some(size) {
+            report.status = FlowStatus::First;
+            return report;
+        }
+        let columns = self.sparse_pass(config, size, executor, &mut report.sparse);
+        let closed = self.dense_pass(config, size, columns, executor, &mut report.dense);
+        self.refine_supported(config, size, closed);
+        report.refined = self.refined_len as u32;
+        report.unrefined = closed as u32 - report.dense.unsupported - report.refined;
+        let shape = Shape::new(size[0], size[1], usize::from(config.bucket_px).max(CELL_MIN_PX));
+        let (refined, score) = (self.refined.get(..self.refined_len).unwrap_or(&[]), &*self.score);
+        self.selection_len = select(refined, score, shape, usize::from(config.bucket_matches), &mut self.cells, self.selection);
+        report.bucketed = self.selection_len as u32;
+        report
+    }
+
+    /// Matches the sparse features and learns from the supported ones where to look. Returns the bins in a row.
+    fn sparse_pass<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        [width, height]: [usize; 2],
+        executor: &E,
+        count: &mut PassCount,
+    ) -> usize {
+        let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
+        let corners = Corners {
+            previous_left: &left_before.sparse,
+            previous_right: &right_before.sparse,
+            current_right: &right.sparse,
+            current_left: &left.sparse,
+        };
+        let widest = Reach::widest(config);
+        corners.trace(|_| widest, self.traced, executor);
+        let closed = corners.gather(self.traced, self.sparse);
+        self.sparse_len = closed.min(self.sparse.len());
+        let matches = self.sparse.get(..self.sparse_len).unwrap_or(&[]);
+        let shape = Shape::new(width, height, SPARSE_CELL_PX);
+        support(matches, shape, config, &mut self.cells, self.motion, self.keep);
+        let kept = matches.iter().zip(&*self.keep).filter(|&(_, &keep)| keep == 1).map(|(m, _)| *m);
+        *count = PassCount {
+            closed: closed as u32,
+            dropped: (closed - self.sparse_len) as u32,
+            unsupported: (self.sparse_len - kept.clone().count()) as u32,
+        };
+        let used = width.div_ceil(BIN_PX) * height.div_ceil(BIN_PX);
+        learn(kept, width, height, config, self.reach.get_mut(..used).unwrap_or(&mut []))
+    }
+
+    /// Matches all features within what the sparse pass learned; leaves the matches in `refined` and who is supported in `keep`.
+    /// Returns how many there are.
+    fn dense_pass<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        [width, height]: [usize; 2],
+        columns: usize,
+        executor: &E,
+        count: &mut PassCount,
+    ) -> usize {
+        let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
+        let corners = Corners {
+            previous_left: &left_before.dense,
+            previous_right: &right_before.dense,
+            current_right: &right.dense,
+            current_left: &left.dense,
+        };
+        let widest = Reach::widest(config);
+        let reach = &*self.reach;
+        let learned = |[u, v]: [u16; 2]| {
+            let bin = usize::from(v) / BIN_PX * columns + usize::from(u) / BIN_PX;
+            reach.get(bin).copied().unwrap_or(widest)
+        };
+        corners.trace(learned, self.traced, executor);
+        let closed = corners.gather(self.traced, self.refined);
+        let kept = closed.min(self.refined.len());
+        let matches = self.refined.get(..kept).unwrap_or(&[]);
+        support(matches, Shape::new(width, height, CELL_MIN_PX), config, &mut self.cells, self.motion, self.keep);
+        let supported = self.keep.iter().take(kept).filter(|&&keep| keep == 1).count();
+        *count = PassCount { closed: closed as u32, dropped: (closed - kept) as u32, unsupported: (kept - supported) as u32 };
+        kept
+    }
+
+    /// Refines the supported among the first `closed` matches and closes the gaps the others leave.
+    fn refine_supported(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], closed: usize) {
+        let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
+        let pixels = |data| Pixels { data, width };
+        let size = width * height;
+        let images = Images {
+            previous_left: pixels(left_before.pixels.get(..size).unwrap_or(&[])),
+            previous_right: pixels(right_before.pixels.get(..size).unwrap_or(&[])),
+            current_left: pixels(left.pixels.get(..size).unwrap_or(&[])),
+            current_right: pixels(right.pixels.get(..size).unwrap_or(&[])),
+        };
+        let mut len = 0;
+        for index in 0..closed {
+            if self.keep.get(index) != Some(&1) {
+                continue;
+            }
+            let Some(m) = self.refined.get(index) else { continue };
+            let better = if config.refine { refine(m, images) } else { Some((*m, 0.0)) };
+            if let (Some((m, texture)), Some(slot), Some(score)) = (better, self.refined.get_mut(len), self.score.get_mut(len)) {
+                (*slot, *score) = (m, texture);
+                len += 1;
+            }
+        }
+        self.refined_len = len;
+    }
+}

@@ -1,0 +1,34 @@
+//! What a match is.
+
+use bytemuck::{Pod, Zeroable};
+
+/// One scene point seen four times. Positions are (u, v) in px from the centre of the top left pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Match {
+    /// In the left image of the previous frame.
+    pub previous_left: [f32; 2],
+    /// In the right image of the previous frame.
+    pub previous_right: [f32; 2],
+    /// In the left image of the current frame.
+    pub current_left: [f32; 2],
+    /// In the right image of the current frame.
+    pub current_right: [f32; 2],
+}
+
+impl Match {
+    /// Disparity in the previous frame, px.
+    pub fn previous_disparity_px(&self) -> f32 {
+        self.previous_left[0] - self.previous_right[0]
+    }
+
+    /// Disparity in the current frame, px.
+    pub fn current_disparity_px(&self) -> f32 {
+        self.current_left[0] - self.current_right[0]
+    }
+
+    /// Movement in the left image, px.
+    pub fn flow_px(&self) -> [f32; 2] {
+        [self.current_left[0] - self.previous_left[0], self.current_left[1] - self.previous_left[1]]
+    }
+}

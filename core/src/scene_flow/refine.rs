@@ -1,0 +1,180 @@
+//! Sub-pixel refinement: the patch around the feature in the previous left image is found again in the other three images
+//! (inverse-compositional Lucas-Kanade; Baker & Matthews, *Lucas-Kanade 20 Years On*, IJCV 2004), for translation, gain and offset.
+//!
+//! Pixels and sums are integers (so their order is free and they vectorise); only the 2 x 2 step is in floats. The patch is sampled
+//! at sixteenths of a pixel; the step taken there is not rounded, so the result is finer than the sampling.
+
+use super::matches::Match;
+
+/// Side of a patch, px.
+const SIDE: usize = 11;
+const HALF: f64 = 5.0;
+const AREA: f64 = (SIDE * SIDE) as f64;
+/// Most steps per image.
+const STEPS: usize = 6;
+/// A patch farther than this from where the circle put it is lost, px.
+const FARTHEST_PX: f64 = 1.75;
+/// A step below this is the last one, px.
+const SMALL_STEP_PX: f64 = 0.03;
+/// Smallest eigenvalue of a patch's structure matrix (of doubled gradients) below which it cannot be placed.
+const TEXTURE_MIN: f64 = 2_000.0;
+
+/// One whole image, rows `width` apart.
+#[derive(Clone, Copy)]
+pub(super) struct Pixels<'a> {
+    pub data: &'a [u8],
+    pub width: usize,
+}
+
+/// A patch, its gradients and what is needed to solve for its movement.
+struct Template {
+    pixel: [[i16; SIDE]; SIDE],
+    along: [[i16; SIDE]; SIDE],
+    down: [[i16; SIDE]; SIDE],
+    /// Mean of pixel, along, down.
+    mean: [f64; 3],
+    /// How much of the pixels' own pattern is in each gradient: gain must not look like movement.
+    share: [f64; 2],
+    /// Inverse of the structure matrix: uu, uv, vv.
+    inverse: [f64; 3],
+    /// Its smaller eigenvalue.
+    texture: f64,
+}
+
+fn sum_products(a: &[[i16; SIDE]; SIDE], b: &[[i16; SIDE]; SIDE]) -> i32 {
+    a.as_flattened().iter().zip(b.as_flattened()).map(|(&a, &b)| i32::from(a) * i32::from(b)).sum()
+}
+
+fn sum(a: &[[i16; SIDE]; SIDE]) -> i32 {
+    a.as_flattened().iter().map(|&a| i32::from(a)).sum()
+}
+
+impl Template {
+    /// The patch centred on pixel (u, v); `None` too near the border or where nothing can be placed.
+    fn cut(image: Pixels<'_>, u: usize, v: usize) -> Option<Self> {
+        let (left, top) = (u.checked_sub(SIDE / 2 + 1)?, v.checked_sub(SIDE / 2 + 1)?);
+        if left + SIDE + 2 > image.width {
+            return None;
+        }
+        let row = |y: usize| image.data.get((top + y) * image.width + left..)?.get(..SIDE + 2);
+        let (mut pixel, mut along, mut down) = ([[0; SIDE]; SIDE], [[0; SIDE]; SIDE], [[0; SIDE]; SIDE]);
+        for (y, ((pixel, along), down)) in pixel.iter_mut().zip(&mut along).zip(&mut down).enumerate() {
+            let (above, here, below) = (row(y)?, row(y + 1)?, row(y + 2)?);
+            for (((pixel, along), down), ((above, here), below)) in
+                pixel.iter_mut().zip(along).zip(down).zip(above.get(1..)?.iter().zip(here.windows(3)).zip(below.get(1..)?))
+            {
+                if let [before, here, after] = *here {
+                    *pixel = i16::from(here);
+                    *along = i16::from(after) - i16::from(before);
+                    *down = i16::from(*below) - i16::from(*above);
+                }
+            }
+        }
+        let mean = [sum(&pixel), sum(&along), sum(&down)].map(|sum| f64::from(sum) / AREA);
+        let spread = |a, b, mean_a: f64, mean_b: f64| f64::from(sum_products(a, b)) - AREA * mean_a * mean_b;
+        let pattern = spread(&pixel, &pixel, mean[0], mean[0]);
+        if pattern <= 0.0 {
+            return None;
+        }
+        let with = [spread(&pixel, &along, mean[0], mean[1]), spread(&pixel, &down, mean[0], mean[2])];
+        let uu = spread(&along, &along, mean[1], mean[1]) - with[0] * with[0] / pattern;
+        let uv = spread(&along, &down, mean[1], mean[2]) - with[0] * with[1] / pattern;
+        let vv = spread(&down, &down, mean[2], mean[2]) - with[1] * with[1] / pattern;
+        let determinant = uu * vv - uv * uv;
+        let texture = 0.5 * (uu + vv - libm::sqrt((uu - vv) * (uu - vv) + 4.0 * uv * uv));
+        if !(texture > TEXTURE_MIN && determinant > 0.0) {
+            return None;
+        }
+        let inverse = [vv / determinant, -uv / determinant, uu / determinant];
+        Some(Self { pixel, along, down, mean, share: with.map(|with| with / pattern), inverse, texture })
+    }
+
+    /// Where the patch is in another image, begun at (u, v).
+    fn find(&self, image: Pixels<'_>, [u, v]: [f32; 2]) -> Option<[f32; 2]> {
+        let begin = [f64::from(u), f64::from(v)];
+        let mut at = begin;
+        for _ in 0..STEPS {
+            // Sixteenths of a pixel of the patch's corner; begin is an integer inside the image and `at` within 2 px of it.
+            let corner = at.map(|x| libm::floor(16.0 * (x - HALF) + 0.5) as i32);
+            let error = self.error(image, corner)?;
+            let step = self.step(&error);
+            let next = [f64::from(corner[0]) / 16.0 + HALF - step[0], f64::from(corner[1]) / 16.0 + HALF - step[1]];
+            let moved = (next[0] - at[0]) * (next[0] - at[0]) + (next[1] - at[1]) * (next[1] - at[1]);
+            let far = |i: usize| libm::fabs(next.get(i).copied().unwrap_or(0.0) - begin.get(i).copied().unwrap_or(0.0));
+            if !(far(0) <= FARTHEST_PX && far(1) <= FARTHEST_PX) {
+                return None;
+            }
+            at = next;
+            if moved < SMALL_STEP_PX * SMALL_STEP_PX {
+                return Some(at.map(|x| x as f32));
+            }
+        }
+        None
+    }
+
+    /// The image minus the template, in 1/32 grey levels, with the patch's corner at `corner` sixteenths of a pixel.
+    fn error(&self, image: Pixels<'_>, corner: [i32; 2]) -> Option<[[i16; SIDE]; SIDE]> {
+        let (left, top) = (usize::try_from(corner[0] >> 4).ok()?, usize::try_from(corner[1] >> 4).ok()?);
+        let (along, down) = ((corner[0] & 15) as u16, (corner[1] & 15) as u16);
+        if left + SIDE + 1 > image.width {
+            return None;
+        }
+        let mut rows = image.data.get(top * image.width + left..)?.chunks(image.width);
+        let mut blend = || -> Option<[u16; SIDE]> {
+            let row = rows.next()?.get(..SIDE + 1)?;
+            let mut out = [0; SIDE];
+            for ((out, &a), &b) in out.iter_mut().zip(row).zip(row.get(1..)?) {
+                *out = u16::from(a) * (16 - along) + u16::from(b) * along;
+            }
+            Some(out)
+        };
+        let mut above = blend()?;
+        let mut error = [[0; SIDE]; SIDE];
+        for (error, pixel) in error.iter_mut().zip(&self.pixel) {
+            let below = blend()?;
+            for (((error, &pixel), &a), &b) in error.iter_mut().zip(pixel).zip(&above).zip(&below) {
+                *error = ((a * (16 - down) + b * down) >> 3) as i16 - 32 * pixel;
+            }
+            above = below;
+        }
+        Some(error)
+    }
+
+    /// How far the template must move to explain the error, px.
+    fn step(&self, error: &[[i16; SIDE]; SIDE]) -> [f64; 2] {
+        let total = f64::from(sum(error));
+        let pattern = f64::from(sum_products(&self.pixel, error)) - self.mean[0] * total;
+        let along = f64::from(sum_products(&self.along, error)) - self.mean[1] * total - self.share[0] * pattern;
+        let down = f64::from(sum_products(&self.down, error)) - self.mean[2] * total - self.share[1] * pattern;
+        // Gradients are doubled and errors in 1/32 grey levels.
+        let scale = 2.0 / 32.0;
+        [
+            scale * (self.inverse[0] * along + self.inverse[1] * down),
+            scale * (self.inverse[1] * along + self.inverse[2] * down),
+        ]
+    }
+}
+
+/// The four images.
+#[derive(Clone, Copy)]
+pub(super) struct Images<'a> {
+    pub previous_left: Pixels<'a>,
+    pub previous_right: Pixels<'a>,
+    pub current_left: Pixels<'a>,
+    pub current_right: Pixels<'a>,
+}
+
+/// Refines one match that is still at whole pixels. Returns it with its texture (the better it can be placed, the larger), or `None`
+/// when the patch is lost in one of the images or loses its positive disparity.
+pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
+    let [u, v] = m.previous_left.map(|x| x as usize);
+    let template = Template::cut(images.previous_left, u, v)?;
+    let refined = Match {
+        previous_left: m.previous_left,
+        previous_right: template.find(images.previous_right, m.previous_right)?,
+        current_left: template.find(images.current_left, m.current_left)?,
+        current_right: template.find(images.current_right, m.current_right)?,
+    };
+    let seen = refined.previous_disparity_px() > 0.0 && refined.current_disparity_px() > 0.0;
+    seen.then_some((refined, template.texture as f32))
+}

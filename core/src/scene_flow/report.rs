@@ -1,0 +1,47 @@
+//! What one frame's scene flow did, in numbers.
+
+use super::camera::FeatureCount;
+
+/// How a frame's scene flow went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FlowStatus {
+    /// Matches against the previous frame were looked for.
+    #[default]
+    Matched,
+    /// There is no previous frame, or it had another size: no matches.
+    First,
+    /// The images differ in size or exceed the capacity: nothing was done, and the next frame is a first one.
+    Refused,
+}
+
+/// Counts of one pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PassCount {
+    /// Circles that closed.
+    pub closed: u32,
+    /// Of these, dropped because the list was full.
+    pub dropped: u32,
+    /// Of those kept, without support in their neighbourhood.
+    pub unsupported: u32,
+}
+
+/// One frame's scene flow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FlowReport {
+    /// How it went.
+    pub status: FlowStatus,
+    /// Features of the left image.
+    pub left: FeatureCount,
+    /// Features of the right image.
+    pub right: FeatureCount,
+    /// The sparse pass. Its unsupported matches stay in `sparse()`.
+    pub sparse: PassCount,
+    /// The dense pass.
+    pub dense: PassCount,
+    /// Supported matches whose patch was lost below the pixel.
+    pub unrefined: u32,
+    /// Matches in `refined()`.
+    pub refined: u32,
+    /// Matches in `bucketed()`.
+    pub bucketed: u32,
+}

@@ -1,0 +1,182 @@
+//! Non-maximum suppression: what of the filters' responses is a feature.
+//!
+//! A pixel is a peak when it reaches the threshold and no pixel within `radius` rows and columns is stronger, nor as strong and
+//! earlier in scan order. Found block by block (Neubeck & Van Gool, *Efficient Non-Maximum Suppression*, ICPR 2006): a block of
+//! radius + 1 pixels squared holds one peak at most, the first of its strongest pixels, and only that one is compared with its
+//! surroundings. Peaks of the wider radius are peaks of the narrower one, so the sparse pass only asks the dense one's features again.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Radius of the dense pass, px.
+pub(super) const DENSE_RADIUS: usize = 3;
+/// Radius of the sparse pass, px.
+pub(super) const SPARSE_RADIUS: usize = 9;
+/// Distance features keep from the image's border, px: room for a descriptor and for refinement.
+pub(super) const FEATURE_MARGIN: usize = 8;
+/// Classes of features: blob maximum, blob minimum, corner maximum, corner minimum. Only equals are compared.
+pub(super) const CLASSES: usize = 4;
+const BLOCK: usize = DENSE_RADIUS + 1;
+
+/// A feature without its descriptor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Candidate {
+    /// Column, px.
+    pub u: u16,
+    /// Row, px.
+    pub v: u16,
+    /// 0..[`CLASSES`].
+    pub class: u8,
+    /// 1 when it is a peak within [`SPARSE_RADIUS`] as well.
+    pub sparse: u8,
+}
+
+/// A filter's responses.
+#[derive(Clone, Copy)]
+pub(super) struct Field<'a> {
+    /// Row by row.
+    pub response: &'a [i16],
+    /// Columns.
+    pub width: usize,
+}
+
+/// Finds the features of both filters and hands them to `emit`: block row by block row, there by filter, there from left to right.
+/// `extremes` is room for two rows.
+pub(super) fn suppress(blob: Field<'_>, corner: Field<'_>, response_min: i16, extremes: &mut [i16], mut emit: impl FnMut(Candidate)) {
+    let width = blob.width;
+    if width <= 2 * FEATURE_MARGIN {
+        return;
+    }
+    let end = (blob.response.len() / width).saturating_sub(FEATURE_MARGIN);
+    let (low, high) = extremes.split_at_mut(width);
+    for top in (FEATURE_MARGIN..end).step_by(BLOCK) {
+        let rows = if end - top < BLOCK { end - top } else { BLOCK };
+        for (class, field) in [(0, blob), (2, corner)] {
+            column_extremes(field, top, rows, low, high);
+            let blocks = |row: &[i16]| FEATURE_MARGIN..row.len() - FEATURE_MARGIN;
+            let pairs = low.get(blocks(low)).unwrap_or(&[]).chunks(BLOCK).zip(high.get(blocks(high)).unwrap_or(&[]).chunks(BLOCK));
+            for (left, (low, high)) in (FEATURE_MARGIN..).step_by(BLOCK).zip(pairs) {
+                let block = Block { left, columns: low.len(), top, rows };
+                let strongest = high.iter().fold(i16::MIN, |best, &x| if x > best { x } else { best });
+                if strongest >= response_min
+                    && let Some(found) = peak_of_block::<1>(field, block, strongest)
+                {
+                    emit(Candidate { class, ..found });
+                }
+                let strongest = -low.iter().fold(i16::MAX, |best, &x| if x < best { x } else { best });
+                if strongest >= response_min
+                    && let Some(found) = peak_of_block::<-1>(field, block, strongest)
+                {
+                    emit(Candidate { class: class + 1, ..found });
+                }
+            }
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Block {
+    left: usize,
+    columns: usize,
+    top: usize,
+    rows: usize,
+}
+
+/// Smallest and largest response of each column over the rows of a block row.
+fn column_extremes(field: Field<'_>, top: usize, rows: usize, low: &mut [i16], high: &mut [i16]) {
+    low.fill(i16::MAX);
+    high.fill(i16::MIN);
+    for row in field.response.chunks_exact(field.width).skip(top).take(rows) {
+        for ((low, high), &x) in low.iter_mut().zip(high.iter_mut()).zip(row) {
+            *low = if x < *low { x } else { *low };
+            *high = if x > *high { x } else { *high };
+        }
+    }
+}
+
+/// The first pixel of the block whose `SIGN` times response is `strongest`, if it is a peak.
+fn peak_of_block<const SIGN: i16>(field: Field<'_>, block: Block, strongest: i16) -> Option<Candidate> {
+    for v in block.top..block.top + block.rows {
+        let row = field.response.get(v * field.width + block.left..)?.get(..block.columns)?;
+        if let Some(column) = row.iter().position(|&x| x * SIGN == strongest) {
+            let u = block.left + column;
+            let peak = is_peak::<SIGN, DENSE_RADIUS>(field, u, v, strongest);
+            let sparse = peak && is_peak::<SIGN, SPARSE_RADIUS>(field, u, v, strongest);
+            return peak.then_some(Candidate { u: u as u16, v: v as u16, class: 0, sparse: u8::from(sparse) });
+        }
+    }
+    None
+}
+
+/// Whether no response around (u, v) is stronger, nor as strong and earlier.
+fn is_peak<const SIGN: i16, const RADIUS: usize>(field: Field<'_>, u: usize, v: usize, strongest: i16) -> bool {
+    let (left, top) = (u.saturating_sub(RADIUS), v.saturating_sub(RADIUS));
+    let right = if u + RADIUS < field.width { u + RADIUS + 1 } else { field.width };
+    for (row, y) in field.response.chunks_exact(field.width).skip(top).take(v + RADIUS + 1 - top).zip(top..) {
+        let around = row.get(left..right).unwrap_or(&[]);
+        // As strong is too strong before (u, v) in scan order, and allowed from there on.
+        let (before, after) = if y < v { (around, [].as_slice()) } else { around.split_at(if y > v { 0 } else { u - left }) };
+        let beaten = before.iter().fold(false, |beaten, &x| beaten | (x * SIGN >= strongest))
+            | after.iter().fold(false, |beaten, &x| beaten | (x * SIGN > strongest));
+        if beaten {
+            return false;
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::vec::Vec;
+
+    /// The definition, pixel by pixel.
+    fn peaks(response: &[i16], width: usize, class: u8, sign: i16, radius: usize, response_min: i16) -> Vec<(u16, u16, u8)> {
+        let height = response.len() / width;
+        let mut found = Vec::new();
+        for v in FEATURE_MARGIN..height - FEATURE_MARGIN {
+            for u in FEATURE_MARGIN..width - FEATURE_MARGIN {
+                let here = sign * response[v * width + u];
+                let mut peak = here >= response_min;
+                for y in v.saturating_sub(radius)..=(v + radius).min(height - 1) {
+                    for x in u.saturating_sub(radius)..=(u + radius).min(width - 1) {
+                        let there = sign * response[y * width + x];
+                        peak &= there < here || (there == here && (y, x) >= (v, u));
+                    }
+                }
+                if peak {
+                    found.push((u as u16, v as u16, class));
+                }
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn finds_exactly_the_peaks_of_the_definition_ties_included() {
+        let (width, height) = (67, 51);
+        for seed in 0..4 {
+            // Few distinct values: ties everywhere.
+            let mut random = Random::new(seed);
+            let mut noise = || -> Vec<i16> { (0..width * height).map(|_| random.below(240) as i16 - 120).collect() };
+            let (blob, corner) = (noise(), noise());
+            let mut found = Vec::new();
+            let fields = (Field { response: &blob, width }, Field { response: &corner, width });
+            suppress(fields.0, fields.1, 5, &mut [0; 2 * 67], |candidate| found.push(candidate));
+            for sparse in [false, true] {
+                let radius = if sparse { SPARSE_RADIUS } else { DENSE_RADIUS };
+                let mut expected = Vec::new();
+                for (class, field, sign) in [(0, &blob, 1), (1, &blob, -1), (2, &corner, 1), (3, &corner, -1)] {
+                    expected.extend(peaks(field, width, class, sign, radius, 5));
+                }
+                let kept = found.iter().filter(|c| !sparse || c.sparse == 1);
+                let mut kept: Vec<_> = kept.map(|c| (c.u, c.v, c.class)).collect();
+                kept.sort_unstable();
+                expected.sort_unstable();
+                assert!(!expected.is_empty());
+                assert_eq!(kept, expected);
+            }
+        }
+    }
+}
