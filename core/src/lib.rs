@@ -14,6 +14,7 @@ extern crate std;
 
 pub mod config;
 pub mod digest;
+pub mod egomotion;
 pub mod executor;
 pub mod geometry;
 pub mod image;

@@ -1,0 +1,178 @@
+//! Real clips, judged as KITTI does.
+
+use super::{Egomotion, EgomotionConfig, Estimator};
+use crate::{
+    executor::Serial,
+    geometry::StereoRig,
+    image::View,
+    memory::{Capacity, Carver},
+    scene_flow::{FlowMatcher, SceneFlowConfig},
+};
+use nalgebra::Matrix4;
+use std::{
+    format, fs,
+    path::{Path, PathBuf},
+    println,
+    string::String,
+    vec,
+    vec::Vec,
+};
+
+const LENGTHS_M: [f64; 6] = [5.0, 10.0, 20.0, 30.0, 40.0, 50.0];
+
+struct Errors {
+    translation_percent: f64,
+    rotation_deg_per_m: f64,
+    frame_rms_m: f64,
+    frame_rms_deg: f64,
+}
+
+fn root() -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    std::env::var_os("DYNVOX_DATA").map_or_else(beside, PathBuf::from).join("kitti-odometry")
+}
+
+fn numbers(path: &Path) -> Option<Vec<f64>> {
+    Some(fs::read_to_string(path).ok()?.split_whitespace().filter_map(|word| word.parse().ok()).collect())
+}
+
+fn rig(path: &Path) -> Option<StereoRig> {
+    let values = numbers(path)?;
+    let (p0, p1) = (values.get(..12)?, values.get(12..24)?);
+    Some(StereoRig { focal_px: p0[0], center_u_px: p0[2], center_v_px: p0[6], baseline_m: -p1[3] / p1[0] })
+}
+
+fn poses(path: &Path) -> Option<Vec<Matrix4<f64>>> {
+    let matrix = |row: &[f64]| {
+        let mut matrix = Matrix4::identity();
+        for (i, value) in row.iter().enumerate() {
+            matrix[(i / 4, i % 4)] = *value;
+        }
+        matrix
+    };
+    Some(numbers(path)?.chunks_exact(12).map(matrix).collect())
+}
+
+fn grey(folder: &Path, frame: usize) -> Option<(Vec<u8>, usize, usize)> {
+    let picture = image::open(folder.join(format!("{frame:06}.png"))).ok()?.into_luma8();
+    let (width, height) = picture.dimensions();
+    Some((picture.into_raw(), width as usize, height as usize))
+}
+
+fn degrees(motion: &Matrix4<f64>) -> f64 {
+    (((motion[(0, 0)] + motion[(1, 1)] + motion[(2, 2)] - 1.0) / 2.0).clamp(-1.0, 1.0)).acos().to_degrees()
+}
+
+fn length(motion: &Matrix4<f64>) -> f64 {
+    (motion[(0, 3)].powi(2) + motion[(1, 3)].powi(2) + motion[(2, 3)].powi(2)).sqrt()
+}
+
+fn inverse(motion: &Matrix4<f64>) -> Matrix4<f64> {
+    motion.try_inverse().unwrap()
+}
+
+fn judge(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors {
+    let between = |poses: &[Matrix4<f64>], i: usize, j: usize| inverse(&poses[i]) * poses[j];
+    let error = |i: usize, j: usize| inverse(&between(estimate, i, j)) * between(truth, i, j);
+    let frames = truth.len().min(estimate.len());
+    let mut distance = vec![0.0];
+    for i in 1..frames {
+        distance.push(distance[i - 1] + length(&between(truth, i - 1, i)));
+    }
+    let (mut translation, mut rotation, mut count) = (0.0, 0.0, 0.0);
+    for wanted in LENGTHS_M {
+        for i in 0..frames {
+            let Some(j) = (i..frames).find(|&j| distance[j] >= distance[i] + wanted) else { break };
+            translation += length(&error(i, j)) / wanted * 100.0;
+            rotation += degrees(&error(i, j)) / wanted;
+            count += 1.0;
+        }
+    }
+    let (mut frame_m, mut frame_deg) = (0.0, 0.0);
+    for i in 1..frames {
+        frame_m += length(&error(i - 1, i)).powi(2);
+        frame_deg += degrees(&error(i - 1, i)).powi(2);
+    }
+    let steps = (frames - 1) as f64;
+    Errors {
+        translation_percent: translation / count,
+        rotation_deg_per_m: rotation / count,
+        frame_rms_m: (frame_m / steps).sqrt(),
+        frame_rms_deg: (frame_deg / steps).sqrt(),
+    }
+}
+
+/// Runs a clip and returns its trajectory; `None` where the clip is missing.
+fn run(name: &str, flow: &SceneFlowConfig, config: &EgomotionConfig) -> Option<Vec<Matrix4<f64>>> {
+    let folder = root().join("sequences").join(name);
+    let rig = rig(&folder.join("calib.txt"))?;
+    let capacity = Capacity::ONBOARD;
+    let bytes = FlowMatcher::bytes(&capacity) + Estimator::bytes(&capacity);
+    let mut slab: Vec<[u64; 8]> = vec![[0; 8]; bytes / 64 + 1];
+    let slab: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
+    let lead = slab.as_ptr().align_offset(64);
+    let mut carver = Carver::new(&mut slab[lead..], bytes).unwrap();
+    let mut matcher = FlowMatcher::carve(&capacity, &mut carver).unwrap();
+    let mut estimator = Estimator::carve(&capacity, &mut carver).unwrap();
+    let mut camera = Egomotion::default();
+    let mut trajectory = Vec::new();
+    let mut times = Vec::new();
+    let verbose = std::env::var_os("VERBOSE").is_some();
+    for frame in 0.. {
+        let (Some(left), Some(right)) = (grey(&folder.join("image_0"), frame), grey(&folder.join("image_1"), frame)) else { break };
+        let (left_view, right_view) = (View::new(&left.0, left.1, left.2)?, View::new(&right.0, right.1, right.2)?);
+        let begin = std::time::Instant::now();
+        let report = matcher.push(flow, left_view, right_view, &Serial);
+        let matched = begin.elapsed();
+        let estimate = (frame > 0).then(|| camera.step(config, &rig, matcher.bucketed(), &mut estimator));
+        times.push((matched.as_secs_f64() * 1e3, (begin.elapsed() - matched).as_secs_f64() * 1e3));
+        if verbose && frame % 10 == 1 {
+            println!("{frame} {report:?} {estimate:?}");
+        }
+        trajectory.push(camera.t_world_camera().to_homogeneous());
+    }
+    let median = |which: fn(&(f64, f64)) -> f64| {
+        let mut times: Vec<f64> = times.iter().map(which).collect();
+        times.sort_by(f64::total_cmp);
+        times.get(times.len() / 2).copied().unwrap_or(0.0)
+    };
+    println!("{name}: scene flow {:.1} ms, egomotion {:.1} ms (median wall)", median(|t| t.0), median(|t| t.1));
+    (trajectory.len() > 1).then_some(trajectory)
+}
+
+fn say(what: &str, errors: &Errors) {
+    let Errors { translation_percent, rotation_deg_per_m, frame_rms_m, frame_rms_deg } = errors;
+    println!(
+        "{what}: t {translation_percent:.3} %, r {rotation_deg_per_m:.4} deg/m, per frame {:.2} cm {frame_rms_deg:.4} deg",
+        frame_rms_m * 100.0
+    );
+}
+
+fn truth(name: &str) -> Option<Vec<Matrix4<f64>>> {
+    poses(&root().join("poses").join(name))
+}
+
+#[test]
+fn follows_a_street_as_well_as_the_best_stereo_odometry_measured() {
+    let name: String = "06".into();
+    let Some(trajectory) = run(&name, &SceneFlowConfig::default(), &EgomotionConfig::default()) else {
+        println!("skipped: kitti-odometry/06");
+        return;
+    };
+    let errors = judge(&truth("06.txt").unwrap(), &trajectory);
+    say("06", &errors);
+    assert!(errors.translation_percent <= 0.80);
+    assert!(errors.rotation_deg_per_m <= 0.025);
+    assert!(errors.frame_rms_m <= 0.010);
+}
+
+#[test]
+fn follows_a_residential_street() {
+    let Some(trajectory) = run("r1405", &SceneFlowConfig::default(), &EgomotionConfig::default()) else {
+        println!("skipped: kitti-odometry/r1405");
+        return;
+    };
+    let errors = judge(&truth("r1405.txt").unwrap(), &trajectory);
+    say("r1405 against GPS/IMU", &errors);
+    say("r1405 against other odometry", &judge(&truth("r1405.vo.txt").unwrap(), &trajectory));
+}

@@ -1,0 +1,56 @@
+//! Settings of the motion estimate.
+
+use crate::config::{Problems, require};
+
+/// What the motion estimate can be told. One set serves the camera; objects use another copy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct EgomotionConfig {
+    /// Most hypotheses drawn from three matches each; 1..=10000. DynSLAM: 500, always all of them.
+    pub samples: u16,
+    /// Probability with which one hypothesis should be free of outliers: drawing stops once it is reached; in 0.5..1. DynSLAM: 1.
+    pub confidence: f64,
+    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0. DynSLAM: 2.
+    pub inlier_px: f32,
+    /// The same in the last rounds of refinement; above 0. DynSLAM: 2.
+    pub refined_inlier_px: f32,
+    /// Fewest matches, and fewest inliers, an estimate is made of; 3..=1000. DynSLAM: 6.
+    pub matches_min: u16,
+    /// Most Gauss-Newton steps of a hypothesis; 1..=50. DynSLAM: about 12.
+    pub sample_steps: u8,
+    /// Most Gauss-Newton steps of a round of refinement; 1..=250. DynSLAM: about 250.
+    pub refine_steps: u8,
+    /// Weight of a match against its distance from the middle column: 1 / (|u - cu| / |cu| + this), as a guard against lens errors at
+    /// the sides; 0 weighs all alike; 0..=10. DynSLAM: 0.05.
+    pub side_damping: f64,
+}
+
+impl Default for EgomotionConfig {
+    fn default() -> Self {
+        Self {
+            samples: 500,
+            confidence: 0.9999,
+            inlier_px: 2.0,
+            refined_inlier_px: 2.0,
+            matches_min: 6,
+            sample_steps: 12,
+            refine_steps: 50,
+            side_damping: 0.05,
+        }
+    }
+}
+
+impl EgomotionConfig {
+    /// Notes what is wrong with the settings.
+    pub fn validate(&self, problems: &mut Problems) {
+        let positive = |value: f32| value.is_finite() && value > 0.0;
+        require(problems, (1..=10_000).contains(&self.samples), "egomotion.samples", "must be in 1..=10000");
+        require(problems, (0.5..1.0).contains(&self.confidence), "egomotion.confidence", "must be at least 0.5 and below 1");
+        require(problems, positive(self.inlier_px), "egomotion.inlier_px", "must be above 0");
+        require(problems, positive(self.refined_inlier_px), "egomotion.refined_inlier_px", "must be above 0");
+        require(problems, (3..=1000).contains(&self.matches_min), "egomotion.matches_min", "must be in 3..=1000");
+        require(problems, (1..=50).contains(&self.sample_steps), "egomotion.sample_steps", "must be in 1..=50");
+        require(problems, (1..=250).contains(&self.refine_steps), "egomotion.refine_steps", "must be in 1..=250");
+        require(problems, (0.0..=10.0).contains(&self.side_damping), "egomotion.side_damping", "must be in 0..=10");
+    }
+}

@@ -1,0 +1,239 @@
+//! The motion estimate.
+
+use super::{
+    EgomotionConfig,
+    normal::{Normal, Posed, moved},
+    points::{Point, Points},
+};
+use crate::{
+    geometry::{StereoRig, Transform},
+    memory::{Capacity, Carver, SlabError, region_bytes},
+    random::Random,
+    scene_flow::Match,
+};
+
+/// Step below which a hypothesis has converged (rad and m, the largest of six).
+const SAMPLE_STEP_MIN: f64 = 1e-6;
+/// Step below which the refinement has converged.
+const REFINE_STEP_MIN: f64 = 1e-8;
+/// Rounds of choosing inliers anew and refining on them.
+const ROUNDS: usize = 3;
+
+/// How an estimate went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MotionStatus {
+    /// There is a motion, and its refinement converged.
+    #[default]
+    Estimated,
+    /// Fewer matches than asked for.
+    TooFewMatches,
+    /// No motion explains as many matches as asked for.
+    TooFewInliers,
+    /// The refinement did not come to rest.
+    NotConverged,
+    /// The rig cannot be used.
+    BadRig,
+}
+
+/// A motion, or why there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionEstimate {
+    /// How it went.
+    pub status: MotionStatus,
+    /// Maps previous camera coordinates to current camera coordinates; `None` unless `status` is `Estimated`.
+    pub t_current_previous: Option<Transform>,
+    /// Matches handed in that could be triangulated.
+    pub matches: u32,
+    /// Of these, explained by the motion.
+    pub inliers: u32,
+    /// Root mean square error of one coordinate over the inliers, px.
+    pub residual_rms_px: f64,
+    /// Hypotheses drawn.
+    pub samples: u32,
+    /// Gauss-Newton steps of the refinement.
+    pub steps: u32,
+}
+
+impl MotionEstimate {
+    fn failed(status: MotionStatus, matches: usize, inliers: usize, samples: u32) -> Self {
+        Self {
+            status,
+            t_current_previous: None,
+            matches: matches as u32,
+            inliers: inliers as u32,
+            residual_rms_px: 0.0,
+            samples,
+            steps: 0,
+        }
+    }
+}
+
+/// Room to estimate motions in, one after the other: the camera's, then each object's.
+#[derive(Debug)]
+pub struct Estimator<'s> {
+    points: Points<'s>,
+    inliers: &'s mut [u32],
+    inlier_len: usize,
+}
+
+impl<'s> Estimator<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        Points::bytes(capacity.matches) + region_bytes::<u32>(capacity.matches)
+    }
+
+    /// Cuts its regions.
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        Ok(Self {
+            points: Points::carve(capacity.matches, carver)?,
+            inliers: carver.cut("egomotion.inlier", capacity.matches)?,
+            inlier_len: 0,
+        })
+    }
+
+    /// Positions, in the order handed in, of the matches the last estimate explains.
+    pub fn inliers(&self) -> impl Iterator<Item = u32> {
+        self.inliers.iter().take(self.inlier_len).filter_map(|&index| self.points.source(index as usize))
+    }
+
+    /// Estimates the motion that carries the matches' points from the previous camera to the current one.
+    ///
+    /// `initial` is where hypotheses begin, standing still where it is absent; it is also the first hypothesis. `random` belongs to this
+    /// purpose alone. Matches beyond `capacity.matches` are not looked at.
+    pub fn estimate<'m>(
+        &mut self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        matches: impl IntoIterator<Item = &'m Match>,
+        random: &mut Random,
+        initial: Option<&Transform>,
+    ) -> MotionEstimate {
+        self.inlier_len = 0;
+        if rig.validate().is_err() {
+            return MotionEstimate::failed(MotionStatus::BadRig, 0, 0, 0);
+        }
+        self.points.fill(matches, rig);
+        let matches = self.points.len();
+        let needed = usize::from(config.matches_min).max(3);
+        if matches < needed {
+            return MotionEstimate::failed(MotionStatus::TooFewMatches, matches, 0, 0);
+        }
+        let start = initial.copied().unwrap_or_else(Transform::identity);
+        let (best, samples) = self.draw(config, rig, random, &start);
+        let mut estimate = MotionEstimate::failed(MotionStatus::TooFewInliers, matches, 0, samples);
+        let mut motion = best;
+        for round in 0..ROUNDS {
+            let inlier_px = if round == 0 { config.inlier_px } else { config.refined_inlier_px };
+            self.inlier_len = self.points.select(&motion, rig, inlier_px, self.inliers);
+            estimate.inliers = self.inlier_len as u32;
+            if self.inlier_len < needed {
+                return estimate;
+            }
+            let (better, steps, converged) = self.refine(config, rig, &motion);
+            estimate.steps += steps;
+            if !converged {
+                return MotionEstimate { status: MotionStatus::NotConverged, ..estimate };
+            }
+            motion = better;
+        }
+        let posed = Posed::new(&motion);
+        let mut sums = Normal::ZERO;
+        for point in self.chosen() {
+            sums.add(&point, &posed, rig, |_| 1.0);
+        }
+        estimate.residual_rms_px = libm::sqrt(sums.error / (4.0 * sums.weight));
+        MotionEstimate { status: MotionStatus::Estimated, t_current_previous: Some(motion), ..estimate }
+    }
+
+    /// The hypothesis that explains most points, the first of equals, and how many were drawn.
+    fn draw(&self, config: &EgomotionConfig, rig: &StereoRig, random: &mut Random, start: &Transform) -> (Transform, u32) {
+        let mut best = *start;
+        let mut most = self.points.score(start, rig, config.inlier_px, 0);
+        let mut wanted = enough(config, most, self.points.len());
+        let mut drawn = 0;
+        while drawn < wanted {
+            drawn += 1;
+            let Some(motion) = self.hypothesis(config, rig, random, start) else { continue };
+            let count = self.points.score(&motion, rig, config.inlier_px, most);
+            if count > most {
+                (best, most) = (motion, count);
+                wanted = enough(config, most, self.points.len());
+            }
+        }
+        (best, drawn)
+    }
+
+    /// The motion of three points drawn at random, if they have one.
+    fn hypothesis(&self, config: &EgomotionConfig, rig: &StereoRig, random: &mut Random, start: &Transform) -> Option<Transform> {
+        let len = self.points.len() as u32;
+        // Distinct by construction: each draw skips those before it.
+        let a = random.below(len);
+        let b = random.below(len - 1);
+        let b = b + u32::from(b >= a);
+        let (low, high) = if a < b { (a, b) } else { (b, a) };
+        let c = random.below(len - 2);
+        let c = c + u32::from(c >= low);
+        let c = c + u32::from(c >= high);
+        let points = [self.points.get(a as usize)?, self.points.get(b as usize)?, self.points.get(c as usize)?];
+        let mut motion = *start;
+        for _ in 0..config.sample_steps {
+            let posed = Posed::new(&motion);
+            let mut sums = Normal::ZERO;
+            for point in &points {
+                sums.add(point, &posed, rig, |_| 1.0);
+            }
+            let step = sums.solve()?;
+            motion = moved(&motion, step);
+            if largest(step) < SAMPLE_STEP_MIN {
+                return Some(motion);
+            }
+        }
+        None
+    }
+
+    fn chosen(&self) -> impl Iterator<Item = Point> {
+        self.inliers.iter().take(self.inlier_len).filter_map(|&index| self.points.get(index as usize))
+    }
+
+    /// Gauss-Newton on all inliers. Returns the motion, the steps taken and whether it came to rest.
+    fn refine(&self, config: &EgomotionConfig, rig: &StereoRig, motion: &Transform) -> (Transform, u32, bool) {
+        let mut motion = *motion;
+        for taken in 1..=u32::from(config.refine_steps) {
+            let posed = Posed::new(&motion);
+            let mut sums = Normal::ZERO;
+            for point in self.chosen() {
+                sums.add(&point, &posed, rig, |_| side_weight(config, rig, &point));
+            }
+            let Some(step) = sums.solve() else { return (motion, taken, false) };
+            motion = moved(&motion, step);
+            if largest(step) < REFINE_STEP_MIN {
+                return (motion, taken, true);
+            }
+        }
+        (motion, u32::from(config.refine_steps), false)
+    }
+}
+
+/// Hypotheses to draw so that one is free of outliers with the configured probability, given the most inliers so far.
+fn enough(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
+    let share = f64::from(inliers) / points as f64;
+    let clean = share * share * share;
+    if clean >= 1.0 {
+        return 1;
+    }
+    // No inlier yet: log(1) = 0, and the quotient is infinite.
+    let wanted = libm::ceil(libm::log(1.0 - config.confidence) / libm::log(1.0 - clean));
+    if wanted < f64::from(config.samples) { wanted as u32 } else { u32::from(config.samples) }
+}
+
+/// Weight by distance from the middle column.
+fn side_weight(config: &EgomotionConfig, rig: &StereoRig, point: &Point) -> f64 {
+    if config.side_damping <= 0.0 || rig.center_u_px == 0.0 {
+        return 1.0;
+    }
+    1.0 / (libm::fabs(point.left[0]) / libm::fabs(rig.center_u_px) + config.side_damping)
+}
+
+fn largest(step: [f64; 6]) -> f64 {
+    step.iter().map(|x| libm::fabs(*x)).fold(0.0, |most, x| if x > most { x } else { most })
+}

@@ -1,0 +1,216 @@
+//! Matches as scene points in the previous camera and where the current cameras see them, one array per coordinate.
+//!
+//! Memory: 28 bytes per match and 8 for the lists of inliers.
+
+use crate::{
+    geometry::{StereoRig, Transform},
+    memory::{Carver, SlabError, region_bytes},
+    scene_flow::Match,
+};
+
+/// Smallest disparity a point is triangulated from, px.
+const DISPARITY_MIN_PX: f64 = 0.1;
+/// Points scored between two looks at whether the hypothesis can still win.
+const STRIDE: usize = 256;
+/// Nearest depth at which a point can be seen, m.
+pub(super) const DEPTH_MIN_M: f64 = 0.05;
+
+/// The points. Coordinates in m, observations in px from the principal point.
+#[derive(Debug)]
+pub(super) struct Points<'s> {
+    x: &'s mut [f32],
+    y: &'s mut [f32],
+    z: &'s mut [f32],
+    left_u: &'s mut [f32],
+    left_v: &'s mut [f32],
+    right_u: &'s mut [f32],
+    right_v: &'s mut [f32],
+    /// Which of the matches each point was.
+    source: &'s mut [u32],
+    len: usize,
+}
+
+/// One point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    pub xyz: [f64; 3],
+    pub left: [f64; 2],
+    pub right: [f64; 2],
+}
+
+impl<'s> Points<'s> {
+    pub(super) const fn bytes(matches: usize) -> usize {
+        7 * region_bytes::<f32>(matches) + region_bytes::<u32>(matches)
+    }
+
+    pub(super) fn carve(matches: usize, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        Ok(Self {
+            x: carver.cut("egomotion.x", matches)?,
+            y: carver.cut("egomotion.y", matches)?,
+            z: carver.cut("egomotion.z", matches)?,
+            left_u: carver.cut("egomotion.left_u", matches)?,
+            left_v: carver.cut("egomotion.left_v", matches)?,
+            right_u: carver.cut("egomotion.right_u", matches)?,
+            right_v: carver.cut("egomotion.right_v", matches)?,
+            source: carver.cut("egomotion.source", matches)?,
+            len: 0,
+        })
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Triangulates the matches. Those without disparity, not finite or beyond the room are left out; returns how many were given.
+    pub(super) fn fill<'m>(&mut self, matches: impl IntoIterator<Item = &'m Match>, rig: &StereoRig) -> usize {
+        self.len = 0;
+        let mut given = 0;
+        for (index, m) in (0..).zip(matches) {
+            given += 1;
+            if let Some(point) = triangulate(m, rig) {
+                self.push(point, index);
+            }
+        }
+        given
+    }
+
+    fn push(&mut self, point: Point, source: u32) {
+        let at = self.len;
+        let ([x, y, z], [left_u, left_v], [right_u, right_v]) = (point.xyz, point.left, point.right);
+        let columns = [
+            (&mut *self.x, x),
+            (&mut *self.y, y),
+            (&mut *self.z, z),
+            (&mut *self.left_u, left_u),
+            (&mut *self.left_v, left_v),
+            (&mut *self.right_u, right_u),
+            (&mut *self.right_v, right_v),
+        ];
+        for (column, value) in columns {
+            if let Some(slot) = column.get_mut(at) {
+                *slot = value as f32;
+            }
+        }
+        if let Some(slot) = self.source.get_mut(at) {
+            *slot = source;
+            self.len += 1;
+        }
+    }
+
+    pub(super) fn get(&self, index: usize) -> Option<Point> {
+        let at = |column: &[f32]| column.get(index).map(|&x| f64::from(x));
+        Some(Point {
+            xyz: [at(self.x)?, at(self.y)?, at(self.z)?],
+            left: [at(self.left_u)?, at(self.left_v)?],
+            right: [at(self.right_u)?, at(self.right_v)?],
+        })
+    }
+
+    /// Which of the matches handed to [`Points::fill`] a point was.
+    pub(super) fn source(&self, index: usize) -> Option<u32> {
+        self.source.get(index).copied()
+    }
+
+    /// Counts the points within `inlier_px` of where the motion puts them; gives up, with a smaller count, when `to_beat` is out of reach.
+    pub(super) fn score(&self, motion: &Transform, rig: &StereoRig, inlier_px: f32, to_beat: u32) -> u32 {
+        let view = Single::new(motion, rig);
+        let mut count = 0;
+        let mut first = 0;
+        while first < self.len && count + ((self.len - first) as u32) > to_beat {
+            let last = (first + STRIDE).min(self.len);
+            count += self.errors(&view, first..last, |hits, error| hits + u32::from(error < inlier_px * inlier_px));
+            first = last;
+        }
+        count
+    }
+
+    /// Writes the positions of the points within `inlier_px` to `inliers`, in order. Returns how many there are.
+    pub(super) fn select(&self, motion: &Transform, rig: &StereoRig, inlier_px: f32, inliers: &mut [u32]) -> usize {
+        let view = Single::new(motion, rig);
+        let mut slots = inliers.iter_mut();
+        let mut count = 0;
+        let mut index = 0;
+        self.errors(&view, 0..self.len, |_, error| {
+            if error < inlier_px * inlier_px
+                && let Some(slot) = slots.next()
+            {
+                *slot = index;
+                count += 1;
+            }
+            index += 1;
+            0
+        });
+        count
+    }
+
+    /// Folds the squared errors of a range of points, px²; infinite for points that would be behind the camera.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "`range` ends at `len` at most, and all columns are cut to it first")]
+    fn errors(&self, view: &Single, range: core::ops::Range<usize>, mut fold: impl FnMut(u32, f32) -> u32) -> u32 {
+        let (x, y, z) = (&self.x[range.clone()], &self.y[range.clone()], &self.z[range.clone()]);
+        let (left_u, left_v) = (&self.left_u[range.clone()], &self.left_v[range.clone()]);
+        let (right_u, right_v) = (&self.right_u[range.clone()], &self.right_v[range.clone()]);
+        let n = range.len();
+        let (y, z, left_u, left_v, right_u, right_v) = (&y[..n], &z[..n], &left_u[..n], &left_v[..n], &right_u[..n], &right_v[..n]);
+        let mut state = 0;
+        for i in 0..n {
+            let error = view.error([x[i], y[i], z[i]], [left_u[i], left_v[i]], [right_u[i], right_v[i]]);
+            state = fold(state, error);
+        }
+        state
+    }
+}
+
+/// A motion and a rig in single precision, for scoring.
+struct Single {
+    rotation: [[f32; 3]; 3],
+    translation: [f32; 3],
+    focal: f32,
+    focal_baseline: f32,
+}
+
+impl Single {
+    fn new(motion: &Transform, rig: &StereoRig) -> Self {
+        let r = motion.rotation.to_rotation_matrix();
+        let r = r.matrix();
+        let t = &motion.translation.vector;
+        Self {
+            rotation: [[r.m11, r.m12, r.m13], [r.m21, r.m22, r.m23], [r.m31, r.m32, r.m33]].map(|row| row.map(|x| x as f32)),
+            translation: [t.x, t.y, t.z].map(|x| x as f32),
+            focal: rig.focal_px as f32,
+            focal_baseline: rig.focal_baseline_px_m() as f32,
+        }
+    }
+
+    #[inline(always)]
+    fn error(&self, [x, y, z]: [f32; 3], left: [f32; 2], right: [f32; 2]) -> f32 {
+        let row = |r: [f32; 3], t: f32| r[0] * x + r[1] * y + r[2] * z + t;
+        let [rx, ry, rz] = self.rotation;
+        let [tx, ty, tz] = self.translation;
+        let depth = row(rz, tz);
+        let inverse = 1.0 / depth;
+        let u = self.focal * row(rx, tx) * inverse;
+        let v = self.focal * row(ry, ty) * inverse;
+        let [a, b, c, d] = [u - left[0], v - left[1], u - self.focal_baseline * inverse - right[0], v - right[1]];
+        let error = a * a + b * b + c * c + d * d;
+        if depth > DEPTH_MIN_M as f32 { error } else { f32::INFINITY }
+    }
+}
+
+/// The point a match shows, in the previous left camera, and its current observations.
+fn triangulate(m: &Match, rig: &StereoRig) -> Option<Point> {
+    let center = [rig.center_u_px, rig.center_v_px];
+    let from_center = |[u, v]: [f32; 2]| [f64::from(u) - center[0], f64::from(v) - center[1]];
+    let before = from_center(m.previous_left);
+    let disparity = before[0] - from_center(m.previous_right)[0];
+    let (left, right) = (from_center(m.current_left), from_center(m.current_right));
+    let finite = left.iter().chain(&right).chain(&before).all(|x| x.is_finite());
+    // `>=` is false for NaN as well.
+    if !(finite && disparity >= DISPARITY_MIN_PX) {
+        return None;
+    }
+    let per_px = rig.baseline_m / disparity;
+    let v = 0.5 * (before[1] + from_center(m.previous_right)[1]);
+    let v = if v.is_finite() { v } else { return None };
+    Some(Point { xyz: [before[0] * per_px, v * per_px, rig.focal_px * per_px], left, right })
+}

@@ -1,0 +1,61 @@
+//! The camera's motion from frame to frame, also where it cannot be estimated.
+
+use super::{EgomotionConfig, Estimator, MotionEstimate};
+use crate::{
+    geometry::{StereoRig, Transform, renormalised},
+    random::Random,
+    scene_flow::Match,
+};
+
+/// Seed of the camera's own draws.
+const SEED: u64 = 0x0063_616D_6572_61;
+
+/// Where the camera is and how it last moved.
+#[derive(Clone, Debug)]
+pub struct Egomotion {
+    t_world_camera: Transform,
+    t_current_previous: Transform,
+    held: u32,
+    random: Random,
+}
+
+impl Default for Egomotion {
+    /// A camera at the world's origin that has not moved.
+    fn default() -> Self {
+        Self { t_world_camera: Transform::identity(), t_current_previous: Transform::identity(), held: 0, random: Random::new(SEED) }
+    }
+}
+
+impl Egomotion {
+    /// Moves the camera by one frame: as estimated or, failing that, as before (constant velocity).
+    pub fn step<'m>(
+        &mut self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        matches: impl IntoIterator<Item = &'m Match>,
+        estimator: &mut Estimator<'_>,
+    ) -> MotionEstimate {
+        let estimate = estimator.estimate(config, rig, matches, &mut self.random, Some(&self.t_current_previous));
+        match estimate.t_current_previous {
+            Some(motion) => (self.t_current_previous, self.held) = (motion, 0),
+            None => self.held = self.held.saturating_add(1),
+        }
+        self.t_world_camera = renormalised(&(self.t_world_camera * self.t_current_previous.inverse()));
+        estimate
+    }
+
+    /// Maps camera coordinates to world coordinates, which are the first camera's.
+    pub fn t_world_camera(&self) -> &Transform {
+        &self.t_world_camera
+    }
+
+    /// The last motion, estimated or held.
+    pub fn t_current_previous(&self) -> &Transform {
+        &self.t_current_previous
+    }
+
+    /// Frames in a row for which the motion has been held; 0 when the last one was estimated.
+    pub fn held_frames(&self) -> u32 {
+        self.held
+    }
+}
