@@ -221,7 +221,9 @@ fn enough(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
     if clean >= 1.0 {
         return 1;
     }
-    // No inlier yet: log(1) = 0, and the quotient is infinite.
+    if clean < 1e-9 {
+        return u32::from(config.samples);
+    }
     let wanted = libm::ceil(libm::log(1.0 - config.confidence) / libm::log(1.0 - clean));
     if wanted < f64::from(config.samples) { wanted as u32 } else { u32::from(config.samples) }
 }

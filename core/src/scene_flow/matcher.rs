@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Cells in which sparse matches look for support, px; those of the dense pass are [`CELL_MIN_PX`].
-const SPARSE_CELL_PX: usize = 48;
+const SPARSE_CELL_PX: usize = 24;
 
 /// Features and matches over the last two frames.
 #[derive(Debug)]
