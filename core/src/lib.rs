@@ -22,6 +22,7 @@ pub mod memory;
 pub mod random;
 pub mod scene_flow;
 pub mod volume;
+pub mod stereo;
 
 pub use executor::{Executor, Serial, Stage};
 pub use memory::{Capacity, Footprint, Slab};

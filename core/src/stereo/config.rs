@@ -1,0 +1,130 @@
+//! Every parameter of the stereo matcher, with the values of the published presets.
+
+use crate::config::{Problems, require};
+
+/// Largest disparity the matcher can represent, px.
+pub const DISPARITY_LIMIT: u16 = 255;
+/// Smallest distance between two support candidates, px: the bound on support points follows from it.
+pub const MIN_CANDIDATE_STEP: usize = 5;
+/// Smallest cell of the grid prior, px: the bound on cells follows from it.
+pub const MIN_GRID_SIZE: usize = 10;
+/// Widest search around the prior plane, px.
+pub const MAX_PLANE_RADIUS: usize = 16;
+
+/// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving; [`Default`] is DynSLAM's, which fills wider gaps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct StereoConfig {
+    /// Largest disparity searched, px, 10..=255. Published: 255.
+    pub disparity_max: u16,
+    /// A support match must cost less than this share of the second best, above 0, at most 1. Published: 0.85.
+    pub support_ratio: f32,
+    /// Least texture of a support point's descriptor: sum of gradient magnitudes over its 16 samples. Published: 10.
+    pub support_texture: u16,
+    /// Distance between support candidates, px, 5..=64. Published: 5.
+    pub candidate_step: usize,
+    /// Half the window in which a support point needs company, candidates, 1..=16. Published: 5.
+    pub plausible_window: usize,
+    /// Company is what differs by at most this, px. Published: 5.
+    pub plausible_threshold: u16,
+    /// Least number of support points in the window, itself included. Published: 5.
+    pub plausible_min: u16,
+    /// A support point between two alike ones at most so many candidates away, on a row or a column, is redundant; 0 keeps all. Published: 5.
+    pub redundant_distance: usize,
+    /// Alike is what differs by at most this, px. Published: 1.
+    pub redundant_threshold: u16,
+    /// Side of a cell of the grid prior, px, 10..=256. Published: 20.
+    pub grid_size: usize,
+    /// Weight of the descriptor distance against the prior (beta), above 0. Published: 0.02.
+    pub beta: f32,
+    /// Uniform share of the prior (gamma), above 0. Published: 3.
+    pub gamma: f32,
+    /// Standard deviation of disparities about the prior plane (sigma), px, above 0. Published: 1.
+    pub sigma: f32,
+    /// Disparities searched to each side of the prior plane, in sigmas, 0..=16. Published: 2.
+    pub plane_radius_sigmas: f32,
+    /// A triangle steeper than this bridges two surfaces: its plane is searched but not preferred. Disparity per px, at least 0.
+    pub plane_slope_max: f32,
+    /// Least texture of a descriptor that is matched densely. Published: 1.
+    pub match_texture: u16,
+    /// Largest difference between the disparities of left and right image, px. Published: 2.
+    pub consistency_threshold: u16,
+    /// Neighbours that differ by at most this belong to one segment, px. Published: 1.
+    pub speckle_similarity: u16,
+    /// Segments smaller than this are removed, px; 0 or 1 keeps all. Published: 200.
+    pub speckle_size: u32,
+    /// Widest gap filled along rows and columns, px; 0 fills none. Published: 3; DynSLAM: 21.
+    pub gap_width: usize,
+    /// Ends of a gap that differ by less than this are one surface, px; otherwise the farther one is continued. Published: 3.
+    pub gap_discontinuity: u16,
+    /// Whether an edge-preserving mean smooths the result; published: yes. It also yields fractions of a pixel.
+    pub adaptive_mean: bool,
+    /// Whether a 3 x 3 median follows. Published: no.
+    pub median: bool,
+}
+
+impl StereoConfig {
+    /// The published preset for driving.
+    pub const fn robotics() -> Self {
+        Self {
+            disparity_max: 255,
+            support_ratio: 0.85,
+            support_texture: 10,
+            candidate_step: 5,
+            plausible_window: 5,
+            plausible_threshold: 5,
+            plausible_min: 5,
+            redundant_distance: 5,
+            redundant_threshold: 1,
+            grid_size: 20,
+            beta: 0.02,
+            gamma: 3.0,
+            sigma: 1.0,
+            plane_radius_sigmas: 2.0,
+            plane_slope_max: 0.7,
+            match_texture: 1,
+            consistency_threshold: 2,
+            speckle_similarity: 1,
+            speckle_size: 200,
+            gap_width: 3,
+            gap_discontinuity: 3,
+            adaptive_mean: true,
+            median: false,
+        }
+    }
+
+    /// DynSLAM's set: as [`StereoConfig::robotics`], but gaps up to 21 px are filled.
+    pub const fn dynslam() -> Self {
+        Self { gap_width: 21, ..Self::robotics() }
+    }
+
+    /// Notes everything that is wrong.
+    pub fn validate(&self, problems: &mut Problems) {
+        let mut check = |holds, key, rule| require(problems, holds, key, rule);
+        let positive = |value: f32| value.is_finite() && value > 0.0;
+        check((10..=DISPARITY_LIMIT).contains(&self.disparity_max), "stereo.disparity_max", "must be within 10..=255 px");
+        check(positive(self.support_ratio) && self.support_ratio <= 1.0, "stereo.support_ratio", "must be above 0 and at most 1");
+        check((MIN_CANDIDATE_STEP..=64).contains(&self.candidate_step), "stereo.candidate_step", "must be within 5..=64 px");
+        check((1..=16).contains(&self.plausible_window), "stereo.plausible_window", "must be within 1..=16 candidates");
+        check(self.redundant_distance <= 64, "stereo.redundant_distance", "must be at most 64 candidates");
+        check((MIN_GRID_SIZE..=256).contains(&self.grid_size), "stereo.grid_size", "must be within 10..=256 px");
+        check(positive(self.beta), "stereo.beta", "must be above 0");
+        check(positive(self.gamma), "stereo.gamma", "must be above 0");
+        check(positive(self.sigma), "stereo.sigma", "must be above 0 px");
+        let radius = self.sigma * self.plane_radius_sigmas;
+        check((0.0..=MAX_PLANE_RADIUS as f32).contains(&radius), "stereo.plane_radius_sigmas", "times sigma must be within 0..=16 px");
+        check((0.0..=1e3).contains(&self.plane_slope_max), "stereo.plane_slope_max", "must be within 0..=1000");
+        check(self.gap_width <= 4_096, "stereo.gap_width", "must be at most 4096 px");
+    }
+
+    /// Disparities searched to each side of the prior plane, px.
+    pub(super) fn plane_radius(&self) -> usize {
+        libm::ceilf(self.sigma * self.plane_radius_sigmas) as usize
+    }
+}
+
+impl Default for StereoConfig {
+    fn default() -> Self {
+        Self::dynslam()
+    }
+}

@@ -1,0 +1,243 @@
+//! Delaunay triangulation of points in scan order, exact, iterative, in fixed memory.
+//!
+//! Points are inserted in the order of their rows, then columns, so that each lies outside the hull of those before it: it is joined to
+//! the hull edges it sees, and the edges opposite to it are flipped until all are locally Delaunay (Lawson). The triangles about the
+//! new point form a fan from one hull neighbour to the other, so a walk along the fan visits every edge in question: no stack.
+//! Predicates are integer determinants: with coordinates below 2^13 the in-circle one stays below 2^57.
+//!
+//! Memory: 68 bytes a point. Time: about linear on street scenes (a few flips a point). Four points on one circle keep the diagonal
+//! that the order of insertion gives. Points on one line make no triangle.
+
+use crate::memory::{Carver, SlabError, region_bytes};
+use bytemuck::{Pod, Zeroable};
+
+/// A support point of one image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct SupportPoint {
+    /// Column, px.
+    pub u: u16,
+    /// Row, px.
+    pub v: u16,
+    /// Disparity, px.
+    pub disparity: u16,
+}
+
+/// No half-edge on the other side: the edge is on the hull.
+const NONE: u32 = u32::MAX;
+
+/// Triangles as half-edges: triangle t has the corners `corner[3t..3t + 3]`, half-edge h runs from `corner[h]` to the next corner of its
+/// triangle and `twin[h]` is the same edge seen from the other side.
+pub(super) struct Triangulation<'s> {
+    points: &'s mut [SupportPoint],
+    corner: &'s mut [u32],
+    twin: &'s mut [u32],
+    hull_next: &'s mut [u32],
+    hull_previous: &'s mut [u32],
+    hull_edge: &'s mut [u32],
+    len: usize,
+    triangles: usize,
+}
+
+/// Twice the signed area of the triangle a, b, c.
+fn orientation(a: SupportPoint, b: SupportPoint, c: SupportPoint) -> i64 {
+    let d = |x: u16, y: u16| i64::from(x) - i64::from(y);
+    d(b.u, a.u) * d(c.v, a.v) - d(b.v, a.v) * d(c.u, a.u)
+}
+
+/// Whether p lies strictly within the circle through a, b, c, whose orientation is positive.
+fn in_circle(a: SupportPoint, b: SupportPoint, c: SupportPoint, p: SupportPoint) -> bool {
+    let from_p = |q: SupportPoint| {
+        let (x, y) = (i64::from(q.u) - i64::from(p.u), i64::from(q.v) - i64::from(p.v));
+        (x, y, x * x + y * y)
+    };
+    let ((ax, ay, al), (bx, by, bl), (cx, cy, cl)) = (from_p(a), from_p(b), from_p(c));
+    al * (bx * cy - by * cx) - bl * (ax * cy - ay * cx) + cl * (ax * by - ay * bx) > 0
+}
+
+#[expect(
+    clippy::indexing_slicing,
+    reason = "corners are below len <= points.len(); half-edges are below 3 * triangles <= 6 * len, as a planar triangulation of len points has at most 2 len triangles"
+)]
+impl<'s> Triangulation<'s> {
+    /// Bytes of the slab for `points` points.
+    pub const fn bytes(points: usize) -> usize {
+        region_bytes::<SupportPoint>(points) + 2 * region_bytes::<u32>(6 * points) + 3 * region_bytes::<u32>(points)
+    }
+
+    /// Cuts room for `points` points.
+    pub fn carve(points: usize, names: [&'static str; 3], carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        let [points_name, triangles_name, hull_name] = names;
+        Ok(Self {
+            points: carver.cut(points_name, points)?,
+            corner: carver.cut(triangles_name, 6 * points)?,
+            twin: carver.cut(triangles_name, 6 * points)?,
+            hull_next: carver.cut(hull_name, points)?,
+            hull_previous: carver.cut(hull_name, points)?,
+            hull_edge: carver.cut(hull_name, points)?,
+            len: 0,
+            triangles: 0,
+        })
+    }
+
+    /// Forgets all points and triangles.
+    pub fn clear(&mut self) {
+        self.len = 0;
+        self.triangles = 0;
+    }
+
+    /// Adds a point at its place in scan order; within a row points may come in any order. Of two points at one place the nearer, with
+    /// the larger disparity, stays. Says whether a point was dropped: this one, as there is no room, or the farther of the two.
+    pub fn add(&mut self, point: SupportPoint) -> bool {
+        let key = |p: &SupportPoint| (p.v, p.u);
+        let at = self.points[..self.len].iter().rposition(|other| key(other) <= key(&point));
+        if let Some(twin) = at.map(|i| &mut self.points[i]).filter(|other| key(other) == key(&point)) {
+            twin.disparity = twin.disparity.max(point.disparity);
+            return true;
+        }
+        if self.len == self.points.len() {
+            return true;
+        }
+        let at = at.map_or(0, |i| i + 1);
+        self.points.copy_within(at..self.len, at + 1);
+        self.points[at] = point;
+        self.len += 1;
+        false
+    }
+
+    /// The points.
+    pub fn points(&self) -> &[SupportPoint] {
+        &self.points[..self.len]
+    }
+
+    /// The corners of all triangles, in the order in which they were made.
+    pub fn triangles(&self) -> impl Iterator<Item = [SupportPoint; 3]> + '_ {
+        let point = |i: u32| self.points[i as usize];
+        self.corner[..3 * self.triangles].as_chunks::<3>().0.iter().map(move |&[a, b, c]| [point(a), point(b), point(c)])
+    }
+
+    /// Number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles
+    }
+
+    /// Triangulates the points added so far.
+    pub fn triangulate(&mut self) {
+        self.triangles = 0;
+        let Some(apex) = (2..self.len).find(|&i| orientation(self.points[0], self.points[1], self.points[i]) != 0) else { return };
+        self.begin(apex);
+        for p in apex + 1..self.len {
+            let first = self.join(p as u32);
+            self.legalise(p as u32, first);
+        }
+    }
+
+    /// The points before `apex` lie on one line: a fan joins them to it, and there is no other triangulation.
+    fn begin(&mut self, apex: usize) {
+        let left_turn = orientation(self.points[0], self.points[1], self.points[apex]) > 0;
+        // The hull in positive orientation: along the line, or back along it, then the apex.
+        let on_line = |i: usize| (if left_turn { i } else { apex - 1 - i }) as u32;
+        let p = apex as u32;
+        for i in 0..apex - 1 {
+            let (a, b) = (on_line(i), on_line(i + 1));
+            let t = self.push([a, b, p]);
+            if i > 0 {
+                self.link(3 * t + 2, 3 * (t - 1) + 1);
+            }
+            self.hull_link(a, b, 3 * t);
+        }
+        let (first, last) = (on_line(0), on_line(apex - 1));
+        self.hull_link(last, p, 3 * (apex as u32 - 2) + 1);
+        self.hull_link(p, first, 2);
+    }
+
+    /// Joins p to every hull edge it sees; returns the first of the new triangles in hull order. All have p as third corner.
+    fn join(&mut self, p: u32) -> u32 {
+        // The point before p is on the hull, and p sees at least one of its two hull edges: it comes after both in scan order.
+        let mut a = p - 1;
+        while self.sees(p, self.hull_previous[a as usize]) {
+            a = self.hull_previous[a as usize];
+        }
+        let (start, first) = (a, self.triangles as u32);
+        while self.sees(p, a) {
+            let b = self.hull_next[a as usize];
+            let t = self.push([b, a, p]);
+            self.link(3 * t, self.hull_edge[a as usize]);
+            if t != first {
+                self.link(3 * t + 1, 3 * (t - 1) + 2);
+            }
+            a = b;
+        }
+        self.hull_link(start, p, 3 * first + 1);
+        self.hull_link(p, a, 3 * (self.triangles as u32 - 1) + 2);
+        first
+    }
+
+    /// Flips the edges opposite to p that are not Delaunay, walking along the fan about p from triangle t.
+    fn legalise(&mut self, p: u32, mut t: u32) {
+        loop {
+            let opposite = self.twin[3 * t as usize];
+            if opposite != NONE && self.flip_if_needed(p, t, opposite) {
+                continue;
+            }
+            let next = self.twin[3 * t as usize + 2];
+            if next == NONE {
+                return;
+            }
+            t = next / 3;
+        }
+    }
+
+    /// Triangle t = (b, a, p) and, beyond its edge b-a, (a, b, c): makes them (c, a, p) and (b, c, p) if p is in the circle of a, b, c.
+    fn flip_if_needed(&mut self, p: u32, t: u32, opposite: u32) -> bool {
+        let other = opposite / 3;
+        let (after, before) = (3 * other + (opposite + 1) % 3, 3 * other + (opposite + 2) % 3);
+        let (a, b, c) = (self.corner[opposite as usize], self.corner[after as usize], self.corner[before as usize]);
+        let at = |i: u32| self.points[i as usize];
+        if !in_circle(at(a), at(b), at(c), at(p)) {
+            return false;
+        }
+        let (beyond_bc, beyond_ca, beyond_pb) = (self.twin[after as usize], self.twin[before as usize], self.twin[3 * t as usize + 2]);
+        self.corner[3 * t as usize] = c;
+        self.corner[3 * other as usize..][..3].copy_from_slice(&[b, c, p]);
+        self.link_or_hull(3 * t, beyond_ca, c);
+        self.link_or_hull(3 * other, beyond_bc, b);
+        self.link_or_hull(3 * other + 2, beyond_pb, p);
+        self.link(3 * t + 2, 3 * other + 1);
+        true
+    }
+
+    /// Whether p lies strictly outside the hull edge that begins at a.
+    fn sees(&self, p: u32, a: u32) -> bool {
+        let at = |i: u32| self.points[i as usize];
+        orientation(at(a), at(self.hull_next[a as usize]), at(p)) < 0
+    }
+
+    fn push(&mut self, corners: [u32; 3]) -> u32 {
+        let t = self.triangles;
+        self.corner[3 * t..][..3].copy_from_slice(&corners);
+        self.twin[3 * t..][..3].fill(NONE);
+        self.triangles += 1;
+        t as u32
+    }
+
+    fn link(&mut self, h: u32, g: u32) {
+        self.twin[h as usize] = g;
+        self.twin[g as usize] = h;
+    }
+
+    fn link_or_hull(&mut self, h: u32, g: u32, origin: u32) {
+        if g == NONE {
+            self.twin[h as usize] = NONE;
+            self.hull_edge[origin as usize] = h;
+        } else {
+            self.link(h, g);
+        }
+    }
+
+    fn hull_link(&mut self, a: u32, b: u32, edge: u32) {
+        self.hull_next[a as usize] = b;
+        self.hull_previous[b as usize] = a;
+        self.hull_edge[a as usize] = edge;
+    }
+}

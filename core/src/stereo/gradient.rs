@@ -1,0 +1,59 @@
+//! Horizontal and vertical 3 x 3 Sobel responses, a quarter of their size about 128, in `u8`.
+//!
+//! Memory: two bytes a pixel, given by the caller. The outermost pixels have no gradient (128).
+
+use crate::image::View;
+
+/// The gradient of a pixel without any.
+pub(super) const FLAT: u8 = 128;
+
+/// Fills the rows of `du` and `dv` (`width` wide) that begin at image row `first`.
+pub(super) fn gradients(image: View<'_, u8>, first: usize, du: &mut [u8], dv: &mut [u8]) {
+    let width = image.width();
+    for (i, (du, dv)) in du.chunks_exact_mut(width).zip(dv.chunks_exact_mut(width)).enumerate() {
+        let v = first + i;
+        du.fill(FLAT);
+        dv.fill(FLAT);
+        if v > 0 && v + 1 < image.height() {
+            row(image.row(v - 1), image.row(v), image.row(v + 1), du, dv);
+        }
+    }
+}
+
+fn quarter(response: i16) -> u8 {
+    ((response >> 2) + 128).clamp(0, 255) as u8
+}
+
+#[expect(clippy::indexing_slicing, reason = "every slice is cut to n = width - 2 items, and i < n")]
+fn row(above: &[u8], here: &[u8], below: &[u8], du: &mut [u8], dv: &mut [u8]) {
+    let Some(n) = du.len().checked_sub(2) else { return };
+    let (a0, a1, a2) = (&above[..n], &above[1..][..n], &above[2..][..n]);
+    let (h0, h2) = (&here[..n], &here[2..][..n]);
+    let (b0, b1, b2) = (&below[..n], &below[1..][..n], &below[2..][..n]);
+    let (du, dv) = (&mut du[1..][..n], &mut dv[1..][..n]);
+    let wide = i16::from;
+    for i in 0..n {
+        let (right, left) = (wide(a2[i]) + 2 * wide(h2[i]) + wide(b2[i]), wide(a0[i]) + 2 * wide(h0[i]) + wide(b0[i]));
+        du[i] = quarter(right - left);
+        let (down, up) = (wide(b0[i]) + 2 * wide(b1[i]) + wide(b2[i]), wide(a0[i]) + 2 * wide(a1[i]) + wide(a2[i]));
+        dv[i] = quarter(down - up);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_has_a_constant_gradient_and_an_edge_saturates() {
+        let ramp: std::vec::Vec<u8> = (0..5 * 9).map(|i| ((i % 9) * 8) as u8).collect();
+        let (mut du, mut dv) = (std::vec![0; 45], std::vec![0; 45]);
+        gradients(View::new(&ramp, 9, 5).unwrap(), 0, &mut du, &mut dv);
+        assert!(du[9 + 1..9 + 8].iter().all(|&g| g == 128 + 16), "8 a pixel is a response of 64, a quarter of it 16");
+        assert!(dv.iter().all(|&g| g == FLAT));
+        let edge: std::vec::Vec<u8> = (0..45).map(|i| if i < 18 { 255 } else { 0 }).collect();
+        gradients(View::new(&edge, 9, 5).unwrap(), 0, &mut du, &mut dv);
+        assert_eq!(dv[9 + 4], 0, "-1020 / 4 + 128 saturates");
+        assert_eq!(du[9 + 4], FLAT);
+    }
+}

@@ -1,0 +1,62 @@
+//! A 3 x 3 median, for pixels whose eight neighbours all have a disparity; the others stay.
+
+use super::dense::NONE;
+
+/// Filters `from`, whose row `first` is the first one of `to`.
+#[expect(clippy::indexing_slicing, reason = "rows first + i - 1 ..= first + i + 1 are in the image; each slice is cut to n = width - 2")]
+pub(super) fn median(from: &[i16], width: usize, first: usize, to: &mut [i16]) {
+    let height = from.len() / width;
+    for (i, to) in to.chunks_exact_mut(width).enumerate() {
+        let v = first + i;
+        to.copy_from_slice(&from[v * width..][..width]);
+        let Some(n) = width.checked_sub(2).filter(|_| v > 0 && v + 1 < height) else { continue };
+        let taps: [&[i16]; 9] = core::array::from_fn(|k| &from[(v + k / 3 - 1) * width + k % 3..][..n]);
+        for (u, to) in to[1..][..n].iter_mut().enumerate() {
+            let window = taps.map(|tap| tap[u]);
+            let least = window.iter().fold(i16::MAX, |a, &b| a.min(b));
+            *to = if least == NONE { *to } else { middle_of_nine(window) };
+        }
+    }
+}
+
+/// The median of nine by exchanges (Smith 1996): columns sorted, then the middle of (largest low, middle middle, smallest high).
+#[inline(always)]
+fn middle_of_nine([a, b, c, d, e, f, g, h, i]: [i16; 9]) -> i16 {
+    let ([a, b, c], [d, e, f], [g, h, i]) = (sorted(a, b, c), sorted(d, e, f), sorted(g, h, i));
+    let low = a.max(d).max(g);
+    let [_, middle, _] = sorted(b, e, h);
+    let high = c.min(f).min(i);
+    let [_, median, _] = sorted(low, middle, high);
+    median
+}
+
+#[inline(always)]
+fn sorted(a: i16, b: i16, c: i16) -> [i16; 3] {
+    let (low, high) = (a.min(b), a.max(b));
+    let (middle, top) = (high.min(c), high.max(c));
+    [low.min(middle), low.max(middle), top]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn equals_sorting_nine_pixels() {
+        let mut random = Random::new(3);
+        let (width, height) = (23, 11);
+        let from: std::vec::Vec<i16> =
+            (0..width * height).map(|_| if random.below(20) == 0 { NONE } else { random.below(400) as i16 }).collect();
+        let mut to = std::vec![0; from.len()];
+        median(&from, width, 0, &mut to);
+        for (i, &got) in to.iter().enumerate() {
+            let (u, v) = (i % width, i / width);
+            let inside = u > 0 && v > 0 && u + 1 < width && v + 1 < height;
+            let mut window: std::vec::Vec<i16> =
+                if inside { (0..9).map(|k| from[(v + k / 3 - 1) * width + u + k % 3 - 1]).collect() } else { std::vec![NONE] };
+            window.sort_unstable();
+            assert_eq!(got, if window[0] == NONE { from[i] } else { window[4] });
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Support points that stand alone, or that add nothing, are taken back (Geiger et al., section 3.1; the published parameters).
+
+use super::{StereoConfig, support::NO_MATCH};
+
+/// Removes the points with fewer than `plausible_min` alike ones in the window about them, all judged before any is removed. `scratch`
+/// is as long as `grid`. Returns how many were removed.
+pub(super) fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, scratch: &mut [i16]) -> u32 {
+    let (Some(before), window) = (scratch.get_mut(..grid.len()), config.plausible_window) else { return 0 };
+    before.copy_from_slice(grid);
+    let threshold = config.plausible_threshold.min(i16::MAX as u16);
+    let mut removed = 0;
+    for (v, row) in grid.chunks_exact_mut(width).enumerate() {
+        let (top, rows) = (v.saturating_sub(window), v.min(window) + window + 1);
+        for (u, point) in row.iter_mut().enumerate().filter(|(_, point)| **point != NO_MATCH) {
+            let (left, columns) = (u.saturating_sub(window), u.min(window) + window + 1);
+            let alike = |other: &&i16| **other != NO_MATCH && other.abs_diff(*point) <= threshold;
+            let company: usize = before
+                .chunks_exact(width)
+                .skip(top)
+                .take(rows)
+                .map(|row| row.get(left..).unwrap_or(&[]).iter().take(columns).filter(alike).count())
+                .sum();
+            if company < usize::from(config.plausible_min) {
+                *point = NO_MATCH;
+                removed += 1;
+            }
+        }
+    }
+    removed
+}
+
+/// Removes the points that lie between two alike ones on their column, then on their row; in scan order, each judged by what is left.
+/// Returns how many were removed.
+pub(super) fn remove_redundant(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 {
+    let height = grid.len() / width;
+    let mut removed = 0;
+    for (stride, length, lines, line_stride) in [(width, height, width, 1), (1, width, height, width)] {
+        for line in 0..lines {
+            for i in 0..length {
+                removed += u32::from(thin(config, grid, line * line_stride, stride, length, i));
+            }
+        }
+    }
+    removed
+}
+
+/// Removes item `i` of a line if it has an alike one on both sides; says whether it did.
+fn thin(config: &StereoConfig, grid: &mut [i16], start: usize, stride: usize, length: usize, i: usize) -> bool {
+    let item = |k: usize| grid.get(start + k * stride).copied().unwrap_or(NO_MATCH);
+    let here = item(i);
+    if here == NO_MATCH {
+        return false;
+    }
+    let alike = |k: usize| item(k) != NO_MATCH && item(k).abs_diff(here) <= config.redundant_threshold;
+    let reach = config.redundant_distance;
+    let between = (i.saturating_sub(reach)..i).any(alike) && (i + 1..length.min(i + reach + 1)).any(alike);
+    if between && let Some(point) = grid.get_mut(start + i * stride) {
+        *point = NO_MATCH;
+    }
+    between
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lonely_point_goes_and_a_cluster_stays() {
+        let mut grid = std::vec![NO_MATCH; 20 * 20];
+        for (u, v) in [(2, 2), (3, 2), (2, 3), (3, 3), (4, 4)] {
+            grid[v * 20 + u] = 30 + u as i16;
+        }
+        grid[15 * 20 + 15] = 30;
+        grid[2 * 20 + 4] = 90;
+        let removed = remove_implausible(&StereoConfig::robotics(), &mut grid, 20, &mut [0; 400]);
+        assert_eq!(removed, 2);
+        assert_eq!(grid.iter().filter(|&&d| d != NO_MATCH).count(), 5);
+    }
+
+    #[test]
+    fn a_flat_wall_is_thinned_but_its_corners_stay() {
+        let mut grid = std::vec![12i16; 31 * 17];
+        let removed = remove_redundant(&StereoConfig::robotics(), &mut grid, 31);
+        assert_eq!(removed as usize, grid.iter().filter(|&&d| d == NO_MATCH).count());
+        for corner in [0, 30, 16 * 31, 16 * 31 + 30] {
+            assert_eq!(grid[corner], 12);
+        }
+        assert!(removed > 31 * 17 * 8 / 10);
+        // What is left still says 12 within the reach of every removed point.
+        for v in 0..17usize {
+            assert!(v == 0 || v == 16 || (v.saturating_sub(5)..(v + 6).min(17)).any(|w| grid[w * 31..][..31].contains(&12)));
+        }
+    }
+}

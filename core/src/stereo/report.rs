@@ -1,0 +1,61 @@
+//! What one stereo frame came to.
+
+/// How a frame ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StereoStatus {
+    /// Disparities were computed; how many the counts say.
+    #[default]
+    Matched,
+    /// The support points make no triangle (a black image, fog, a covered lens): no disparity.
+    TooFewSupportPoints,
+    /// Left and right image differ in size: no disparity.
+    SizesDiffer,
+    /// The images are larger than the capacity: no disparity.
+    TooLarge,
+    /// The images are smaller than [`super::MIN_IMAGE_SIZE`]: no disparity.
+    TooSmall,
+    /// The configuration does not pass `validate`: no disparity.
+    ConfigRefused,
+}
+
+/// Counts of one frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StereoReport {
+    /// How it ended.
+    pub status: StereoStatus,
+    /// Candidates on the grid.
+    pub candidates: u32,
+    /// Candidates matched, before any was taken back.
+    pub support_matches: u32,
+    /// Support points removed for want of company.
+    pub implausible: u32,
+    /// Support points removed as they add nothing.
+    pub redundant: u32,
+    /// Support points left.
+    pub support_points: u32,
+    /// Of these, dropped in the right image as another lies at the same place.
+    pub hidden_right: u32,
+    /// Triangles in the left image.
+    pub triangles_left: u32,
+    /// Triangles in the right image.
+    pub triangles_right: u32,
+    /// Pixels matched densely in the left image.
+    pub matched: u32,
+    /// Of these, contradicted by the right image.
+    pub inconsistent: u32,
+    /// Of these, in segments too small.
+    pub speckles: u32,
+    /// Pixels filled between others.
+    pub filled: u32,
+    /// Pixels with a disparity in the end.
+    pub valid: u32,
+    /// Pixels of the image.
+    pub pixels: u32,
+}
+
+impl StereoReport {
+    /// Share of pixels with a disparity.
+    pub fn density(&self) -> f32 {
+        if self.pixels == 0 { 0.0 } else { self.valid as f32 / self.pixels as f32 }
+    }
+}

@@ -1,0 +1,59 @@
+//! Real pairs against their truth; skipped where the clips are missing.
+
+use super::*;
+use std::{format, path::PathBuf, println};
+
+fn data() -> PathBuf {
+    std::env::var_os("DYNVOX_DATA").map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")), PathBuf::from)
+}
+
+pub(super) fn grey(path: &str) -> Option<Grey> {
+    let image = image::open(data().join(path)).ok()?.into_luma8();
+    Some(Grey { width: image.width() as usize, height: image.height() as usize, pixels: image.into_raw() })
+}
+
+fn deep(path: &str) -> Option<Vec<u16>> {
+    Some(image::open(data().join(path)).ok()?.into_luma16().into_raw())
+}
+
+/// Share of pixels with truth and estimate that are off by more than 3 px; share of truth covered; median and mean |error| of those within 3 px.
+fn score(estimate: &[u16], truth: &[u16]) -> [f64; 4] {
+    let known = truth.iter().filter(|&&t| t > 0).count();
+    let mut off: Vec<u16> = truth.iter().zip(estimate).filter(|(t, e)| **t > 0 && **e > 0).map(|(t, e)| t.abs_diff(*e)).collect();
+    off.sort_unstable();
+    let good = off.iter().take_while(|&&o| o <= 768).count();
+    let mean = off[..good].iter().map(|&o| f64::from(o)).sum::<f64>() / good as f64 / 256.0;
+    [100.0 * (off.len() - good) as f64 / off.len() as f64, 100.0 * off.len() as f64 / known as f64, f64::from(off[good / 2]) / 256.0, mean]
+}
+
+fn kitti_2012(config: &StereoConfig, name: &str) -> Option<[f64; 4]> {
+    let mut sums = [0.0; 4];
+    for pair in ["000027", "000151", "000174"] {
+        let path = |folder: &str| format!("kitti-stereo-2012/training/{folder}/{pair}_10.png");
+        let (left, right, truth) = (grey(&path("image_0"))?, grey(&path("image_1"))?, deep(&path("disp_noc"))?);
+        let (report, estimate) = disparity(config, &left, &right, &Serial);
+        let scores = score(&estimate, &truth);
+        println!(
+            "{name} {pair}: {:.2} % off at {:.2} % covered, median {:.3} px, mean {:.3} px; {report:?}",
+            scores[0], scores[1], scores[2], scores[3]
+        );
+        for (sum, score) in sums.iter_mut().zip(scores) {
+            *sum += score / 3.0;
+        }
+    }
+    println!("{name} mean: {:.2} % off at {:.2} % covered, median {:.3} px, mean {:.3} px", sums[0], sums[1], sums[2], sums[3]);
+    Some(sums)
+}
+
+#[test]
+fn both_presets_are_as_true_as_published_on_kitti_2012() {
+    let figures = [("dynslam", StereoConfig::dynslam(), 5.5, 87.0), ("robotics", StereoConfig::robotics(), 4.3, 83.0)];
+    for (name, config, off, covered) in figures {
+        let Some(scores) = kitti_2012(&config, name) else {
+            println!("skipped: both_presets_are_as_true_as_published_on_kitti_2012");
+            return;
+        };
+        assert!(scores[0] <= off, "{name}: {:.2} % off", scores[0]);
+        assert!(scores[1] >= covered, "{name}: {:.2} % covered", scores[1]);
+    }
+}
