@@ -6,6 +6,8 @@
 //! block is updated by integer averages ([`Volume::fuse`]); what was visible a fixed lag ago is rid of noise ([`Volume::prune`]).
 
 mod allocate;
+#[cfg(test)]
+mod analytic;
 mod block;
 mod config;
 mod fuse;
@@ -13,6 +15,7 @@ mod history;
 mod index;
 mod prune;
 mod recency;
+mod mesh;
 mod sampler;
 mod store;
 #[cfg(test)]
@@ -28,6 +31,7 @@ pub use history::VisibleHistory;
 pub use index::BlockIndex;
 pub use prune::PruneReport;
 pub use recency::Recency;
+pub use mesh::{MeshConfig, Triangle, Vertex};
 pub use sampler::{Sampler, VoxelSample};
 pub use store::{BlockStore, EvictionReport, LeavingBlock, NoStore, ReturningBlock};
 pub use viewpoint::Viewpoint;
