@@ -178,7 +178,7 @@ impl<'v, 's> Patch<'v, 's> {
     /// The colour of a point of the patch, if it has one.
     #[expect(clippy::indexing_slicing, reason = "points lie within the 9 a side, hence in one of the 8 blocks, and voxels below 512")]
     fn colour(&self, [x, y, z]: [usize; 3]) -> Option<[u8; 3]> {
-        let slot = self.slots[x / BLOCK_SIDE | y / BLOCK_SIDE << 1 | z / BLOCK_SIDE << 2]?;
+        let slot = self.slots[x / BLOCK_SIDE + 2 * (y / BLOCK_SIDE) + 4 * (z / BLOCK_SIDE)]?;
         let planes = self.blocks.colour(slot)?;
         let voxel = x % BLOCK_SIDE + BLOCK_SIDE * (y % BLOCK_SIDE) + BLOCK_SIDE * BLOCK_SIDE * (z % BLOCK_SIDE);
         let colour = [planes[0][voxel], planes[1][voxel], planes[2][voxel]];
