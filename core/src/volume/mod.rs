@@ -16,6 +16,7 @@ mod index;
 mod prune;
 mod recency;
 mod mesh;
+mod raycast;
 mod sampler;
 mod store;
 #[cfg(test)]
@@ -32,6 +33,7 @@ pub use index::BlockIndex;
 pub use prune::PruneReport;
 pub use recency::Recency;
 pub use mesh::{MeshConfig, Triangle, Vertex};
+pub use raycast::{NORMAL_ONE, RaycastConfig, RaycastError, RaycastReport, Raycaster};
 pub use sampler::{Sampler, VoxelSample};
 pub use store::{BlockStore, EvictionReport, LeavingBlock, NoStore, ReturningBlock};
 pub use viewpoint::Viewpoint;

@@ -1,0 +1,173 @@
+//! The camera in lattice units, relative to a block near it: coordinates stay small, so `f32` stays exact however far the camera has come.
+
+use crate::{
+    geometry::scalar::{floor_i32, max_f32, min_f32},
+    volume::{BLOCK_SIDE, BlockCoord, Viewpoint},
+};
+
+/// Farthest block from the camera's that can be looked at, on each axis: what the table's keys can tell apart.
+pub(super) const MAX_REACH_BLOCKS: i32 = 4_000;
+/// Rays nearly along a plane of the lattice are bent by this much, so that all quotients are finite.
+const LEAST_SLOPE: f32 = 1e-9;
+/// Slack on projected boxes, px: rounding never takes a box from a pixel it touches.
+const SLACK_PX: f32 = 0.02;
+
+/// The camera as rays and boxes need it.
+#[derive(Clone, Debug)]
+pub(super) struct Eye {
+    /// The camera's block: local block coordinates count from here.
+    pub base: [i32; 3],
+    /// The camera, in local lattice units.
+    pub origin: [f32; 3],
+    /// Lattice units per metre of depth: the ray of pixel (0, 0), and its change per column and row.
+    rays: [[f32; 3]; 3],
+    /// From lattice units to camera axes: rows for focal length times x, focal length times y, and depth, in m.
+    rows: [[f32; 3]; 3],
+    center_px: [f32; 2],
+    /// Camera from world.
+    pub rotation: [[f32; 3]; 3],
+    pub width: usize,
+    pub height: usize,
+}
+
+/// What of the image and of depth a box can cover.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    /// First and last column, within the image.
+    pub columns: [usize; 2],
+    /// First and last row, within the image.
+    pub rows: [usize; 2],
+    /// Nearest and farthest depth, m.
+    pub depth_m: [f32; 2],
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl Eye {
+    /// `None` when the pose is not finite or beyond the map, or the rig is absurd.
+    pub fn new(view: &Viewpoint, voxel_size_m: f32) -> Option<Self> {
+        view.rig.validate().ok()?;
+        let voxel_m = f64::from(voxel_size_m);
+        let camera = view.t_world_camera.translation.vector / voxel_m;
+        let bound = f64::from(i16::MAX) * BLOCK_SIDE as f64;
+        let turned = view.t_world_camera.rotation.coords.iter().all(|c| c.is_finite());
+        if !turned || !camera.iter().all(|c| *c > -bound && *c < bound) {
+            return None;
+        }
+        let base = [camera.x, camera.y, camera.z].map(|c| libm::floor(c / BLOCK_SIDE as f64) as i32);
+        let side = BLOCK_SIDE as i32;
+        let local = |axis: f64, base: i32| (axis - f64::from(base * side)) as f32;
+        let rotation = view.camera_from_world().0;
+        let row = |r: usize, scale: f64| [0, 1, 2].map(|c| (rotation.matrix().get((r, c)).copied().unwrap_or_default() * scale) as f32);
+        Some(Self {
+            base,
+            origin: [local(camera.x, base[0]), local(camera.y, base[1]), local(camera.z, base[2])],
+            rays: view.rays_world().map(|ray| (ray / voxel_m).cast::<f32>().into()),
+            rows: [row(0, voxel_m * view.rig.focal_px), row(1, voxel_m * view.rig.focal_px), row(2, voxel_m)],
+            center_px: [view.rig.center_u_px as f32, view.rig.center_v_px as f32],
+            rotation: [row(0, 1.0), row(1, 1.0), row(2, 1.0)],
+            width: view.width,
+            height: view.height,
+        })
+    }
+
+    /// A block relative to the camera's; `None` beyond [`MAX_REACH_BLOCKS`].
+    #[inline]
+    pub fn local(&self, coord: BlockCoord) -> Option<[i32; 3]> {
+        let [x, y, z] = self.base;
+        let local = [i32::from(coord.x) - x, i32::from(coord.y) - y, i32::from(coord.z) - z];
+        local.iter().all(|c| c.abs() <= MAX_REACH_BLOCKS).then_some(local)
+    }
+
+    /// The pixels and depths that a box, given by its centre and half its sides in lattice units, may cover within `near_m..=far_m`.
+    #[inline]
+    pub fn extent(&self, center: [f32; 3], half: [f32; 3], near_m: f32, far_m: f32) -> Option<Extent> {
+        let from_eye = [center[0] - self.origin[0], center[1] - self.origin[1], center[2] - self.origin[2]];
+        let reach = |row: [f32; 3]| dot(row.map(f32::abs), half);
+        let [across, down, depth] = self.rows;
+        let (z, z_reach) = (dot(depth, from_eye), reach(depth));
+        let depth_m = [max_f32(z - z_reach, near_m), min_f32(z + z_reach, far_m)];
+        if depth_m[0] > depth_m[1] {
+            return None;
+        }
+        let inverse = depth_m.map(|depth| 1.0 / depth);
+        // The box in camera axes; its left rim looks leftmost from the nearest depth when left of the axis, from the farthest when right.
+        let span = |row: [f32; 3], center_px: f32, size: usize| {
+            let (middle, reach) = (dot(row, from_eye), reach(row));
+            let (low, high) = (middle - reach, middle + reach);
+            let first = center_px + low * if low < 0.0 { inverse[0] } else { inverse[1] } - SLACK_PX;
+            let last = center_px + high * if high > 0.0 { inverse[0] } else { inverse[1] } + SLACK_PX;
+            let end = size as f32 - 1.0;
+            // Pixel centres at integers: the first at or after, the last at or before.
+            (first <= end && last >= 0.0).then(|| {
+                let first = if first > 0.0 { -floor_i32(-first) as usize } else { 0 };
+                [first, if last < end { floor_i32(last) as usize } else { size - 1 }]
+            })
+        };
+        let columns = span(across, self.center_px[0], self.width)?;
+        let rows = span(down, self.center_px[1], self.height)?;
+        (columns[0] <= columns[1] && rows[0] <= rows[1]).then_some(Extent { columns, rows, depth_m })
+    }
+
+    /// The ray through a pixel.
+    #[inline]
+    pub fn ray(&self, u: usize, v: usize) -> Ray {
+        let [corner, column, row] = self.rays;
+        let (u, v) = (u as f32, v as f32);
+        let mut slope = [0.0; 3];
+        for (slope, ((corner, row), column)) in slope.iter_mut().zip(corner.into_iter().zip(row).zip(column)) {
+            let exact = corner + row * v + column * u;
+            *slope = if exact > -LEAST_SLOPE && exact < LEAST_SLOPE { LEAST_SLOPE } else { exact };
+        }
+        Ray { origin: self.origin, slope, depth_per_cell: slope.map(|s| 1.0 / s), forward: slope.map(|s| s > 0.0) }
+    }
+}
+
+/// A ray through the lattice, by depth in metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ray {
+    pub origin: [f32; 3],
+    /// Lattice units per metre of depth.
+    pub slope: [f32; 3],
+    /// Metres of depth per lattice unit.
+    pub depth_per_cell: [f32; 3],
+    /// Whether the ray runs towards larger coordinates.
+    pub forward: [bool; 3],
+}
+
+impl Ray {
+    /// Depth at which the ray crosses lattice plane `plane` of an axis. It never decreases along the ray, which makes the order of cells
+    /// the same wherever a march begins.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    pub fn crossing(&self, axis: usize, plane: i32) -> f32 {
+        (plane as f32 - self.origin[axis]) * self.depth_per_cell[axis]
+    }
+
+    /// The cell in which the ray is just after `depth_m`: all planes crossed up to there are behind it.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    pub fn cell_at(&self, depth_m: f32) -> [i32; 3] {
+        [0, 1, 2].map(|axis| {
+            let cell = floor_i32(self.origin[axis] + self.slope[axis] * depth_m);
+            let (ahead, step) = if self.forward[axis] { (1, 1) } else { (0, -1) };
+            if self.crossing(axis, cell + ahead) <= depth_m {
+                cell + step
+            } else if self.crossing(axis, cell + 1 - ahead) > depth_m {
+                cell - step
+            } else {
+                cell
+            }
+        })
+    }
+
+    /// Where the ray leaves the cuboid of cells `low..low + side`.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    pub fn leaves(&self, low: [i32; 3], side: i32) -> f32 {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.crossing(axis, low[axis] + if self.forward[axis] { side } else { 0 }));
+        min_f32(min_f32(x, y), z)
+    }
+}

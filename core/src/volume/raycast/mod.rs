@@ -1,0 +1,231 @@
+//! The map as a camera at any pose would see it: depth, normal, colour and weight per pixel.
+//!
+//! The surface is where the trilinear field between lattice points falls from above 0, in free space that was seen, to 0 or below. It is
+//! found cell by cell, in the order in which the ray passes them (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray Tracing*,
+//! 1987), and within a cell by false position; no step is longer than a cell, so nothing thin is jumped over, and the depth carries
+//! no bias of a step length. A ray that begins behind a surface, or comes out of unseen space at its back, meets none there. Where corners
+//! of a cell were never seen, the plane through the others stands in.
+//!
+//! Speed comes from not looking, never from looking less well: before rays start, the blocks in view are reduced to bits for the cells
+//! that have corners on both sides (`signs`, `surface`), and these to the range of depths each eight pixels can meet (`ranges`). A cell
+//! without its bit cannot stop a ray, so leaving it out changes nothing; the tests compare with a walk through every cell.
+//!
+//! Memory: 11 bytes a pixel for the images, 8 bytes for eight pixels, 236 bytes per `visible_blocks` and 8 bytes for the next power of two
+//! of twice their number. Time: linear in blocks in view and in pixels.
+//!
+//! When more blocks are in view than `visible_blocks`, the picture ends nearer, and the report says where.
+
+mod cell;
+mod config;
+mod eye;
+mod march;
+mod ranges;
+mod signs;
+mod surface;
+#[cfg(test)]
+mod tests;
+
+pub use config::RaycastConfig;
+
+use super::{Viewpoint, Volume};
+use crate::{
+    executor::{Executor, join4},
+    geometry::scalar::min_f32,
+    image::View,
+    memory::{Capacity, Carver, Footprint, SlabError, region_bytes},
+};
+use eye::Eye;
+use march::Marcher;
+use ranges::Ranges;
+use surface::Surface;
+
+/// Units of a normal's components: ±127 is ±1.
+pub const NORMAL_ONE: f32 = 127.0;
+
+/// Why there is no picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RaycastError {
+    /// The image is empty or larger than the capacity's.
+    ImageSize,
+    /// The pose is not finite or lies beyond the map, or the rig is absurd.
+    Viewpoint,
+}
+
+/// What a picture is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RaycastReport {
+    /// Pixels that show a surface.
+    pub pixels: u32,
+    /// Blocks in view, within the far limit.
+    pub blocks_in_view: u32,
+    /// How many of them there was no room for, so that the picture ends at `far_m`.
+    pub blocks_left_out: u32,
+    /// The far limit, m: the configured one unless blocks were left out.
+    pub far_m: f32,
+}
+
+/// Looks at maps, and keeps the last picture.
+#[derive(Debug)]
+pub struct Raycaster<'s> {
+    config: RaycastConfig,
+    surface: Surface<'s>,
+    ranges: Ranges<'s>,
+    depth_m: &'s mut [f32],
+    normal: &'s mut [[i8; 3]],
+    colour: &'s mut [[u8; 3]],
+    weight: &'s mut [u8],
+    width: usize,
+    height: usize,
+    peak_blocks: usize,
+}
+
+/// Some rows of the picture, which one worker fills.
+struct Band<'b> {
+    first_row: usize,
+    depth_m: &'b mut [f32],
+    normal: &'b mut [[i8; 3]],
+    colour: &'b mut [[u8; 3]],
+    weight: &'b mut [u8],
+}
+
+impl<'b> Band<'b> {
+    fn split(self, rows: usize, width: usize) -> (Self, Self) {
+        let at = (rows * width).min(self.depth_m.len());
+        let (depth_m, depth_low) = self.depth_m.split_at_mut(at);
+        let (normal, normal_low) = self.normal.split_at_mut(at);
+        let (colour, colour_low) = self.colour.split_at_mut(at);
+        let (weight, weight_low) = self.weight.split_at_mut(at);
+        let low = Band { first_row: self.first_row + rows, depth_m: depth_low, normal: normal_low, colour: colour_low, weight: weight_low };
+        (Band { first_row: self.first_row, depth_m, normal, colour, weight }, low)
+    }
+}
+
+impl<'s> Raycaster<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        let pixels = capacity.pixels();
+        Surface::bytes(capacity)
+            + Ranges::bytes(capacity)
+            + region_bytes::<f32>(pixels)
+            + 2 * region_bytes::<[u8; 3]>(pixels)
+            + region_bytes::<u8>(pixels)
+    }
+
+    /// Cuts the images and the working space.
+    pub fn carve(capacity: &Capacity, config: &RaycastConfig, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        let pixels = capacity.pixels();
+        Ok(Self {
+            config: *config,
+            surface: Surface::carve(capacity, carver)?,
+            ranges: Ranges::carve(capacity, carver)?,
+            depth_m: carver.cut("raycast.depth", pixels)?,
+            normal: carver.cut("raycast.normal", pixels)?,
+            colour: carver.cut("raycast.colour", pixels)?,
+            weight: carver.cut("raycast.weight", pixels)?,
+            width: 0,
+            height: 0,
+            peak_blocks: 0,
+        })
+    }
+
+    /// Looks at a map from a viewpoint. The picture is read with [`Self::depth_m`] and its like until the next one.
+    pub fn cast<E: Executor>(&mut self, volume: &Volume<'_>, view: &Viewpoint, executor: &E) -> Result<RaycastReport, RaycastError> {
+        (self.width, self.height) = (0, 0);
+        let pixels = view.width.saturating_mul(view.height);
+        if pixels == 0 || pixels > self.depth_m.len() || !self.ranges.fit(view.width, view.height) {
+            return Err(RaycastError::ImageSize);
+        }
+        let eye = Eye::new(view, volume.config.voxel_size_m).ok_or(RaycastError::Viewpoint)?;
+        let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
+        let near_m = self.config.near_m;
+        let in_view = self.surface.find(volume, &eye, [near_m, self.config.far_m], min_weight, executor);
+        let limits_m = [near_m, min_f32(in_view.far_m, self.config.far_m)];
+        self.ranges.find(&self.surface, &eye, limits_m);
+        (self.width, self.height) = (view.width, view.height);
+        if self.surface.len() > self.peak_blocks {
+            self.peak_blocks = self.surface.len();
+        }
+        let marcher = Marcher { surface: &self.surface, blocks: &volume.blocks, eye: &eye, min_weight };
+        let ranges = &self.ranges;
+        let whole = Band { first_row: 0, depth_m: self.depth_m, normal: self.normal, colour: self.colour, weight: self.weight }
+            .split(view.height, view.width)
+            .0;
+        let rows = view.height.div_ceil(4);
+        let (high, low) = whole.split(2 * rows, view.width);
+        let ((a, b), (c, d)) = (high.split(rows, view.width), low.split(rows, view.width));
+        let mut hits = [0u32; 4];
+        let [hits_a, hits_b, hits_c, hits_d] = &mut hits;
+        // Sky and road go together, so that two threads have about the same to do.
+        join4(
+            executor,
+            || *hits_a = band(&marcher, ranges, a),
+            || *hits_d = band(&marcher, ranges, d),
+            || *hits_b = band(&marcher, ranges, b),
+            || *hits_c = band(&marcher, ranges, c),
+        );
+        Ok(RaycastReport {
+            pixels: hits.iter().sum(),
+            blocks_in_view: in_view.blocks,
+            blocks_left_out: in_view.blocks.saturating_sub(self.surface.len() as u32),
+            far_m: limits_m[1],
+        })
+    }
+
+    /// Depth along the camera's z, m; 0 where there is no surface. `None` before the first picture, as for the other images.
+    pub fn depth_m(&self) -> Option<View<'_, f32>> {
+        View::new(self.depth_m, self.width, self.height)
+    }
+
+    /// Normal in camera axes, towards the camera, in units of 1 / [`NORMAL_ONE`]; all 0 where there is no surface.
+    pub fn normal(&self) -> Option<View<'_, [i8; 3]>> {
+        View::new(self.normal, self.width, self.height)
+    }
+
+    /// Red, green, blue; all 0 where there is no surface or it has no colour.
+    pub fn colour(&self) -> Option<View<'_, [u8; 3]>> {
+        View::new(self.colour, self.width, self.height)
+    }
+
+    /// Observations at the nearest lattice point; 0 where there is no surface.
+    pub fn weight(&self) -> Option<View<'_, u8>> {
+        View::new(self.weight, self.width, self.height)
+    }
+
+    /// Enters what was in use at most into a footprint.
+    pub fn note_use(&self, footprint: &mut Footprint) {
+        let (now, peak) = (self.surface.len(), self.peak_blocks);
+        footprint.set_use::<[i32; 3]>("raycast.local", now, peak);
+        footprint.set_use::<[u32; 8]>("raycast.slots", now, peak);
+        footprint.set_use::<[signs::Layers; 2]>("raycast.signs", now, peak);
+        footprint.set_use::<signs::Layers>("raycast.cells", now, peak);
+    }
+}
+
+/// Fills a band and counts its hits.
+fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, band: Band<'_>) -> u32 {
+    let width = marcher.eye.width;
+    let images = band
+        .depth_m
+        .chunks_mut(width)
+        .zip(band.normal.chunks_mut(width))
+        .zip(band.colour.chunks_mut(width).zip(band.weight.chunks_mut(width)));
+    let mut hits = 0;
+    for (v, ((depth_m, normal), (colour, weight))) in (band.first_row..).zip(images) {
+        let ranges = ranges.row(v);
+        let pixels = depth_m.iter_mut().zip(normal).zip(colour.iter_mut().zip(weight)).enumerate();
+        for (u, ((depth_m, normal), (colour, weight))) in pixels {
+            let hit = ranges.get(u >> ranges::TILE_SHIFT).filter(|range| range[0] <= range[1]).and_then(|&range| marcher.cast(u, v, range));
+            match hit {
+                Some(hit) => {
+                    *depth_m = hit.depth_m;
+                    *normal = hit.normal.map(|c| (c * NORMAL_ONE) as i8);
+                    *colour = hit.colour;
+                    *weight = hit.weight;
+                    hits += 1;
+                }
+                None => (*depth_m, *normal, *colour, *weight) = (0.0, [0; 3], [0; 3], 0),
+            }
+        }
+    }
+    hits
+}

@@ -1,0 +1,108 @@
+//! Which lattice points of a block lie before the surface and which behind, as bits, and from them the cells it runs through.
+//!
+//! A layer (one z) of a block is a 64-bit word: bit `x + 8 y`.
+
+use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS};
+
+/// One bit per lattice point or cell of a block, a word per layer.
+pub(super) type Layers = [u64; BLOCK_SIDE];
+
+/// Voxels in a layer.
+const LAYER: usize = BLOCK_SIDE * BLOCK_SIDE;
+/// The points of a layer with x = 0, and those with x = 0 to 6.
+const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
+const BUT_LAST_COLUMN: u64 = 0x7F7F_7F7F_7F7F_7F7F;
+
+/// The points seen before the surface and those seen at or behind it.
+pub(super) fn of_block(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS], min_weight: u8) -> [Layers; 2] {
+    let mut signs = [[0; BLOCK_SIDE]; 2];
+    let [before, behind] = &mut signs;
+    let layers = sdf.as_chunks::<LAYER>().0.iter().zip(weight.as_chunks::<LAYER>().0);
+    for ((sdf, weight), (before, behind)) in layers.zip(before.iter_mut().zip(behind)) {
+        let (mut is_before, mut is_seen) = ([0u8; LAYER], [0u8; LAYER]);
+        for (((is_before, is_seen), &sdf), &weight) in is_before.iter_mut().zip(&mut is_seen).zip(sdf).zip(weight) {
+            *is_seen = u8::from(weight >= min_weight);
+            *is_before = u8::from(sdf > 0);
+        }
+        let seen = packed(&is_seen);
+        *before = seen & packed(&is_before);
+        *behind = seen & !*before;
+    }
+    signs
+}
+
+/// 64 bytes of 0 or 1 as bits, the first lowest.
+#[inline]
+fn packed(flags: &[u8; LAYER]) -> u64 {
+    let mut bits = 0;
+    for (row, flags) in (0u32..).zip(flags.as_chunks::<BLOCK_SIDE>().0) {
+        // The factor moves byte i to bit 56 + i; no two products meet in one bit, so nothing carries.
+        let byte = u64::from_le_bytes(*flags).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+        bits |= byte << (8 * row);
+    }
+    bits
+}
+
+/// The cells of which a corner is set, given the points of the block (0) and of those after it in x (1), y (2), z (4).
+#[inline]
+#[expect(clippy::indexing_slicing, reason = "n is 0 or 4, z below 8")]
+fn touched(points: [&Layers; 8]) -> Layers {
+    let along_x = |own: u64, next: u64| own | (own >> 1 & BUT_LAST_COLUMN) | (next & FIRST_COLUMN) << 7;
+    let layer = |n: usize, z: usize| {
+        let own = along_x(points[n][z], points[n + 1][z]);
+        own | own >> 8 | along_x(points[n + 2][z], points[n + 3][z]) << 56
+    };
+    let mut cells = [0; BLOCK_SIDE];
+    let mut above = layer(4, 0);
+    for (z, cells) in cells.iter_mut().enumerate().rev() {
+        let here = layer(0, z);
+        *cells = here | above;
+        above = here;
+    }
+    cells
+}
+
+/// The cells the surface runs through: with a corner before it and one behind.
+#[inline]
+pub(super) fn crossed(signs: [&[Layers; 2]; 8]) -> Layers {
+    let before = touched(signs.map(|[before, _]| before));
+    let behind = touched(signs.map(|[_, behind]| behind));
+    let mut cells = [0; BLOCK_SIDE];
+    for (cells, (before, behind)) in cells.iter_mut().zip(before.into_iter().zip(behind)) {
+        *cells = before & behind;
+    }
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn agrees_with_asking_every_corner_of_every_cell() {
+        let mut random = Random::new(7);
+        let mut sdf = [[0i16; BLOCK_VOXELS]; 8];
+        let mut weight = [[0u8; BLOCK_VOXELS]; 8];
+        for round in 0..20 {
+            for value in sdf.iter_mut().flatten() {
+                *value = if random.below(20) > round { 900 } else { random.below(3) as i16 - 1 };
+            }
+            weight.iter_mut().flatten().for_each(|value| *value = random.below(9) as u8);
+            let signs: [_; 8] = core::array::from_fn(|n| of_block(&sdf[n], &weight[n], 2));
+            let cells = crossed(signs.each_ref());
+            for cell in 0..BLOCK_VOXELS {
+                let (mut before, mut behind) = (false, false);
+                for corner in 0..8 {
+                    let [x, y, z] = [0, 1, 2].map(|axis| (cell >> (3 * axis) & 7) + (corner >> axis & 1));
+                    let block = x / 8 + 2 * (y / 8) + 4 * (z / 8);
+                    let voxel = x % 8 + 8 * (y % 8) + 64 * (z % 8);
+                    let seen = weight[block][voxel] >= 2;
+                    before |= seen && sdf[block][voxel] > 0;
+                    behind |= seen && sdf[block][voxel] <= 0;
+                }
+                assert_eq!(cells[cell >> 6] >> (cell & 63) & 1 == 1, before && behind);
+            }
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! The blocks in view and the cells of each that the surface runs through.
+//!
+//! Made anew for every picture: blocks are culled, their signs turned into bits, the bits of neighbours joined into crossed cells. Then a
+//! ray asks one bit per cell, and most blocks not at all: only those with crossed cells remain in the table.
+
+use super::{eye::Eye, signs};
+use crate::{
+    executor::{Executor, join4},
+    memory::{Capacity, Carver, SlabError, region_bytes},
+    volume::{BLOCK_SIDE, Volume},
+};
+
+/// No block.
+pub(super) const NONE: u32 = u32::MAX;
+/// Parts of the far limit by which it is shortened when more blocks are in view than there is room for.
+const RANGE_STEPS: usize = 64;
+
+/// Blocks in view, by entry, in slot order.
+#[derive(Debug)]
+pub(super) struct Surface<'s> {
+    /// Block coordinates relative to the camera's block.
+    local: &'s mut [[i32; 3]],
+    /// The block's own slot and those of the blocks after it in x (1), y (2), z (4); [`NONE`] where there is none.
+    slots: &'s mut [[u32; 8]],
+    signs: &'s mut [[signs::Layers; 2]],
+    cells: &'s mut [signs::Layers],
+    /// Keys and entries, an open-addressed hash table with linear probes.
+    table: &'s mut [u64],
+    len: usize,
+    /// How far a hash is shifted down to index the part of the table in use.
+    shift: u32,
+}
+
+/// What was in view.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InView {
+    /// Blocks.
+    pub blocks: u32,
+    /// The far limit for which there was room, m.
+    pub far_m: f32,
+}
+
+/// Key of a block, never 0 in the table since an entry + 1 stands above it.
+#[inline]
+fn key([x, y, z]: [i32; 3]) -> u64 {
+    (x as u64 & 0x1FFF) | (y as u64 & 0x1FFF) << 13 | (z as u64 & 0x1FFF) << 26
+}
+
+const KEY_BITS: u32 = 39;
+const KEY_MASK: u64 = (1 << KEY_BITS) - 1;
+
+impl<'s> Surface<'s> {
+    const fn table_len(entries: usize) -> usize {
+        let len = (2 * entries).next_power_of_two();
+        if len < 16 { 16 } else { len }
+    }
+
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        let entries = capacity.visible_blocks;
+        region_bytes::<[i32; 3]>(entries)
+            + region_bytes::<[u32; 8]>(entries)
+            + region_bytes::<[signs::Layers; 2]>(entries)
+            + region_bytes::<signs::Layers>(entries)
+            + region_bytes::<u64>(Self::table_len(entries))
+    }
+
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        let entries = capacity.visible_blocks;
+        Ok(Self {
+            local: carver.cut("raycast.local", entries)?,
+            slots: carver.cut("raycast.slots", entries)?,
+            signs: carver.cut("raycast.signs", entries)?,
+            cells: carver.cut("raycast.cells", entries)?,
+            table: carver.cut("raycast.table", Self::table_len(entries))?,
+            len: 0,
+            shift: 0,
+        })
+    }
+
+    /// Finds the blocks in view and the cells the surface runs through.
+    pub fn find<E: Executor>(&mut self, volume: &Volume<'_>, eye: &Eye, limits_m: [f32; 2], min_weight: u8, executor: &E) -> InView {
+        let in_view = self.cull(volume, eye, limits_m);
+        self.index(|_| true);
+        self.read_signs(volume, min_weight, executor);
+        self.join_neighbours(executor);
+        self.index(|cells| cells.iter().any(|&layer| layer != 0));
+        in_view
+    }
+
+    /// Lists the blocks of which a cell or a neighbour's corner may be in the picture.
+    fn cull(&mut self, volume: &Volume<'_>, eye: &Eye, [near_m, far_m]: [f32; 2]) -> InView {
+        // Cells of the block before this one end at this block's first points: the box is one longer on that side.
+        let half = (BLOCK_SIDE as f32 + 1.0) * 0.5;
+        let blocks = (0..volume.pool.high_water() as u32).filter_map(|slot| {
+            volume.pool.handle(slot)?;
+            let local = eye.local(volume.blocks.coord(slot)?)?;
+            let center = local.map(|c| (c * BLOCK_SIDE as i32) as f32 + half - 1.0);
+            Some((slot, local, eye.extent(center, [half; 3], near_m, far_m)?.depth_m[0]))
+        });
+        self.len = 0;
+        let mut count = 0;
+        let mut by_range = [0u32; RANGE_STEPS];
+        let steps_per_m = RANGE_STEPS as f32 / far_m;
+        for (slot, local, depth_m) in blocks.clone() {
+            count += 1;
+            if let Some(step) = by_range.get_mut(((depth_m * steps_per_m) as usize).min(RANGE_STEPS - 1)) {
+                *step += 1;
+            }
+            self.enter(slot, local);
+        }
+        if count as usize <= self.local.len() {
+            return InView { blocks: count, far_m };
+        }
+        // No room for all: see less far, rather than full of holes.
+        let mut room = self.local.len() as u32;
+        let steps = by_range.iter().take_while(|&&step| room.checked_sub(step).map(|left| room = left).is_some()).count();
+        let far_m = steps as f32 / steps_per_m;
+        self.len = 0;
+        blocks.filter(|(_, _, depth_m)| ((depth_m * steps_per_m) as usize) < steps).for_each(|(slot, local, _)| self.enter(slot, local));
+        InView { blocks: count, far_m }
+    }
+
+    fn enter(&mut self, slot: u32, block: [i32; 3]) {
+        if let (Some(local), Some(slots)) = (self.local.get_mut(self.len), self.slots.get_mut(self.len)) {
+            *local = block;
+            *slots = [slot, NONE, NONE, NONE, NONE, NONE, NONE, NONE];
+            self.len += 1;
+        }
+    }
+
+    /// Fills the table with the entries whose cells are `wanted`.
+    fn index(&mut self, wanted: impl Fn(&signs::Layers) -> bool) {
+        let count = self.cells.iter().take(self.len).filter(|cells| wanted(cells)).count();
+        let len = Self::table_len(count);
+        self.shift = 64 - len.trailing_zeros();
+        let Some(table) = self.table.get_mut(..len) else { return };
+        table.fill(0);
+        for ((entry, local), cells) in (1u64..).zip(self.local.iter()).zip(self.cells.iter()).take(self.len) {
+            if !wanted(cells) {
+                continue;
+            }
+            let key = key(*local);
+            let mut at = place(key, self.shift);
+            // At most half full: an empty place is found.
+            for _ in 0..len {
+                if let Some(slot) = table.get_mut(at)
+                    && *slot == 0
+                {
+                    *slot = key | entry << KEY_BITS;
+                    break;
+                }
+                at = (at + 1) & (len - 1);
+            }
+        }
+    }
+
+    fn read_signs<E: Executor>(&mut self, volume: &Volume<'_>, min_weight: u8, executor: &E) {
+        let read = |signs: &mut [[signs::Layers; 2]], slots: &[[u32; 8]]| {
+            for (signs, [slot, ..]) in signs.iter_mut().zip(slots) {
+                if let (Some(sdf), Some(weight)) = (volume.blocks.sdf(*slot), volume.blocks.weight(*slot)) {
+                    *signs = signs::of_block(sdf, weight, min_weight);
+                }
+            }
+        };
+        let (Some(signs), Some(slots)) = (self.signs.get_mut(..self.len), self.slots.get(..self.len)) else { return };
+        let quarter = self.len.div_ceil(4);
+        let (signs_low, signs_high) = signs.split_at_mut((2 * quarter).min(signs.len()));
+        let (slots_low, slots_high) = slots.split_at((2 * quarter).min(slots.len()));
+        let (signs_a, signs_b) = signs_low.split_at_mut(quarter.min(signs_low.len()));
+        let (slots_a, slots_b) = slots_low.split_at(quarter.min(slots_low.len()));
+        let (signs_c, signs_d) = signs_high.split_at_mut(quarter.min(signs_high.len()));
+        let (slots_c, slots_d) = slots_high.split_at(quarter.min(slots_high.len()));
+        join4(executor, || read(signs_a, slots_a), || read(signs_b, slots_b), || read(signs_c, slots_c), || read(signs_d, slots_d));
+    }
+
+    /// Finds each block's neighbours and the cells it shares with them.
+    fn join_neighbours<E: Executor>(&mut self, _executor: &E) {
+        const UNSEEN: [signs::Layers; 2] = [[0; BLOCK_SIDE]; 2];
+        for at in 0..self.len {
+            let Some(&[x, y, z]) = self.local.get(at) else { return };
+            let mut around = [&UNSEEN; 8];
+            let mut slots = [NONE; 8];
+            for (n, (around, slot)) in (0i32..).zip(around.iter_mut().zip(&mut slots)) {
+                let entry = if n == 0 { Some(at) } else { self.entry([x + (n & 1), y + (n >> 1 & 1), z + (n >> 2)]) };
+                if let Some((signs, slots)) = entry.and_then(|entry| self.signs.get(entry).zip(self.slots.get(entry))) {
+                    *around = signs;
+                    *slot = slots[0];
+                }
+            }
+            let cells = signs::crossed(around);
+            if let (Some(to), Some(all)) = (self.cells.get_mut(at), self.slots.get_mut(at)) {
+                *to = cells;
+                *all = slots;
+            }
+        }
+    }
+
+    /// The entry of a block in the table.
+    #[inline]
+    pub fn entry(&self, block: [i32; 3]) -> Option<usize> {
+        let key = key(block);
+        let mut at = place(key, self.shift);
+        let mask = (1usize << (64 - self.shift)) - 1;
+        loop {
+            let found = *self.table.get(at)?;
+            if found & KEY_MASK == key && found != 0 {
+                return Some((found >> KEY_BITS) as usize - 1);
+            }
+            if found == 0 {
+                return None;
+            }
+            at = (at + 1) & mask;
+        }
+    }
+
+    /// The crossed cells of an entry.
+    #[inline]
+    pub fn cells(&self, entry: usize) -> Option<&signs::Layers> {
+        self.cells.get(entry)
+    }
+
+    /// The slots around the last corner of an entry's block.
+    #[inline]
+    pub fn slots(&self, entry: usize) -> Option<&[u32; 8]> {
+        self.slots.get(entry)
+    }
+
+    /// All blocks in view with their crossed cells, in slot order.
+    pub fn blocks(&self) -> impl Iterator<Item = ([i32; 3], &signs::Layers)> {
+        self.local.iter().copied().zip(self.cells.iter()).take(self.len)
+    }
+
+    /// Blocks in use.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+}
+
+#[inline]
+fn place(key: u64, shift: u32) -> usize {
+    (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> shift) as usize
+}
