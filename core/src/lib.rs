@@ -21,8 +21,8 @@ pub mod image;
 pub mod memory;
 pub mod random;
 pub mod scene_flow;
-pub mod volume;
 pub mod stereo;
+pub mod volume;
 
 pub use executor::{Executor, Serial, Stage};
 pub use memory::{Capacity, Footprint, Slab};

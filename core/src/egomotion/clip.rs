@@ -150,6 +150,18 @@ fn run(name: &str, flow: &SceneFlowConfig, config: &EgomotionConfig) -> Option<V
         if verbose && frame % 10 == 1 {
             println!("{frame} {report:?} {estimate:?}");
         }
+        if let Ok(dir) = std::env::var("DUMP") {
+            let mut text = String::new();
+            let chosen: std::collections::HashSet<u32> = matcher.selection().iter().copied().collect();
+            for (i, m) in matcher.refined().iter().enumerate() {
+                let all = [m.previous_left, m.previous_right, m.current_left, m.current_right];
+                for x in all.as_flattened() {
+                    text += &format!("{x} ");
+                }
+                text += &format!("{}\n", u8::from(chosen.contains(&(i as u32))));
+            }
+            fs::write(format!("{dir}/{name}_{frame:03}.txt"), text).unwrap();
+        }
         trajectory.push(camera.t_world_camera().to_homogeneous());
     }
     let median = |which: fn(&(f64, f64)) -> f64| {
@@ -230,7 +242,7 @@ fn experiment() {
         config.refined_inlier_px = x as f32
     }
     if let Some(x) = var("SIDE") {
-        config.side_damping = x
+        config.side_knee = x
     }
     for clip in ["06", "r1405"] {
         let trajectory = run(clip, &flow, &config).unwrap();

@@ -20,9 +20,10 @@ pub struct EgomotionConfig {
     pub sample_steps: u8,
     /// Most Gauss-Newton steps of a round of refinement; 1..=250. DynSLAM: about 250.
     pub refine_steps: u8,
-    /// Weight of a match against its distance from the middle column: 1 / (|u - cu| / |cu| + this), as a guard against lens errors at
-    /// the sides; 0 weighs all alike; 0..=10. DynSLAM: 0.05.
-    pub side_damping: f64,
+    /// Distance from the middle column, as a share of it, at which what rectification left of the lenses' errors weighs as much as the
+    /// noise of a match. Those errors grow with the fourth power: a match at share s has weight 1 / (1 + (s / knee)^8). Above 0; 10 weighs
+    /// all alike. DynSLAM: weights 1 / (s + 0.05), which leave twice the error in scale on the clips measured.
+    pub side_knee: f64,
 }
 
 impl Default for EgomotionConfig {
@@ -35,7 +36,7 @@ impl Default for EgomotionConfig {
             matches_min: 6,
             sample_steps: 12,
             refine_steps: 50,
-            side_damping: 0.05,
+            side_knee: 0.4,
         }
     }
 }
@@ -51,6 +52,6 @@ impl EgomotionConfig {
         require(problems, (3..=1000).contains(&self.matches_min), "egomotion.matches_min", "must be in 3..=1000");
         require(problems, (1..=50).contains(&self.sample_steps), "egomotion.sample_steps", "must be in 1..=50");
         require(problems, (1..=250).contains(&self.refine_steps), "egomotion.refine_steps", "must be in 1..=250");
-        require(problems, (0.0..=10.0).contains(&self.side_damping), "egomotion.side_damping", "must be in 0..=10");
+        require(problems, self.side_knee > 0.0 && self.side_knee <= 10.0, "egomotion.side_knee", "must be above 0 and at most 10");
     }
 }

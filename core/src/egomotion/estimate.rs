@@ -228,12 +228,16 @@ fn enough(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
     if wanted < f64::from(config.samples) { wanted as u32 } else { u32::from(config.samples) }
 }
 
-/// Weight by distance from the middle column.
+/// Weight by distance from the middle column ([`EgomotionConfig::side_knee`]).
 fn side_weight(config: &EgomotionConfig, rig: &StereoRig, point: &Point) -> f64 {
-    if config.side_damping <= 0.0 || rig.center_u_px == 0.0 {
+    let knee_px = config.side_knee * libm::fabs(rig.center_u_px);
+    if !(knee_px > 0.0) {
         return 1.0;
     }
-    1.0 / (libm::fabs(point.left[0]) / libm::fabs(rig.center_u_px) + config.side_damping)
+    let share = point.left[0] / knee_px;
+    let square = share * share;
+    let fourth = square * square;
+    1.0 / (1.0 + fourth * fourth)
 }
 
 fn largest(step: [f64; 6]) -> f64 {

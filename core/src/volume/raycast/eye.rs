@@ -121,7 +121,12 @@ impl Eye {
             let exact = corner + row * v + column * u;
             *slope = if exact > -LEAST_SLOPE && exact < LEAST_SLOPE { LEAST_SLOPE } else { exact };
         }
-        Ray { origin: self.origin, slope, depth_per_cell: slope.map(|s| 1.0 / s), forward: slope.map(|s| s > 0.0) }
+        Ray {
+            origin: self.origin,
+            slope,
+            depth_per_cell: slope.map(|s| 1.0 / s),
+            forward: slope.map(|s| s > 0.0),
+        }
     }
 }
 

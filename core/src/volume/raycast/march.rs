@@ -184,7 +184,12 @@ impl Marcher<'_, '_> {
         let length = libm::sqrtf(right * right + down * down + forward * forward);
         let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
         let (colour, weight) = self.colour(crossing);
-        Hit { depth_m: crossing.depth_m, normal: [right * scale, down * scale, forward * scale], colour, weight }
+        Hit {
+            depth_m: crossing.depth_m,
+            normal: [right * scale, down * scale, forward * scale],
+            colour,
+            weight,
+        }
     }
 
     /// The mean of the coloured corners, by nearness, and the weight of the nearest.
