@@ -1,5 +1,12 @@
 //! The one configuration, and what can be wrong with it.
 
+use crate::{
+    egomotion::EgomotionConfig,
+    geometry::{RigProblem, StereoRig},
+    scene_flow::SceneFlowConfig,
+    stereo::StereoConfig,
+    volume::{MeshConfig, RaycastConfig, VolumeConfig},
+};
 use heapless::Vec;
 
 /// Most problems `validate` reports at once.
@@ -21,5 +28,55 @@ pub type Problems = Vec<Problem, MAX_PROBLEMS>;
 pub fn require(problems: &mut Problems, holds: bool, key: &'static str, rule: &'static str) {
     if !holds && !problems.is_full() {
         let _ = problems.push(Problem { key, rule });
+    }
+}
+
+/// Everything a mapper can be told, beside its bounds. Every default stands with its field, in the struct of the stage it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// The cameras.
+    pub rig: StereoRig,
+    /// Stereo matching.
+    pub stereo: StereoConfig,
+    /// Features and their matches over time.
+    pub scene_flow: SceneFlowConfig,
+    /// The camera's motion.
+    pub egomotion: EgomotionConfig,
+    /// The map.
+    pub volume: VolumeConfig,
+    /// Views of the map.
+    pub raycast: RaycastConfig,
+    /// Its triangles.
+    pub mesh: MeshConfig,
+}
+
+impl Config {
+    /// All defaults, for a rig.
+    pub fn for_rig(rig: StereoRig) -> Self {
+        Self {
+            rig,
+            stereo: StereoConfig::default(),
+            scene_flow: SceneFlowConfig::default(),
+            egomotion: EgomotionConfig::default(),
+            volume: VolumeConfig::default(),
+            raycast: RaycastConfig::default(),
+            mesh: MeshConfig::default(),
+        }
+    }
+
+    /// Everything wrong with it, or nothing.
+    pub fn validate(&self) -> Result<(), Problems> {
+        let mut problems = Problems::new();
+        let rig = self.rig.validate();
+        require(&mut problems, rig != Err(RigProblem::Focal), "rig.focal_px", "must be a positive number");
+        require(&mut problems, rig != Err(RigProblem::Center), "rig.center_px", "must be finite numbers");
+        require(&mut problems, rig != Err(RigProblem::Baseline), "rig.baseline_m", "must be a positive number");
+        self.stereo.validate(&mut problems);
+        self.scene_flow.validate(&mut problems);
+        self.egomotion.validate(&mut problems);
+        self.volume.validate(&mut problems);
+        self.raycast.validate(&mut problems);
+        self.mesh.validate(&mut problems);
+        if problems.is_empty() { Ok(()) } else { Err(problems) }
     }
 }

@@ -18,11 +18,17 @@ pub mod egomotion;
 pub mod executor;
 pub mod geometry;
 pub mod image;
+pub mod mapper;
 pub mod memory;
 pub mod random;
+pub mod report;
 pub mod scene_flow;
 pub mod stereo;
 pub mod volume;
 
+pub use config::Config;
 pub use executor::{Executor, Serial, Stage};
+pub use image::StereoFrame;
+pub use mapper::{Mapper, NewError, StepError};
 pub use memory::{Capacity, Footprint, Slab};
+pub use report::{Report, Severity};

@@ -50,7 +50,7 @@ impl Capacity {
         image_height: 384,
         features: 16_000,
         matches: 10_000,
-        blocks: 62_000,
+        blocks: 68_000,
         visible_blocks: 24_000,
         history_frames: 200,
         colour: true,

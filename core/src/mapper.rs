@@ -1,0 +1,291 @@
+//! The loop of the paper (Section III), one line per stage.
+
+use crate::{
+    Capacity, Executor, Footprint, Stage,
+    config::{Config, Problems},
+    digest::Digest,
+    egomotion::{Egomotion, Estimator},
+    geometry::{Transform, depth_from_disparity},
+    image::{StereoFrame, View, ViewMut},
+    memory::{Carver, SlabError, region_bytes},
+    report::{BlockCount, Report},
+    scene_flow::{FlowMatcher, FlowStatus},
+    stereo::StereoMatcher,
+    volume::{
+        AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, RaycastError, Raycaster, Triangle, Viewpoint,
+        Volume,
+    },
+};
+
+/// Why a mapper cannot be made.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NewError {
+    /// The slab cannot hold the capacity.
+    Slab(SlabError),
+    /// The configuration is not usable; all problems found.
+    Config(Problems),
+}
+
+impl From<SlabError> for NewError {
+    fn from(error: SlabError) -> Self {
+        Self::Slab(error)
+    }
+}
+
+/// Why a frame cannot be taken. The mapper is as it was before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepError {
+    /// The images of the frame differ in size.
+    SizesDiffer,
+    /// The frame is larger than the capacity allows.
+    TooLarge {
+        /// Widest image, px.
+        width: usize,
+        /// Highest image, px.
+        height: usize,
+    },
+    /// The frame is smaller than the matchers can use.
+    TooSmall {
+        /// Least width, px.
+        width: usize,
+        /// Least height, px.
+        height: usize,
+    },
+    /// The frame's size differs from that of the frames before.
+    SizeChanged,
+}
+
+/// Least image width the matchers can use, px.
+pub const MIN_WIDTH: usize = 64;
+/// Least image height the matchers can use, px.
+pub const MIN_HEIGHT: usize = 32;
+
+/// A stereo mapper in a slab.
+#[derive(Debug)]
+pub struct Mapper<'s> {
+    config: Config,
+    capacity: Capacity,
+    stereo: StereoMatcher<'s>,
+    scene_flow: FlowMatcher<'s>,
+    estimator: Estimator<'s>,
+    camera: Egomotion,
+    depth_m: &'s mut [f32],
+    background: Volume<'s>,
+    raycaster: Raycaster<'s>,
+    /// Width and height of the frames, known from the first one on.
+    size: Option<[usize; 2]>,
+    frame: u32,
+    footprint: Footprint,
+}
+
+impl Capacity {
+    /// Bytes of slab a mapper of this capacity needs.
+    pub const fn bytes(&self) -> usize {
+        StereoMatcher::bytes(self)
+            + FlowMatcher::bytes(self)
+            + Estimator::bytes(self)
+            + region_bytes::<f32>(self.pixels())
+            + Volume::bytes(self)
+            + Raycaster::bytes(self)
+    }
+}
+
+const MIB: usize = 1 << 20;
+const _: () = assert!(Capacity::TINY.bytes() < 8 * MIB);
+const _: () = assert!(Capacity::SMALL.bytes() < 64 * MIB);
+const _: () = assert!(Capacity::ONBOARD.bytes() < 256 * MIB);
+// A 32-bit machine cannot even name 2 GiB.
+#[cfg(target_pointer_width = "64")]
+const _: () = assert!(Capacity::DESKTOP.bytes() < 2048 * MIB);
+
+impl<'s> Mapper<'s> {
+    /// Cuts a mapper out of `slab`, which must begin at a multiple of [`crate::memory::SLAB_ALIGN`] bytes and hold at least
+    /// `capacity.bytes()`.
+    pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {
+        config.validate().map_err(NewError::Config)?;
+        let mut carver = Carver::new(slab, capacity.bytes())?;
+        let mut mapper = Self {
+            config: *config,
+            capacity: *capacity,
+            stereo: StereoMatcher::carve(capacity, &mut carver)?,
+            scene_flow: FlowMatcher::carve(capacity, &mut carver)?,
+            estimator: Estimator::carve(capacity, &mut carver)?,
+            camera: Egomotion::default(),
+            depth_m: carver.cut("depth_m", capacity.pixels())?,
+            background: Volume::carve(capacity, &config.volume, &mut carver)?,
+            raycaster: Raycaster::carve(capacity, &config.raycast, &mut carver)?,
+            size: None,
+            frame: 0,
+            footprint: Footprint::default(),
+        };
+        mapper.footprint = carver.footprint().clone();
+        Ok(mapper)
+    }
+
+    /// Takes one frame: depth, motion, map. Never allocates, never panics; what could not be done is counted in the report. Blocks that
+    /// must leave a full pool are lost, and counted.
+    pub fn step<E: Executor>(&mut self, frame: &StereoFrame<'_>, executor: &E) -> Result<Report, StepError> {
+        self.step_with(frame, executor, &mut NoStore)
+    }
+
+    /// As [`Mapper::step`], with a store that keeps the blocks that must leave and brings them back when they are seen again.
+    pub fn step_with<E: Executor, S: BlockStore>(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        executor: &E,
+        store: &mut S,
+    ) -> Result<Report, StepError> {
+        let [width, height] = self.admit(frame)?;
+        let (config, left, right) = (&self.config, frame.left, frame.right);
+
+        // (A) Depth from the pair, and (C.1) sparse scene flow over this pair and the last: neither needs the other.
+        let (stereo, scene_flow) = executor.join(
+            || executor.stage(Stage::Stereo, || self.stereo.compute(&config.stereo, left, right, executor)),
+            || executor.stage(Stage::SceneFlow, || self.scene_flow.push(&config.scene_flow, left, right, executor)),
+        );
+        // (C.2) The camera's own motion. The first frame's camera is the world.
+        let matches = self.scene_flow.bucketed();
+        let egomotion = executor.stage(Stage::Egomotion, || {
+            (scene_flow.status == FlowStatus::Matched)
+                .then(|| self.camera.step(&config.egomotion, &config.rig, matches, &mut self.estimator))
+        });
+        let t_world_camera = *self.camera.t_world_camera();
+        // (E) What the camera sees goes into the map, unless its pose is a guess.
+        let fused = self.camera.held_frames() == 0;
+        let view = Viewpoint { rig: config.rig, width, height, t_world_camera };
+        let allocation = if fused { self.fuse(frame, &view, executor, store) } else { AllocationReport::default() };
+        // (F) Noise last seen a fixed lag ago goes.
+        let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
+
+        let report = Report {
+            frame: self.frame,
+            t_world_camera,
+            stereo,
+            scene_flow,
+            egomotion,
+            fused,
+            allocation,
+            prune,
+            blocks: self.block_count(),
+            input_digest: input_digest(frame),
+            digest: self.digest(),
+        };
+        self.frame += 1;
+        Ok(report)
+    }
+
+    /// Checks a frame against the capacity and the frames before.
+    fn admit(&mut self, frame: &StereoFrame<'_>) -> Result<[usize; 2], StepError> {
+        let size = [frame.left.width(), frame.left.height()];
+        let same = |width: usize, height: usize| size == [width, height];
+        let right = same(frame.right.width(), frame.right.height());
+        let colour = frame.colour.is_none_or(|image| same(image.width(), image.height()));
+        let class = frame.class.is_none_or(|image| same(image.width(), image.height()));
+        if !(right && colour && class) {
+            return Err(StepError::SizesDiffer);
+        }
+        if size[0] > self.capacity.image_width || size[1] > self.capacity.image_height {
+            return Err(StepError::TooLarge { width: self.capacity.image_width, height: self.capacity.image_height });
+        }
+        if size[0] < MIN_WIDTH || size[1] < MIN_HEIGHT {
+            return Err(StepError::TooSmall { width: MIN_WIDTH, height: MIN_HEIGHT });
+        }
+        if self.size.is_some_and(|known| known != size) {
+            return Err(StepError::SizeChanged);
+        }
+        self.size = Some(size);
+        Ok(size)
+    }
+
+    /// Turns the disparity into depth, makes blocks around it and averages it in.
+    fn fuse<E: Executor, S: BlockStore>(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        view: &Viewpoint,
+        executor: &E,
+        store: &mut S,
+    ) -> AllocationReport {
+        let Some(mut depth_m) = ViewMut::new(self.depth_m, view.width, view.height) else { return AllocationReport::default() };
+        let volume = &self.config.volume;
+        depth_from_disparity(&view.rig, volume.near_m, volume.far_m, self.stereo.disparity_q8(), &mut depth_m);
+        let seen = Observation {
+            depth_m: depth_m.as_view(),
+            grey: frame.left,
+            colour: frame.colour,
+            class: frame.class,
+        };
+        let allocation = executor.stage(Stage::Allocate, || self.background.allocate(view, seen.depth_m, store));
+        executor.stage(Stage::Fuse, || self.background.fuse(view, seen, executor));
+        allocation
+    }
+
+    /// Ends a drive: prunes what is still in the window.
+    pub fn finish(&mut self) -> PruneReport {
+        self.background.finish()
+    }
+
+    /// Lets every block of the static map leave into `store`, so that the store holds the whole map.
+    pub fn stream_out<S: BlockStore>(&mut self, store: &mut S) -> EvictionReport {
+        self.background.stream_out(store)
+    }
+
+    fn block_count(&self) -> BlockCount {
+        let pool = self.background.pool();
+        BlockCount {
+            used: pool.len() as u32,
+            peak: pool.peak() as u32,
+            capacity: pool.capacity() as u32,
+            visible: self.background.visible().slots().len() as u32,
+        }
+    }
+
+    /// Digest of all that frames to come depend on in the result: the pose and the map.
+    fn digest(&self) -> u64 {
+        let pose = self.camera.t_world_camera();
+        let mut digest = Digest::default();
+        digest.u64(u64::from(self.frame));
+        pose.rotation.coords.iter().chain(pose.translation.vector.iter()).for_each(|&value| digest.f64(value));
+        digest.u64(self.background.digest());
+        digest.finish()
+    }
+
+    /// Looks at the static map from a pose, at the size of the frames taken so far. Before the first frame there is no size to look at.
+    pub fn raycast<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
+        let [width, height] = self.size.ok_or(RaycastError::ImageSize)?;
+        let view = Viewpoint { rig: self.config.rig, width, height, t_world_camera: *t_world_camera };
+        executor.stage(Stage::Raycast, || self.raycaster.cast(&self.background, &view, executor))?;
+        Ok(&self.raycaster)
+    }
+
+    /// The static map's triangles, one after the other, in world coordinates. How many there were.
+    pub fn triangles(&self, sink: &mut impl FnMut(Triangle)) -> u64 {
+        self.background.triangles(&self.config.mesh, sink)
+    }
+
+    /// The static map.
+    pub fn background(&self) -> &Volume<'s> {
+        &self.background
+    }
+
+    /// Disparity of the last frame, 1/256 px, 0 none.
+    pub fn disparity_q8(&self) -> View<'_, u16> {
+        self.stereo.disparity_q8()
+    }
+
+    /// Every region of the slab, with its use now and at most.
+    pub fn footprint(&self) -> Footprint {
+        let mut footprint = self.footprint.clone();
+        self.background.note_use(&mut footprint);
+        self.raycaster.note_use(&mut footprint);
+        footprint
+    }
+}
+
+/// Digest of the images, row by row.
+fn input_digest(frame: &StereoFrame<'_>) -> u64 {
+    let mut digest = Digest::default();
+    frame.left.rows().chain(frame.right.rows()).for_each(|row| digest.bytes(row));
+    frame.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
+    frame.class.iter().flat_map(View::rows).for_each(|row| digest.bytes(row));
+    digest.finish()
+}

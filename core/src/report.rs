@@ -1,0 +1,93 @@
+//! What one step did, as plain values.
+
+use crate::{
+    egomotion::MotionEstimate,
+    geometry::Transform,
+    scene_flow::FlowReport,
+    stereo::StereoReport,
+    volume::{AllocationReport, PruneReport},
+};
+
+/// How much a step's events matter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Nothing to say.
+    #[default]
+    Info,
+    /// Something went wrong and was made good within the frame.
+    Recovered,
+    /// The map lacks what it should hold, or the pose is a guess.
+    MapAffected,
+}
+
+impl Severity {
+    /// Name in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Recovered => "recovered",
+            Self::MapAffected => "map affected",
+        }
+    }
+}
+
+/// The state of a block pool after a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BlockCount {
+    /// Blocks in use.
+    pub used: u32,
+    /// The most ever in use.
+    pub peak: u32,
+    /// Blocks the pool can hold.
+    pub capacity: u32,
+    /// Blocks visible in this frame.
+    pub visible: u32,
+}
+
+/// One step.
+#[derive(Clone, Copy, Debug)]
+pub struct Report {
+    /// Number of the frame, from 0.
+    pub frame: u32,
+    /// Where the left camera is: camera to world; the first frame's camera is the world.
+    pub t_world_camera: Transform,
+    /// The stereo matcher.
+    pub stereo: StereoReport,
+    /// The scene flow.
+    pub scene_flow: FlowReport,
+    /// The camera's motion; none was looked for in the first frame.
+    pub egomotion: Option<MotionEstimate>,
+    /// Whether the frame was fused. One whose pose had to be guessed is not: it would smear the map.
+    pub fused: bool,
+    /// Blocks made and refused.
+    pub allocation: AllocationReport,
+    /// What pruning did.
+    pub prune: PruneReport,
+    /// The static map's pool.
+    pub blocks: BlockCount,
+    /// Digest of the images as they came in, so that a changed decoder is told from a changed core.
+    pub input_digest: u64,
+    /// Digest of the pose and of the whole map after this step.
+    pub digest: u64,
+}
+
+impl Report {
+    /// The worst thing that happened in this step.
+    pub fn severity(&self) -> Severity {
+        let allocation = &self.allocation;
+        let dropped = allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
+        if !self.fused || dropped > 0 {
+            Severity::MapAffected
+        } else if self.dropped_features() + self.prune.early > 0 {
+            Severity::Recovered
+        } else {
+            Severity::Info
+        }
+    }
+
+    /// Features and matches for which there was no room.
+    pub fn dropped_features(&self) -> u32 {
+        let flow = &self.scene_flow;
+        flow.left.dropped + flow.right.dropped + flow.sparse.dropped + flow.dense.dropped
+    }
+}
