@@ -1,1 +1,4 @@
-//! The host of dynvox.
+//! The host of dynvox: feeds the core, watches its ceilings, shows what it made.
+
+pub mod dataset;
+pub mod evaluation;

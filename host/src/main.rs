@@ -1,1 +1,2 @@
+//! The host of dynvox.
 fn main() {}

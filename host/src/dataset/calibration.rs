@@ -1,0 +1,178 @@
+//! Calibration files: KITTI's projection matrices, with and without labels, and `key value` lines.
+//!
+//! KITTI's rectified camera k projects with `P_k = K [I | t_k]`, so the two cameras of a pair share `K` and their baseline is
+//! `(P_left[0,3] - P_right[0,3]) / focal`.
+
+use super::{DatasetError, error::read_failed};
+use dynvox_core::geometry::{RigProblem, StereoRig};
+use nalgebra::Vector3;
+use std::path::Path;
+
+/// A 3 x 4 projection matrix, row by row.
+pub type Projection = [f64; 12];
+
+/// The projection matrices of a KITTI calibration file, by camera number.
+#[derive(Debug)]
+pub struct KittiCalibration {
+    cameras: [Option<Projection>; 4],
+    path: std::path::PathBuf,
+}
+
+impl KittiCalibration {
+    /// Reads lines `P0: 12 numbers`, or bare lines of 12 numbers for P0, P1, ... in order. Other lines (`Tr:`, `R_rect`) are passed over.
+    pub fn read(path: &Path) -> Result<Self, DatasetError> {
+        Self::parse(&std::fs::read_to_string(path).map_err(read_failed(path))?, path)
+    }
+
+    fn parse(text: &str, path: &Path) -> Result<Self, DatasetError> {
+        let mut cameras = [None; 4];
+        let mut bare = 0;
+        for (number, line) in text.lines().enumerate().map(|(at, line)| (at + 1, line.trim())) {
+            let Some(first) = line.split_whitespace().next() else { continue };
+            let slot = match first.trim_end_matches(':') {
+                "P0" => 0,
+                "P1" => 1,
+                "P2" => 2,
+                "P3" => 3,
+                other if other.parse::<f64>().is_ok() => {
+                    bare += 1;
+                    bare - 1
+                }
+                _ => continue,
+            };
+            let values = line.split_whitespace().filter(|word| !word.starts_with('P'));
+            let values: Option<Vec<f64>> = values.map(|word| word.parse().ok().filter(|value: &f64| value.is_finite())).collect();
+            let row = values.and_then(|values| Projection::try_from(values).ok()).ok_or_else(|| DatasetError::Calibration {
+                path: path.to_path_buf(),
+                reason: format!("line {number} is not a projection matrix of 12 numbers"),
+                action: "Compare it with a calib.txt of the benchmark: one line per camera, `P0: ` and 12 numbers".into(),
+            })?;
+            if let Some(camera) = cameras.get_mut(slot) {
+                *camera = Some(row);
+            }
+        }
+        Ok(Self { cameras, path: path.to_path_buf() })
+    }
+
+    /// The rig of the pair `left`, `right` (0, 1 grey; 2, 3 colour).
+    pub fn rig(&self, left: usize, right: usize) -> Result<StereoRig, DatasetError> {
+        let ([p_left, p_right], path) = ([self.camera(left)?, self.camera(right)?], &self.path);
+        let unusable = |reason: String, action: &str| DatasetError::Calibration { path: path.clone(), reason, action: action.into() };
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
+        let shared = [0, 5, 2, 6].iter().all(|&at| near(p_left[at], p_right[at])) && near(p_left[0], p_left[5]);
+        if !shared {
+            return Err(unusable(
+                format!("P{left} and P{right} differ in focal length or principal point"),
+                "The images must be rectified to one pinhole camera: use the benchmark's rectified images and their calibration",
+            ));
+        }
+        let rig = StereoRig {
+            focal_px: p_left[0],
+            center_u_px: p_left[2],
+            center_v_px: p_left[6],
+            baseline_m: (p_left[3] - p_right[3]) / p_left[0],
+        };
+        checked(rig, path)
+    }
+
+    /// Where camera 0 stands as seen from camera `camera`: `t` of `P = K [I | t]`, m.
+    pub fn offset_m(&self, camera: usize) -> Result<Vector3<f64>, DatasetError> {
+        let p = self.camera(camera)?;
+        let z = p[11];
+        Ok(Vector3::new((p[3] - p[2] * z) / p[0], (p[7] - p[6] * z) / p[5], z))
+    }
+
+    fn camera(&self, camera: usize) -> Result<Projection, DatasetError> {
+        self.cameras.get(camera).copied().flatten().ok_or_else(|| DatasetError::Calibration {
+            path: self.path.clone(),
+            reason: format!("it has no P{camera}"),
+            action: format!("Add the line `P{camera}: ` with the 12 numbers of that camera's projection matrix"),
+        })
+    }
+}
+
+/// Reads a plain stereo folder's calibration: KITTI's lines `P0:`, `P1:`, or one `key value` line each for `focal_px`, `center_u_px`,
+/// `center_v_px` and `baseline_m`. `#` begins a comment.
+pub fn read_plain(path: &Path) -> Result<StereoRig, DatasetError> {
+    let text = std::fs::read_to_string(path).map_err(read_failed(path))?;
+    let text: String = text.lines().map(|line| line.split('#').next().unwrap_or("").to_owned() + "\n").collect();
+    let keys = ["focal_px", "center_u_px", "center_v_px", "baseline_m"];
+    if !text.lines().any(|line| keys.iter().any(|key| line.trim_start().starts_with(key))) {
+        return KittiCalibration::parse(&text, path)?.rig(0, 1);
+    }
+    let mut values = [None; 4];
+    for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        let mut words = line.split([' ', '\t', '=', ':']).filter(|word| !word.is_empty());
+        let key = words.next().unwrap_or_default();
+        let slot = keys.iter().position(|known| *known == key).and_then(|at| values.get_mut(at));
+        let number = words.next().and_then(|word| word.parse::<f64>().ok());
+        let (Some(slot), Some(number)) = (slot, number) else {
+            return Err(DatasetError::Calibration {
+                path: path.to_path_buf(),
+                reason: format!("`{line}` is not a line of it"),
+                action: format!("Its lines are `key value` with the keys {}", keys.join(", ")),
+            });
+        };
+        *slot = Some(number);
+    }
+    let [Some(focal_px), Some(center_u_px), Some(center_v_px), Some(baseline_m)] = values else {
+        let missing: Vec<&str> = keys.iter().zip(values).filter(|(_, value)| value.is_none()).map(|(key, _)| *key).collect();
+        return Err(DatasetError::Calibration {
+            path: path.to_path_buf(),
+            reason: format!("{} is missing", missing.join(", ")),
+            action: "Add one line `key value` for each".into(),
+        });
+    };
+    checked(StereoRig { focal_px, center_u_px, center_v_px, baseline_m }, path)
+}
+
+fn checked(rig: StereoRig, path: &Path) -> Result<StereoRig, DatasetError> {
+    let (reason, action) = match rig.validate() {
+        Ok(()) => return Ok(rig),
+        Err(RigProblem::Focal) => (format!("the focal length is {} px", rig.focal_px), "It must be above 0"),
+        Err(RigProblem::Center) => ("the principal point is not finite".to_owned(), "Give it in pixels from the image's corner"),
+        Err(RigProblem::Baseline) => (
+            format!("the baseline is {} m", rig.baseline_m),
+            "The right camera must stand to the right of the left one: exchange the two cameras, or correct the sign of the fourth number",
+        ),
+    };
+    Err(DatasetError::Calibration { path: path.to_path_buf(), reason, action: action.into() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GREY: &str = "718 0 607 0 0 718 185 0 0 0 1 0\n718 0 607 -386.1 0 718 185 0 0 0 1 0\n";
+
+    #[test]
+    fn reads_lines_with_and_without_labels_alike() {
+        let path = Path::new("calib.txt");
+        let labelled: String = GREY.lines().zip(["P0:", "P1:"]).map(|(line, label)| format!("{label} {line}\n")).collect::<String>()
+            + "Tr: 1 2 3\nR_rect 1 0\n";
+        let a = KittiCalibration::parse(GREY, path).unwrap().rig(0, 1).unwrap();
+        let b = KittiCalibration::parse(&labelled, path).unwrap().rig(0, 1).unwrap();
+        assert_eq!(a, b);
+        assert!((a.baseline_m - 386.1 / 718.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn names_the_camera_that_is_missing_and_the_baseline_that_is_not_positive() {
+        let path = Path::new("calib.txt");
+        let one = KittiCalibration::parse(GREY.lines().next().unwrap(), path).unwrap();
+        assert!(one.rig(0, 1).unwrap_err().to_string().contains("no P1"));
+        let two = KittiCalibration::parse(GREY, path).unwrap();
+        assert!(two.rig(2, 3).unwrap_err().to_string().contains("no P2"));
+        let message = two.rig(1, 0).unwrap_err().to_string();
+        assert!(message.contains("baseline is -0.5") && message.contains("exchange the two cameras"), "{message}");
+        let short = KittiCalibration::parse("P0: 1 2 3\n", path).unwrap_err().to_string();
+        assert!(short.contains("line 1"), "{short}");
+    }
+
+    #[test]
+    fn a_camera_beside_the_first_knows_its_place() {
+        let text = "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP2: 700 0 600 43.4 0 700 180 0.5 0 0 1 0.0025\n";
+        let offset = KittiCalibration::parse(text, Path::new("c")).unwrap().offset_m(2).unwrap();
+        assert!((offset - Vector3::new((43.4 - 1.5) / 700.0, (0.5 - 0.45) / 700.0, 0.0025)).norm() < 1e-12);
+    }
+}

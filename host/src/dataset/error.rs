@@ -1,0 +1,150 @@
+//! What can be wrong with a data set. Each message says what, where, and what to do next.
+
+use std::path::PathBuf;
+
+/// A data set that cannot be used, or a frame of it.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// The path does not exist.
+    #[error("there is no data set at {path}. Check the path; `dynvox run` without one maps the synthetic street")]
+    Absent {
+        /// Path as given.
+        path: PathBuf,
+    },
+    /// The layout is none that is known.
+    #[error(
+        "{path} has no layout that is known here. Known are KITTI odometry (sequences/NN/image_0), KITTI tracking \
+         (training/image_02/NNNN) and a folder with left/, right/ and calib.txt; --dataset says which one is meant"
+    )]
+    Layout {
+        /// Folder looked at.
+        path: PathBuf,
+    },
+    /// A part of the layout is missing.
+    #[error("{path} is missing. {action}")]
+    Part {
+        /// File or folder expected.
+        path: PathBuf,
+        /// What to do.
+        action: String,
+    },
+    /// The sequence does not exist.
+    #[error("there is no sequence {sequence} in {root}. It holds {known}; choose one with --sequence")]
+    Sequence {
+        /// Name asked for.
+        sequence: String,
+        /// Root of the data set.
+        root: PathBuf,
+        /// Names there.
+        known: String,
+    },
+    /// Several sequences and no choice.
+    #[error("{root} holds several sequences: {known}. Choose one with --sequence")]
+    Choice {
+        /// Root of the data set.
+        root: PathBuf,
+        /// Names there.
+        known: String,
+    },
+    /// An image of one side has no partner on the other.
+    #[error("{image} has no partner {partner}. Add the missing image or remove this one; --start and --frames skip frames at the ends")]
+    Partner {
+        /// The image that is there.
+        image: PathBuf,
+        /// The one that is not.
+        partner: PathBuf,
+    },
+    /// No image at all.
+    #[error("{path} holds no PNG image. Images must be 8-bit PNG files, as `convert x.jpg x.png` makes them")]
+    Empty {
+        /// Folder looked at.
+        path: PathBuf,
+    },
+    /// An image of another size than the first.
+    #[error(
+        "{path} is {found_width} x {found_height} px, but the sequence began with {width} x {height}. All images must have one size: rectify or crop them alike"
+    )]
+    Size {
+        /// The image.
+        path: PathBuf,
+        /// Its width, px.
+        found_width: usize,
+        /// Its height, px.
+        found_height: usize,
+        /// Width of the sequence, px.
+        width: usize,
+        /// Height of the sequence, px.
+        height: usize,
+    },
+    /// An image that cannot be decoded.
+    #[error("{path} cannot be read: {reason}. Fetch or convert this image anew, or end before it with --frames")]
+    Image {
+        /// The image.
+        path: PathBuf,
+        /// What the decoder says.
+        reason: String,
+    },
+    /// A kind of PNG that is not stereo input.
+    #[error(
+        "{path} is a {kind} image. Stereo input is 8 bit, grey or colour: convert it, for instance with `convert in.png -depth 8 out.png`"
+    )]
+    Kind {
+        /// The image.
+        path: PathBuf,
+        /// Its pixel type.
+        kind: String,
+    },
+    /// A calibration that cannot be used.
+    #[error("the calibration {path} cannot be used: {reason}. {action}")]
+    Calibration {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+        /// What to do.
+        action: String,
+    },
+    /// A table of numbers that does not parse or has too few rows.
+    #[error("{path}: {reason}. {action}")]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+        /// What to do.
+        action: String,
+    },
+    /// Reading failed for a reason of the machine's.
+    #[error("{path} cannot be read: {source}. Check that the file is there and readable")]
+    Read {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the machine says.
+        source: std::io::Error,
+    },
+    /// The synthetic street refuses its configuration.
+    #[error("the synthetic street cannot be built: {reason}. Change its keys with --set street.<key>=<value>")]
+    Street {
+        /// What is wrong.
+        reason: String,
+    },
+    /// A scale outside (0, 1], or one that leaves no image.
+    #[error(
+        "--scale {scale} cannot be used on {width} x {height} px. Give a number above 0 and up to 1 that leaves at least {least} x {least} px"
+    )]
+    Scale {
+        /// Scale asked for.
+        scale: f64,
+        /// Width before, px.
+        width: usize,
+        /// Height before, px.
+        height: usize,
+        /// Least side left, px.
+        least: usize,
+    },
+}
+
+/// Attaches the path to a failed read.
+pub fn read_failed(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> DatasetError + '_ {
+    move |source| DatasetError::Read { path: path.to_path_buf(), source }
+}

@@ -1,0 +1,98 @@
+//! Where frames come from: KITTI odometry and tracking, a plain stereo folder, the synthetic street.
+//!
+//! A data set is a list of rectified stereo pairs with one rig. Loaders guess nothing silently: what they assume stands in
+//! [`Dataset::notes`], and what they cannot use is a [`DatasetError`] that says what to do.
+
+mod calibration;
+mod error;
+mod folder;
+mod image;
+mod kitti;
+mod open;
+mod scaled;
+mod sequence;
+mod table;
+#[cfg(test)]
+mod tests;
+
+pub use error::DatasetError;
+pub use image::{Image, luma, read_png};
+pub use open::{Found, Kind, open, sequences_at, survey};
+pub use scaled::Scaled;
+pub use sequence::Sequence;
+pub use table::{pose_of_row, read_poses};
+
+use dynvox_core::geometry::{StereoRig, Transform};
+
+/// One stereo pair, decoded.
+#[derive(Clone, Debug)]
+pub struct StereoImages {
+    /// Left grey image.
+    pub left: Image<u8>,
+    /// Right grey image, of the same size.
+    pub right: Image<u8>,
+    /// Left image in colour, where the data set has it: the same camera as `left`.
+    pub colour: Option<Image<[u8; 3]>>,
+}
+
+/// What a renderer knows of a frame exactly.
+#[derive(Clone, Debug)]
+pub struct ExactFrame {
+    /// Depth of the left pixels, m; 0 or infinite where there is none.
+    pub depth_m: Image<f32>,
+    /// Whether the pixel belongs to something that can move, parked or not.
+    pub moving: Image<bool>,
+}
+
+/// Which camera pair of KITTI odometry to use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Images {
+    /// The grey pair where it is there, else the colour pair.
+    #[default]
+    Auto,
+    /// `image_0` and `image_1`.
+    Grey,
+    /// `image_2` and `image_3`: matched in grey, fused in colour.
+    Colour,
+}
+
+/// A list of stereo pairs with one rig.
+pub trait Dataset: Send + Sync {
+    /// Short name, fit for a folder: `kitti-odometry-06`.
+    fn name(&self) -> &str;
+
+    /// Frames in all.
+    fn len(&self) -> usize;
+
+    /// Whether there is no frame.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Width and height of every image, px.
+    fn size(&self) -> (usize, usize);
+
+    /// The rig, equal for all frames.
+    fn rig(&self) -> StereoRig;
+
+    /// Time of a frame, s.
+    fn time_s(&self, index: usize) -> f64;
+
+    /// Decodes or renders a frame.
+    fn frame(&self, index: usize) -> Result<StereoImages, DatasetError>;
+
+    /// True `t_world_camera` of every frame's left camera, where known.
+    fn truth(&self) -> Option<&[Transform]> {
+        None
+    }
+
+    /// Exact depth and masks of a frame, where known.
+    fn exact(&self, _index: usize) -> Option<ExactFrame> {
+        None
+    }
+
+    /// What was assumed or left aside, as sentences.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+}

@@ -1,0 +1,81 @@
+//! Guessing a layout from its path, and saying what was found.
+
+use super::{Dataset, DatasetError, Images, folder, kitti};
+use std::path::Path;
+
+/// The layouts that are known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Kind {
+    /// KITTI odometry: `sequences/NN/{image_0,image_1,calib.txt}`.
+    KittiOdometry,
+    /// KITTI tracking: `training/{image_02,image_03}/NNNN`, `training/calib/NNNN.txt`.
+    KittiTracking,
+    /// A folder with `left/`, `right/`, `calib.txt`.
+    Folder,
+}
+
+impl Kind {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::KittiOdometry => "kitti-odometry",
+            Self::KittiTracking => "kitti-tracking",
+            Self::Folder => "folder",
+        }
+    }
+
+    /// The layout at `path`.
+    pub fn guess(path: &Path) -> Result<Self, DatasetError> {
+        if !path.exists() {
+            return Err(DatasetError::Absent { path: path.to_path_buf() });
+        }
+        if kitti::odometry_root(path).is_some() || kitti::is_odometry_sequence(path) {
+            Ok(Self::KittiOdometry)
+        } else if kitti::tracking_split(path).is_some() {
+            Ok(Self::KittiTracking)
+        } else if folder::is_stereo_folder(path) {
+            Ok(Self::Folder)
+        } else {
+            Err(DatasetError::Layout { path: path.to_path_buf() })
+        }
+    }
+}
+
+/// Opens the data set at `path`; the layout is guessed unless `kind` says it.
+pub fn open(path: &Path, kind: Option<Kind>, sequence: Option<&str>, images: Images) -> Result<Box<dyn Dataset>, DatasetError> {
+    if !path.exists() {
+        return Err(DatasetError::Absent { path: path.to_path_buf() });
+    }
+    let kind = kind.map_or_else(|| Kind::guess(path), Ok)?;
+    Ok(match kind {
+        Kind::KittiOdometry => Box::new(kitti::open_odometry(path, sequence, images)?),
+        Kind::KittiTracking => Box::new(kitti::open_tracking(path, sequence)?),
+        Kind::Folder => Box::new(folder::open(path)?),
+    })
+}
+
+/// One sequence at a path, as `inspect` shows it.
+pub struct Found {
+    /// Name for `--sequence`; absent where the path is the sequence itself.
+    pub sequence: Option<String>,
+    /// The sequence, or why it cannot be used.
+    pub opened: Result<Box<dyn Dataset>, DatasetError>,
+}
+
+/// The names of the sequences at `path`; empty where the path is one sequence itself.
+pub fn sequences_at(path: &Path, kind: Kind) -> Result<Vec<String>, DatasetError> {
+    match kind {
+        Kind::KittiOdometry => kitti::odometry_root(path).map_or(Ok(Vec::new()), |root| kitti::sequences(&root)),
+        Kind::KittiTracking => kitti::tracking_split(path).map_or(Ok(Vec::new()), |split| kitti::tracking_sequences(&split)),
+        Kind::Folder => Ok(Vec::new()),
+    }
+}
+
+/// Opens everything at `path`.
+pub fn survey(path: &Path, kind: Option<Kind>) -> Result<(Kind, Vec<Found>), DatasetError> {
+    let kind = kind.map_or_else(|| Kind::guess(path), Ok)?;
+    let names = sequences_at(path, kind)?;
+    let names: Vec<Option<String>> = if names.is_empty() { vec![None] } else { names.into_iter().map(Some).collect() };
+    let found = |sequence: Option<String>| Found { opened: open(path, Some(kind), sequence.as_deref(), Images::Auto), sequence };
+    Ok((kind, names.into_iter().map(found).collect()))
+}

@@ -1,0 +1,3 @@
+//! How good a run was, where the truth is known.
+
+pub mod trajectory;
