@@ -64,8 +64,8 @@ impl Config {
         }
     }
 
-    /// Everything wrong with it, or nothing.
-    pub fn validate(&self) -> Result<(), Problems> {
+    /// Everything wrong with it; empty when nothing is.
+    pub fn validate(&self) -> Problems {
         let mut problems = Problems::new();
         let rig = self.rig.validate();
         require(&mut problems, rig != Err(RigProblem::Focal), "rig.focal_px", "must be a positive number");
@@ -77,6 +77,6 @@ impl Config {
         self.volume.validate(&mut problems);
         self.raycast.validate(&mut problems);
         self.mesh.validate(&mut problems);
-        if problems.is_empty() { Ok(()) } else { Err(problems) }
+        problems
     }
 }

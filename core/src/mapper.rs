@@ -2,7 +2,7 @@
 
 use crate::{
     Capacity, Executor, Footprint, Stage,
-    config::{Config, Problems},
+    config::{Config, Problem},
     digest::Digest,
     egomotion::{Egomotion, Estimator},
     geometry::{Transform, depth_from_disparity},
@@ -18,12 +18,12 @@ use crate::{
 };
 
 /// Why a mapper cannot be made.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NewError {
     /// The slab cannot hold the capacity.
     Slab(SlabError),
-    /// The configuration is not usable; all problems found.
-    Config(Problems),
+    /// The configuration is not usable: the first problem; [`Config::validate`] lists them all.
+    Config(Problem),
 }
 
 impl From<SlabError> for NewError {
@@ -102,7 +102,9 @@ impl<'s> Mapper<'s> {
     /// Cuts a mapper out of `slab`, which must begin at a multiple of [`crate::memory::SLAB_ALIGN`] bytes and hold at least
     /// `capacity.bytes()`.
     pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {
-        config.validate().map_err(NewError::Config)?;
+        if let Some(problem) = config.validate().first() {
+            return Err(NewError::Config(*problem));
+        }
         let mut carver = Carver::new(slab, capacity.bytes())?;
         let mut mapper = Self {
             config: *config,

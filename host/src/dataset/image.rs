@@ -41,14 +41,22 @@ impl<T> Image<T> {
 
     /// The same image with every pixel mapped.
     pub fn map<U>(&self, each: impl FnMut(&T) -> U) -> Image<U> {
-        Image { width: self.width, height: self.height, pixels: self.pixels.iter().map(each).collect() }
+        Image {
+            width: self.width,
+            height: self.height,
+            pixels: self.pixels.iter().map(each).collect(),
+        }
     }
 }
 
 impl<T: Copy> Image<T> {
     /// Copies a view.
     pub fn from_view(view: &View<'_, T>) -> Self {
-        Self { width: view.width(), height: view.height(), pixels: view.rows().flatten().copied().collect() }
+        Self {
+            width: view.width(),
+            height: view.height(),
+            pixels: view.rows().flatten().copied().collect(),
+        }
     }
 
     /// Pixel at column `u`, row `v`; `None` beyond the image.
@@ -87,7 +95,10 @@ pub fn read_png(path: &Path) -> Result<Decoded, DatasetError> {
             let colour = Image::new(width, height, pixels).ok_or_else(absurd)?;
             Ok(Decoded { grey: colour.map(|&rgb| luma(rgb)), colour: Some(colour) })
         }
-        other => Err(DatasetError::Kind { path: path.to_path_buf(), kind: format!("{}-bit {}", 8 * bytes_per_channel(&other), "PNG") }),
+        other => Err(DatasetError::Kind {
+            path: path.to_path_buf(),
+            kind: format!("{}-bit {}", 8 * bytes_per_channel(&other), "PNG"),
+        }),
     }
 }
 

@@ -126,7 +126,11 @@ fn odometry_folder(path: &Path, sequence: Option<&str>) -> Result<PathBuf, Datas
     }
     if let Some(wanted) = sequence.filter(|wanted| path.file_name().is_none_or(|name| name.to_string_lossy() != **wanted)) {
         let known = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        return Err(DatasetError::Sequence { sequence: wanted.to_owned(), root: path.to_path_buf(), known: format!("only {known}") });
+        return Err(DatasetError::Sequence {
+            sequence: wanted.to_owned(),
+            root: path.to_path_buf(),
+            known: format!("only {known}"),
+        });
     }
     Ok(path.to_path_buf())
 }

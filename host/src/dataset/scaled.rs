@@ -33,7 +33,13 @@ impl Scaled {
         }
         let mut notes = inner.notes().to_vec();
         notes.push(format!("images scaled from {width} x {height} to {} x {} px", side(width), side(height)));
-        Ok(Self { columns: spans(side(width), width, scale), rows: spans(side(height), height, scale), inner, scale, notes })
+        Ok(Self {
+            columns: spans(side(width), width, scale),
+            rows: spans(side(height), height, scale),
+            inner,
+            scale,
+            notes,
+        })
     }
 
     fn shrink<const N: usize>(&self, pixels: &[[u8; N]], width: usize) -> Vec<[u8; N]> {

@@ -114,7 +114,13 @@ fn check_size(path: &Path, image: &Image<u8>, (width, height): (usize, usize)) -
     if (image.width(), image.height()) == (width, height) {
         return Ok(());
     }
-    Err(DatasetError::Size { path: path.to_path_buf(), found_width: image.width(), found_height: image.height(), width, height })
+    Err(DatasetError::Size {
+        path: path.to_path_buf(),
+        found_width: image.width(),
+        found_height: image.height(),
+        width,
+        height,
+    })
 }
 
 /// The PNG files of a folder, by name.
