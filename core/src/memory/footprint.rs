@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 /// Most regions one slab can be cut into.
-const MAX_REGIONS: usize = 96;
+const MAX_REGIONS: usize = 128;
 
 /// One named region of the slab. All figures in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
