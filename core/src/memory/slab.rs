@@ -57,6 +57,14 @@ impl<'s> Carver<'s> {
 
     /// Cuts `count` zeroed items of `T` off the front and books them under `name`.
     pub fn cut<T: Pod>(&mut self, name: &'static str, count: usize) -> Result<&'s mut [T], SlabError> {
+        let items = self.cut_as_found(name, count)?;
+        items.fill(T::zeroed());
+        Ok(items)
+    }
+
+    /// As [`Carver::cut`], with whatever the slab holds: for big regions that are cleared piece by piece as they come into use, so that
+    /// a slab much larger than the map costs neither time nor resident memory.
+    pub fn cut_as_found<T: Pod>(&mut self, name: &'static str, count: usize) -> Result<&'s mut [T], SlabError> {
         let bytes = region_bytes::<T>(count);
         let rest = core::mem::take(&mut self.rest);
         if rest.len() < bytes {
@@ -65,7 +73,6 @@ impl<'s> Carver<'s> {
         let (region, rest) = rest.split_at_mut(bytes);
         self.rest = rest;
         self.footprint.add(Region { name, bytes, used: bytes, peak: bytes }).map_err(|_| SlabError::TooManyRegions)?;
-        region.fill(0);
         let (items, _) = region.split_at_mut(count * size_of::<T>());
         bytemuck::try_cast_slice_mut(items).map_err(|_| SlabError::Misaligned)
     }
@@ -83,14 +90,15 @@ mod tests {
     #[test]
     fn cuts_aligned_zeroed_regions_and_books_them() {
         let mut slab = std::boxed::Box::new(Slab([7u8; 256]));
-        let mut carver = Carver::new(&mut slab.0, 192).unwrap();
+        let mut carver = Carver::new(&mut slab.0, 256).unwrap();
         let a = carver.cut::<u16>("a", 5).unwrap();
         let b = carver.cut::<u64>("b", 16).unwrap();
         assert_eq!(a, [0; 5]);
         assert_eq!(b, [0; 16]);
         assert_eq!(b.as_ptr() as usize % SLAB_ALIGN, 0);
+        assert_eq!(carver.cut_as_found::<u8>("c", 2).unwrap(), [7; 2]);
         let footprint = carver.footprint();
-        assert_eq!(footprint.bytes(), 192);
+        assert_eq!(footprint.bytes(), 256);
         assert_eq!(footprint.region("b").unwrap().bytes, 128);
     }
 

@@ -80,9 +80,9 @@ impl<'s> Blocks<'s> {
         let coloured = if capacity.colour { capacity.blocks } else { 0 };
         Ok(Self {
             coord: carver.cut("volume.coord", capacity.blocks)?,
-            sdf: carver.cut("volume.sdf", capacity.blocks)?,
-            weight: carver.cut("volume.weight", capacity.blocks)?,
-            colour: if capacity.colour { carver.cut("volume.colour", coloured)? } else { &mut [] },
+            sdf: carver.cut_as_found("volume.sdf", capacity.blocks)?,
+            weight: carver.cut_as_found("volume.weight", capacity.blocks)?,
+            colour: if capacity.colour { carver.cut_as_found("volume.colour", coloured)? } else { &mut [] },
             digest: carver.cut("volume.digest", capacity.blocks)?,
         })
     }
