@@ -16,7 +16,7 @@ mod speckle;
 mod support;
 
 pub use config::{DISPARITY_LIMIT, MAX_PLANE_RADIUS, MIN_CANDIDATE_STEP, MIN_GRID_SIZE, StereoConfig};
-pub use report::{StereoReport, StereoStatus};
+pub use report::{StereoReport, StereoStatus, StereoStep};
 
 use crate::{
     config::Problems,
@@ -128,6 +128,18 @@ impl<'s> StereoMatcher<'s> {
 
     /// Computes the disparities of a rectified pair.
     pub fn compute<E: Executor>(&mut self, config: &StereoConfig, left: View<'_, u8>, right: View<'_, u8>, executor: &E) -> StereoReport {
+        self.compute_observed(config, left, right, executor, |_| ())
+    }
+
+    /// As [`StereoMatcher::compute`], calling `done` after each step: no clock enters the core, so whoever times the steps does it there.
+    pub fn compute_observed<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        left: View<'_, u8>,
+        right: View<'_, u8>,
+        executor: &E,
+        mut done: impl FnMut(StereoStep),
+    ) -> StereoReport {
         let mut report = StereoReport::default();
         report.status = self.begin(config, left, right);
         report.pixels = (self.width * self.height) as u32;
@@ -135,18 +147,27 @@ impl<'s> StereoMatcher<'s> {
             return report;
         }
         self.find_gradients(left, right, executor);
+        done(StereoStep::Gradients);
         self.match_support(config, executor, &mut report);
+        done(StereoStep::Support);
         self.sift_support(config, &mut report);
+        done(StereoStep::Sifting);
         self.triangulate(config, executor, &mut report);
+        done(StereoStep::Triangulation);
         if report.triangles_left == 0 || report.triangles_right == 0 {
             report.status = StereoStatus::TooFewSupportPoints;
             return report;
         }
         self.match_densely(config, executor, &mut report);
+        done(StereoStep::DenseMatching);
         self.remove_speckles(config, &mut report);
+        done(StereoStep::Speckles);
         self.fill_gaps(config, &mut report);
+        done(StereoStep::Gaps);
         self.smooth(config, executor);
+        done(StereoStep::Smoothing);
         self.finish(&mut report);
+        done(StereoStep::Output);
         report
     }
 
@@ -312,12 +333,7 @@ fn split_planes(gradients: &mut [u32], pixels: usize) -> [&mut [u8]; 4] {
 /// The gradients of both images.
 fn gradients(region: &[u32], width: usize, height: usize) -> [Gradients<'_>; 2] {
     let mut planes = bytemuck::cast_slice::<u32, u8>(region).chunks_exact(width * height);
-    [(); 2].map(|()| Gradients {
-        du: planes.next().unwrap_or(&[]),
-        dv: planes.next().unwrap_or(&[]),
-        width,
-        height,
-    })
+    [(); 2].map(|()| Gradients { du: planes.next().unwrap_or(&[]), dv: planes.next().unwrap_or(&[]), width, height })
 }
 
 /// Three arrays as one of triples.

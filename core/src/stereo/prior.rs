@@ -77,14 +77,7 @@ impl Plane {
         let determinant = bu * cv - bv * cu;
         let (numerator_u, numerator_v) = (bd * cv - bv * cd, bu * cd - bd * cu);
         let slope = |numerator: i64| (numerator << 16).checked_div(determinant);
-        Some(Self {
-            origin: a,
-            numerator_u,
-            numerator_v,
-            determinant,
-            slope_u: slope(numerator_u)?,
-            slope_v: slope(numerator_v)?,
-        })
+        Some(Self { origin: a, numerator_u, numerator_v, determinant, slope_u: slope(numerator_u)?, slope_v: slope(numerator_v)? })
     }
 
     /// Fills a run of row `v` from column `left`, in 1/65536 px: exact at its first pixel, at most 0.03 px off after 2,000.
@@ -163,10 +156,6 @@ impl PlaneCost {
         for (k, cost) in by_distance.iter_mut().enumerate() {
             *cost = most - held(preference(k)).min(most);
         }
-        Self {
-            by_distance,
-            elsewhere: most,
-            radius: config.plane_radius().min(MAX_PLANE_RADIUS),
-        }
+        Self { by_distance, elsewhere: most, radius: config.plane_radius().min(MAX_PLANE_RADIUS) }
     }
 }

@@ -59,3 +59,56 @@ impl StereoReport {
         if self.pixels == 0 { 0.0 } else { self.valid as f32 / self.pixels as f32 }
     }
 }
+
+/// A step of the matcher, as a name for measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StereoStep {
+    /// Sobel responses of both images.
+    Gradients,
+    /// Support points matched over the full disparity range.
+    Support,
+    /// Implausible and redundant support points removed.
+    Sifting,
+    /// Both triangulations and grid priors.
+    Triangulation,
+    /// Planes drawn, both images matched densely and compared.
+    DenseMatching,
+    /// Small segments removed.
+    Speckles,
+    /// Gaps filled.
+    Gaps,
+    /// Adaptive mean and median.
+    Smoothing,
+    /// Conversion to the result's unit.
+    Output,
+}
+
+impl StereoStep {
+    /// All steps, in order.
+    pub const ALL: [Self; 9] = [
+        Self::Gradients,
+        Self::Support,
+        Self::Sifting,
+        Self::Triangulation,
+        Self::DenseMatching,
+        Self::Speckles,
+        Self::Gaps,
+        Self::Smoothing,
+        Self::Output,
+    ];
+
+    /// Name in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gradients => "gradients",
+            Self::Support => "support",
+            Self::Sifting => "sifting",
+            Self::Triangulation => "triangulation",
+            Self::DenseMatching => "dense_matching",
+            Self::Speckles => "speckles",
+            Self::Gaps => "gaps",
+            Self::Smoothing => "smoothing",
+            Self::Output => "output",
+        }
+    }
+}

@@ -10,7 +10,7 @@
 use super::{
     StereoConfig,
     config::DISPARITY_LIMIT,
-    descriptor::{Descriptor, Gradients, MARGIN, distance, texture},
+    descriptor::{Descriptor, Gradients, MARGIN, distance_of_four, texture},
 };
 
 /// No match at this candidate.
@@ -44,11 +44,11 @@ struct Rows<'a> {
     below: &'a [Descriptor],
 }
 
-impl<'a> Rows<'a> {
+impl Rows<'_> {
     /// The four corner descriptors of column `u`.
-    fn corners(&self, u: usize) -> Option<[&'a Descriptor; 4]> {
+    fn corners(&self, u: usize) -> Option<[Descriptor; 4]> {
         let (west, east) = (u.checked_sub(CORNER)?, u + CORNER);
-        Some([self.above.get(west)?, self.above.get(east)?, self.below.get(west)?, self.below.get(east)?])
+        Some([*self.above.get(west)?, *self.above.get(east)?, *self.below.get(west)?, *self.below.get(east)?])
     }
 }
 
@@ -91,9 +91,9 @@ impl SupportMatching<'_> {
     }
 
     /// The column in `first..=last` of the other image that looks like `point`, if one does and no other nearly as much.
-    fn best(&self, point: Option<[&Descriptor; 4]>, other: &Rows<'_>, first: usize, last: usize) -> Option<usize> {
-        let [a, b, c, d] = point?;
-        if [a, b, c, d].iter().any(|corner| texture(corner) < u32::from(self.config.support_texture)) {
+    fn best(&self, point: Option<[Descriptor; 4]>, other: &Rows<'_>, first: usize, last: usize) -> Option<usize> {
+        let point = point?;
+        if point.iter().any(|corner| texture(corner) < u32::from(self.config.support_texture)) {
             return None;
         }
         // At most 64 x 255 = 16,320, so that costs fit i16, whose minimum is one instruction everywhere.
@@ -108,7 +108,7 @@ impl SupportMatching<'_> {
         let (below_west, below_east) = (other.below.get(west)?, other.below.get(east)?);
         let corners = above_west.iter().zip(above_east).zip(below_west.iter().zip(below_east));
         for (cost, ((e, f), (g, h))) in costs.iter_mut().zip(corners) {
-            *cost = (distance(a, e) + distance(b, f) + distance(c, g) + distance(d, h)) as i16;
+            *cost = distance_of_four(&point, [e, f, g, h]) as i16;
         }
         self.distinct(costs).map(|i| first + i)
     }
