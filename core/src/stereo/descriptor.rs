@@ -3,9 +3,12 @@
 //! Descriptors are never kept for a whole image (16 bytes a pixel): a row of them is built from the gradients when it is matched.
 
 use super::gradient::FLAT;
+use bytemuck::{Pod, Zeroable};
 
-/// 12 samples of the horizontal gradient, then 4 of the vertical one.
-pub(super) type Descriptor = [u8; 16];
+/// 12 samples of the horizontal gradient, then 4 of the vertical one. Aligned, so that it is loaded as one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub(super) struct Descriptor(pub [u8; 16]);
 
 /// Columns and rows at the image's rim that have no descriptor: two for the window, one because the outermost pixels have no gradient.
 pub(super) const MARGIN: usize = 3;
@@ -39,12 +42,42 @@ impl Gradients<'_> {
         }
         let a: [&[u8]; 12] = DU.map(|(du, dv)| &self.du[(v + dv - 2) * w + du..][..n]);
         let b: [&[u8]; 4] = DV.map(|(du, dv)| &self.dv[(v + dv - 2) * w + du..][..n]);
-        let [a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11] = a;
-        let [b0, b1, b2, b3] = b;
-        for (i, out) in out[2..][..n].iter_mut().enumerate() {
-            *out = [a0[i], a1[i], a2[i], a3[i], a4[i], a5[i], a6[i], a7[i], a8[i], a9[i], a10[i], a11[i], b0[i], b1[i], b2[i], b3[i]];
+        let samples: [&[u8]; 16] = core::array::from_fn(|k| if k < 12 { a[k] } else { b[k - 12] });
+        let out = &mut out[2..][..n];
+        let mut i = 0;
+        while i + 16 <= n {
+            transpose(samples.map(|sample| bytes_16(&sample[i..])), &mut out[i..i + 16]);
+            i += 16;
+        }
+        for i in i..n {
+            out[i] = Descriptor(samples.map(|sample| sample[i]));
         }
         true
+    }
+}
+
+/// The first 16 bytes of a slice that has them.
+#[inline(always)]
+fn bytes_16(bytes: &[u8]) -> [u8; 16] {
+    bytes.first_chunk().copied().unwrap_or([0; 16])
+}
+
+/// Turns 16 samples of 16 pixels each into 16 descriptors, by interleaving halves four times.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "k < 8, i < 16")]
+fn transpose(mut samples: [[u8; 16]; 16], out: &mut [Descriptor]) {
+    let interleave =
+        |a: &[u8; 16], b: &[u8; 16], half: usize| core::array::from_fn(|i| if i % 2 == 0 { a[half + i / 2] } else { b[half + i / 2] });
+    for _ in 0..4 {
+        let mut next = [[0; 16]; 16];
+        for k in 0..8 {
+            next[2 * k] = interleave(&samples[k], &samples[k + 8], 0);
+            next[2 * k + 1] = interleave(&samples[k], &samples[k + 8], 8);
+        }
+        samples = next;
+    }
+    for (out, bytes) in out.iter_mut().zip(samples) {
+        out.0 = bytes;
     }
 }
 
@@ -55,7 +88,7 @@ impl Gradients<'_> {
 #[inline(always)]
 pub(super) fn distance(a: &Descriptor, b: &Descriptor) -> u32 {
     let mut differences = [0u8; 16];
-    for (difference, (&a, &b)) in differences.iter_mut().zip(a.iter().zip(b)) {
+    for (difference, (&a, &b)) in differences.iter_mut().zip(a.0.iter().zip(&b.0)) {
         *difference = a.max(b) - a.min(b);
     }
     differences.iter().map(|&difference| u32::from(difference)).sum()
@@ -63,15 +96,10 @@ pub(super) fn distance(a: &Descriptor, b: &Descriptor) -> u32 {
 
 /// Sum of the distances of four pairs of descriptors, at most 16,320.
 #[inline(always)]
-pub(super) fn distance_of_four(a: &[Descriptor; 4], b: [&Descriptor; 4]) -> u32 {
+pub(super) fn distance_of_four(a: &[Descriptor; 4], [e, f, g, h]: [&Descriptor; 4]) -> u32 {
     let wide =
-        |a: &Descriptor, b: &Descriptor| -> u32 { a.iter().zip(b).map(|(&a, &b)| (i32::from(a) - i32::from(b)).unsigned_abs()).sum() };
+        |a: &Descriptor, b: &Descriptor| -> u32 { a.0.iter().zip(&b.0).map(|(&a, &b)| (i32::from(a) - i32::from(b)).unsigned_abs()).sum() };
     // Hidden from the optimiser, `a` is not widened ahead of the loop this stands in, nor that loop turned inside out.
-    a_opaque(a, b, wide)
-}
-
-#[inline(always)]
-fn a_opaque(a: &[Descriptor; 4], [e, f, g, h]: [&Descriptor; 4], wide: impl Fn(&Descriptor, &Descriptor) -> u32) -> u32 {
     let [a, b, c, d] = core::hint::black_box(a);
     wide(a, e) + wide(b, f) + wide(c, g) + wide(d, h)
 }
@@ -79,7 +107,7 @@ fn a_opaque(a: &[Descriptor; 4], [e, f, g, h]: [&Descriptor; 4], wide: impl Fn(&
 /// Texture of a descriptor: the sum of its gradients' magnitudes.
 #[inline(always)]
 pub(super) fn texture(a: &Descriptor) -> u32 {
-    distance(a, &[FLAT; 16])
+    distance(a, &Descriptor([FLAT; 16]))
 }
 
 #[cfg(test)]
@@ -90,14 +118,30 @@ mod tests {
     #[test]
     fn distances_are_sums_of_absolute_differences() {
         let mut random = Random::new(5);
-        let mut descriptor = |bound: u32| [(); 16].map(|()| (random.below(bound) * (256 / bound)) as u8);
+        let mut descriptor = |bound: u32| Descriptor([(); 16].map(|()| (random.below(bound) * (256 / bound)) as u8));
         for bound in [2, 16, 256].repeat(50) {
             let [a, b, c, d] = [(); 4].map(|()| descriptor(bound));
-            let plain = |a: &Descriptor, b: &Descriptor| -> u32 { a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum() };
+            let plain = |a: &Descriptor, b: &Descriptor| -> u32 { a.0.iter().zip(b.0).map(|(a, b)| u32::from(a.abs_diff(b))).sum() };
             assert_eq!(distance(&a, &b), plain(&a, &b));
             let four = plain(&a, &b) + plain(&b, &c) + plain(&c, &d) + plain(&d, &a);
             assert_eq!(distance_of_four(&[a, b, c, d], [&b, &c, &d, &a]), four);
         }
-        assert_eq!(distance(&[0; 16], &[255; 16]), 4_080);
+        assert_eq!(distance(&Descriptor([0; 16]), &Descriptor([255; 16])), 4_080);
+    }
+
+    #[test]
+    fn a_row_of_descriptors_holds_each_pixels_samples() {
+        let mut random = Random::new(6);
+        let (width, height) = (45, 9);
+        let [du, dv] = [(); 2].map(|()| -> std::vec::Vec<u8> { (0..width * height).map(|_| random.below(256) as u8).collect() });
+        let gradients = Gradients { du: &du, dv: &dv, width, height };
+        let mut row = std::vec![Descriptor([0; 16]); width];
+        assert!(!gradients.describe_row(2, &mut row) && !gradients.describe_row(6, &mut row));
+        assert!(gradients.describe_row(4, &mut row));
+        for u in MARGIN..width - MARGIN {
+            let at = |image: &[u8], (du, dv): (usize, usize)| image[(4 + dv - 2) * width + u + du - 2];
+            assert_eq!(row[u].0[..12], DU.map(|offset| at(&du, offset)));
+            assert_eq!(row[u].0[12..], DV.map(|offset| at(&dv, offset)));
+        }
     }
 }
