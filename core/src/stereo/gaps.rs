@@ -70,3 +70,50 @@ pub(super) fn fill_columns(disparity: &mut [i16], width: usize, filling: Filling
     }
     filled
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::{vec, vec::Vec};
+
+    /// The twin, on one line.
+    fn plain(line: &[i16], filling: Filling) -> Vec<i16> {
+        let mut out = line.to_vec();
+        let known: Vec<usize> = (0..line.len()).filter(|&i| line[i] != NONE).collect();
+        for ends in known.windows(2).filter(|ends| ends[1] - ends[0] - 1 <= filling.width) {
+            out[ends[0] + 1..ends[1]].fill(filling.value(line[ends[0]], line[ends[1]]));
+        }
+        out
+    }
+
+    #[test]
+    fn rows_and_columns_equal_their_plain_twin() {
+        let mut random = Random::new(31);
+        for (width, height, none) in [(40, 23, 2), (17, 60, 5), (1, 30, 3), (30, 1, 3)].repeat(6) {
+            let filling = Filling { width: random.below(9) as usize, discontinuity: 192 };
+            let pixel = |random: &mut Random| if random.below(none) > 0 { NONE } else { random.below(500) as i16 };
+            let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
+
+            let mut rows = image.clone();
+            let filled = fill_rows(&mut rows, width, filling);
+            assert!(rows == image.chunks(width).flat_map(|row| plain(row, filling)).collect::<Vec<_>>());
+            assert_eq!(filled as usize, image.iter().zip(&rows).filter(|(a, b)| a != b).count());
+
+            let mut columns = image.clone();
+            fill_columns(&mut columns, width, filling, &mut vec![0; width]);
+            for u in 0..width {
+                let column = |image: &[i16]| image.iter().skip(u).step_by(width).copied().collect::<Vec<_>>();
+                assert!(column(&columns) == plain(&column(&image), filling));
+            }
+        }
+    }
+
+    #[test]
+    fn one_surface_gets_the_mean_and_two_the_farther() {
+        let filling = Filling { width: 3, discontinuity: 192 };
+        let mut row = [640, NONE, NONE, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE];
+        assert_eq!(fill_rows(&mut row, 12, filling), 3);
+        assert_eq!(row, [640, 670, 670, 700, 100, 100, NONE, NONE, NONE, NONE, 100, NONE]);
+    }
+}

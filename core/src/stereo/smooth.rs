@@ -56,3 +56,57 @@ pub(super) fn mean_along_columns(from: &[i16], width: usize, first: usize, to: &
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::{vec, vec::Vec};
+
+    /// The twin: wide integers, one pixel at a time; division rounds half up.
+    fn plain(image: &[i16], step: usize, at: usize, i: usize, length: usize) -> i16 {
+        if at < REACH || at + REACH >= length || image[i] == NONE {
+            return image[i];
+        }
+        let (mut numerator, mut denominator) = (0i64, 0i64);
+        for k in 0..=2 * REACH {
+            let difference = i64::from(image[i + k * step - REACH * step]) - i64::from(image[i]);
+            let weight = (i64::from(CUT) - difference.abs().min(i64::from(CUT))) / 4;
+            numerator += weight * difference;
+            denominator += weight;
+        }
+        image[i] + (2 * numerator + denominator).div_euclid(2 * denominator) as i16
+    }
+
+    #[test]
+    fn equals_wide_integers_on_edges_holes_and_noise() {
+        let mut random = Random::new(41);
+        for (width, height) in [(37, 21), (8, 8), (9, 9), (64, 5)].repeat(5) {
+            let base = [0, 40 * 64, 255 * 64 - 400];
+            let image: Vec<i16> = (0..width * height)
+                .map(|i| if random.below(9) == 0 { NONE } else { base[i % width / 7 % 3] + random.below(400) as i16 })
+                .collect();
+            let mut rows = vec![0; image.len()];
+            mean_along_rows(&image, width, &mut rows);
+            let mut columns = vec![0; image.len()];
+            mean_along_columns(&image, width, 0, &mut columns);
+            for i in 0..image.len() {
+                let (u, v) = (i % width, i / width);
+                assert_eq!(rows[i], plain(&image, 1, u, i, width));
+                assert_eq!(columns[i], plain(&image, width, v, i, height));
+            }
+        }
+    }
+
+    #[test]
+    fn the_extremes_of_a_step_do_not_overflow() {
+        for difference in -600..=600i16 {
+            let mut row = [8_000 + difference; 9];
+            row[4] = 8_000;
+            let mut out = [0; 9];
+            mean_along_rows(&row, 9, &mut out);
+            assert!((out[4] - 8_000).abs() <= difference.abs(), "{difference}: {}", out[4]);
+            assert_eq!(out[4], plain(&row, 1, 4, 4, 9));
+        }
+    }
+}

@@ -100,3 +100,52 @@ fn find_segments(disparity: &[i16], width: usize, similarity: i16, runs: &mut Ru
         above = row;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::{vec, vec::Vec};
+
+    /// The twin: flood fill from each pixel.
+    fn plain(disparity: &[i16], width: usize, similarity: i16, smallest: usize) -> Vec<i16> {
+        let mut out = disparity.to_vec();
+        let mut seen = vec![false; out.len()];
+        for start in 0..out.len() {
+            if seen[start] || disparity[start] == NONE {
+                continue;
+            }
+            let (mut segment, mut next) = (vec![start], 0);
+            seen[start] = true;
+            while let Some(&i) = segment.get(next) {
+                next += 1;
+                let u = i % width;
+                let beside = [(u > 0).then(|| i - 1), (u + 1 < width).then_some(i + 1), i.checked_sub(width), Some(i + width)];
+                for j in beside.into_iter().flatten().filter(|&j| j < disparity.len()) {
+                    if !seen[j] && disparity[j] != NONE && disparity[i].abs_diff(disparity[j]) <= similarity as u16 {
+                        seen[j] = true;
+                        segment.push(j);
+                    }
+                }
+            }
+            if segment.len() < smallest {
+                segment.into_iter().for_each(|i| out[i] = NONE);
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn equals_a_flood_fill_on_noise_of_every_roughness() {
+        let mut random = Random::new(21);
+        for (width, height, levels, smallest) in [(31, 17, 3, 5), (40, 30, 6, 12), (64, 9, 2, 30), (1, 50, 3, 4), (50, 1, 3, 4)].repeat(8) {
+            let pixel = |random: &mut Random| if random.below(6) == 0 { NONE } else { random.below(levels) as i16 * 64 };
+            let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
+            let mut fast = image.clone();
+            let blanked = remove_speckles(&mut fast, width, 64, smallest, &mut vec![0; image.len()], &mut vec![0; 2 * width]);
+            assert!(fast == plain(&image, width, 64, smallest as usize));
+            let gone = image.iter().zip(&fast).filter(|(a, b)| a != b).count();
+            assert_eq!(blanked as usize, gone);
+        }
+    }
+}

@@ -1,6 +1,8 @@
-//! Whole pairs through the matcher.
+//! Whole pairs through the matcher: analytic scenes with closed answers, input that must not be believed, and real clips.
 
 mod clips;
+mod scenes;
+mod trouble;
 
 use super::*;
 use crate::{Serial, memory::Carver};
@@ -24,19 +26,23 @@ pub(super) fn capacity(image_width: usize, image_height: usize) -> Capacity {
     Capacity { image_width, image_height, ..Capacity::TINY }
 }
 
-/// Aligned zeroed bytes.
-pub(super) fn slab(bytes: usize) -> Box<[u32]> {
-    vec![0u32; bytes.div_ceil(4) + 16].into_boxed_slice()
+/// Runs `work` on a matcher in a slab of exactly its size.
+pub(super) fn with_matcher<R>(capacity: &Capacity, work: impl FnOnce(&mut StereoMatcher<'_>) -> R) -> R {
+    let bytes = StereoMatcher::bytes(capacity);
+    let mut memory: Box<[u8]> = vec![0xA5; bytes + crate::memory::SLAB_ALIGN].into_boxed_slice();
+    let skip = memory.as_ptr().align_offset(crate::memory::SLAB_ALIGN);
+    let mut carver = Carver::new(&mut memory[skip..skip + bytes], bytes).unwrap();
+    let mut matcher = StereoMatcher::carve(capacity, &mut carver).unwrap();
+    assert_eq!(carver.footprint().bytes(), bytes, "what was cut is what was promised");
+    work(&mut matcher)
 }
 
-/// Runs the matcher on one pair, in a slab of exactly its size.
+/// The report and the disparities of one pair, 1/256 px.
 pub(super) fn disparity<E: Executor>(config: &StereoConfig, left: &Grey, right: &Grey, executor: &E) -> (StereoReport, Vec<u16>) {
-    let capacity = capacity(left.width, left.height);
-    let mut memory = slab(StereoMatcher::bytes(&capacity));
-    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut memory);
-    let skip = bytes.as_ptr().align_offset(crate::memory::SLAB_ALIGN);
-    let mut carver = Carver::new(&mut bytes[skip..], StereoMatcher::bytes(&capacity)).unwrap();
-    let mut matcher = StereoMatcher::carve(&capacity, &mut carver).unwrap();
-    let report = matcher.compute(config, left.view(), right.view(), executor);
-    (report, matcher.disparity_q8().rows().flatten().copied().collect())
+    with_matcher(&capacity(left.width, left.height), |matcher| {
+        let report = matcher.compute(config, left.view(), right.view(), executor);
+        let view = matcher.disparity_q8();
+        assert_eq!((view.width(), view.height()), (left.width, left.height));
+        (report, view.rows().flatten().copied().collect())
+    })
 }
