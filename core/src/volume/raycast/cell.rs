@@ -1,7 +1,7 @@
 //! One cell of the lattice as a ray meets it: the trilinear field between its corners.
 
-use super::eye::Ray;
-use crate::geometry::scalar::{clamp_f32, max_f32, min_f32};
+use super::eye::{AXES, Depth, Ray, depth_in_m};
+use crate::geometry::scalar::{max_f32, min_f32};
 
 /// Most steps towards a root; the first hits it where the field is linear.
 const MAX_REFINEMENTS: usize = 6;
@@ -92,35 +92,45 @@ impl Field {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Passage {
     from: [f32; 3],
-    across: [f32; 3],
+    to: [f32; 3],
 }
 
 impl Passage {
-    /// Coordinates on a wall are exactly 0 or 1, so that the two cells at a wall compute the same value there.
+    /// The way through `cell` between two depths. Coordinates on a wall are exactly 0 or 1.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn new(ray: &Ray, cell: [i32; 3], depth_m: [f32; 2]) -> Self {
-        let at = |depth: f32| {
-            [0, 1, 2].map(|axis| {
-                let inside = clamp_f32(ray.origin[axis] - cell[axis] as f32 + ray.slope[axis] * depth, 0.0, 1.0);
-                if depth == ray.crossing(axis, cell[axis]) {
+    pub fn new(ray: &Ray, cell: [i32; 3], depths: [Depth; 2]) -> Self {
+        let mut ends = [[0.0; 3]; 2];
+        for (end, depth) in ends.iter_mut().zip(depths) {
+            for axis in AXES {
+                end[axis] = if ray.crossing(axis, cell[axis]) == depth {
                     0.0
-                } else if depth == ray.crossing(axis, cell[axis] + 1) {
+                } else if ray.crossing(axis, cell[axis] + 1) == depth {
                     1.0
                 } else {
-                    inside
-                }
-            })
-        };
-        let (from, to) = (at(depth_m[0]), at(depth_m[1]));
-        Self { from, across: [to[0] - from[0], to[1] - from[1], to[2] - from[2]] }
+                    within(ray, axis, cell, depth_in_m(depth))
+                };
+            }
+        }
+        let [from, to] = ends;
+        Self { from, to }
     }
 
     /// The point a share of the way through.
     #[inline]
     pub fn at(&self, share: f32) -> [f32; 3] {
-        let [x, y, z] = self.from;
-        [x + self.across[0] * share, y + self.across[1] * share, z + self.across[2] * share]
+        let ([x, y, z], [to_x, to_y, to_z]) = (self.from, self.to);
+        [x + (to_x - x) * share, y + (to_y - y) * share, z + (to_z - z) * share]
+    }
+
+    /// Where the ray enters.
+    pub fn from(&self) -> [f32; 3] {
+        self.from
+    }
+
+    /// Where the ray leaves.
+    pub fn to(&self) -> [f32; 3] {
+        self.to
     }
 
     /// The share of the way at which `field` falls from `first` > 0 to 0, where it ends at `last` <= 0: false position, which halves the
@@ -150,6 +160,23 @@ impl Passage {
     }
 }
 
+/// The ray's coordinate in a cell, held within it.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+pub(super) fn within(ray: &Ray, axis: usize, cell: [i32; 3], depth_m: f32) -> f32 {
+    let offset = ray.origin[axis] - cell[axis] as f32;
+    min_f32(max_f32(offset + ray.slope[axis] * depth_m, 0.0), 1.0)
+}
+
+/// The trilinear mean of the corners at a point: the field's value, for one look.
+#[inline(always)]
+pub(super) fn mean(corners: &[f32; 8], [x, y, z]: [f32; 3]) -> f32 {
+    let [a, b, c, d, e, f, g, h] = *corners;
+    let (a, b, c, d) = (a + (e - a) * z, b + (f - b) * z, c + (g - c) * z, d + (h - d) * z);
+    let (a, b) = (a + (c - a) * y, b + (d - b) * y);
+    a + (b - a) * x
+}
+
 /// What each corner counts at a point of the cell.
 #[inline]
 pub(super) fn shares([x, y, z]: [f32; 3]) -> [f32; 8] {
@@ -174,7 +201,7 @@ mod tests {
             }
             let point = [(); 3].map(|()| random.below(1_000) as f32 / 1_000.0);
             let mean: f32 = shares(point).iter().zip(corners).map(|(share, value)| share * value).sum();
-            assert!((field.at(point) - mean).abs() < 0.05);
+            assert!((field.at(point) - mean).abs() < 0.05 && (super::mean(&corners, point) - mean).abs() < 0.05);
             for axis in 0..3 {
                 let mut beside = point;
                 beside[axis] += 0.5;

@@ -7,8 +7,9 @@ use crate::{
 
 /// Farthest block from the camera's that can be looked at, on each axis: what the table's keys can tell apart.
 pub(super) const MAX_REACH_BLOCKS: i32 = 4_000;
-/// Rays nearly along a plane of the lattice are bent by this much, so that all quotients are finite.
-const LEAST_SLOPE: f32 = 1e-9;
+/// Rays nearly along a plane of the lattice are bent to this slope, in lattice units per m: a thousandth of a cell in 100 m, and the
+/// depth of no plane within reach overflows 64 bits.
+const LEAST_SLOPE: f32 = 1e-5;
 /// Slack on projected boxes, px: rounding never takes a box from a pixel it touches.
 const SLACK_PX: f32 = 0.02;
 
@@ -113,66 +114,100 @@ impl Eye {
 
     /// The ray through a pixel.
     #[inline]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     pub fn ray(&self, u: usize, v: usize) -> Ray {
         let [corner, column, row] = self.rays;
         let (u, v) = (u as f32, v as f32);
-        let mut slope = [0.0; 3];
-        for (slope, ((corner, row), column)) in slope.iter_mut().zip(corner.into_iter().zip(row).zip(column)) {
-            let exact = corner + row * v + column * u;
-            *slope = if exact > -LEAST_SLOPE && exact < LEAST_SLOPE { LEAST_SLOPE } else { exact };
+        let mut ray = Ray { origin: self.origin, slope: [0.0; 3], zero: [0; 3], per_plane: [0; 3] };
+        for axis in AXES {
+            let exact = corner[axis] + row[axis] * v + column[axis] * u;
+            let slope = if exact > -LEAST_SLOPE && exact < LEAST_SLOPE { LEAST_SLOPE } else { exact };
+            let per_plane = f64::from(1.0 / slope) * DEPTH_ONE_M;
+            ray.slope[axis] = slope;
+            ray.per_plane[axis] = per_plane as i64;
+            ray.zero[axis] = (per_plane * f64::from(-self.origin[axis])) as i64;
         }
-        Ray {
-            origin: self.origin,
-            slope,
-            depth_per_cell: slope.map(|s| 1.0 / s),
-            forward: slope.map(|s| s > 0.0),
-        }
+        ray
     }
 }
 
-/// A ray through the lattice, by depth in metres.
+/// The axes of the lattice. Loops over them keep arrays in registers, which `map` on arrays does not.
+pub(super) const AXES: [usize; 3] = [0, 1, 2];
+
+/// A depth in units of 2^-28 m. In integers the depths of lattice planes come out the same whether they are multiplied or added up, so
+/// that a ray meets the same cells at the same depths wherever its march begins.
+pub(super) type Depth = i64;
+
+const DEPTH_ONE_M: f64 = (1u64 << 28) as f64;
+
+/// Metres as a [`Depth`].
+#[inline]
+pub(super) fn depth_from_m(depth_m: f32) -> Depth {
+    (f64::from(depth_m) * DEPTH_ONE_M) as i64
+}
+
+/// A [`Depth`] in metres.
+#[inline]
+pub(super) fn depth_in_m(depth: Depth) -> f32 {
+    const UNIT_M: f32 = (1.0 / DEPTH_ONE_M) as f32;
+    depth as f32 * UNIT_M
+}
+
+/// A ray through the lattice.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray {
     pub origin: [f32; 3],
     /// Lattice units per metre of depth.
     pub slope: [f32; 3],
-    /// Metres of depth per lattice unit.
-    pub depth_per_cell: [f32; 3],
-    /// Whether the ray runs towards larger coordinates.
-    pub forward: [bool; 3],
+    /// Depth at which plane 0 is crossed.
+    zero: [Depth; 3],
+    /// Depth from plane to plane, negative where the ray runs towards smaller coordinates.
+    per_plane: [Depth; 3],
 }
 
 impl Ray {
-    /// Depth at which the ray crosses lattice plane `plane` of an axis. It never decreases along the ray, which makes the order of cells
-    /// the same wherever a march begins.
-    #[inline]
+    /// Depth at which the ray crosses lattice plane `plane` of an axis.
+    #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn crossing(&self, axis: usize, plane: i32) -> f32 {
-        (plane as f32 - self.origin[axis]) * self.depth_per_cell[axis]
+    pub fn crossing(&self, axis: usize, plane: i32) -> Depth {
+        self.zero[axis] + i64::from(plane) * self.per_plane[axis]
     }
 
-    /// The cell in which the ray is just after `depth_m`: all planes crossed up to there are behind it.
-    #[inline]
+    /// 1 where the ray runs towards larger coordinates, so that it leaves a cell by the upper wall; else 0.
+    #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn cell_at(&self, depth_m: f32) -> [i32; 3] {
-        [0, 1, 2].map(|axis| {
-            let cell = floor_i32(self.origin[axis] + self.slope[axis] * depth_m);
-            let (ahead, step) = if self.forward[axis] { (1, 1) } else { (0, -1) };
-            if self.crossing(axis, cell + ahead) <= depth_m {
-                cell + step
-            } else if self.crossing(axis, cell + 1 - ahead) > depth_m {
-                cell - step
-            } else {
-                cell
-            }
-        })
+    pub fn ahead(&self, axis: usize) -> i32 {
+        i32::from(self.per_plane[axis] > 0)
     }
 
-    /// Where the ray leaves the cuboid of cells `low..low + side`.
+    /// Depth from plane to plane, positive.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    pub fn stride(&self, axis: usize) -> Depth {
+        self.per_plane[axis].abs()
+    }
+
+    /// The cell in which the ray is just after `depth`: all planes crossed up to there are behind it.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn leaves(&self, low: [i32; 3], side: i32) -> f32 {
-        let [x, y, z] = [0, 1, 2].map(|axis| self.crossing(axis, low[axis] + if self.forward[axis] { side } else { 0 }));
-        min_f32(min_f32(x, y), z)
+    pub fn cell_at(&self, depth: Depth) -> [i32; 3] {
+        let depth_m = depth_in_m(depth);
+        let mut cell = [0; 3];
+        for axis in AXES {
+            let guess = floor_i32(self.origin[axis] + self.slope[axis] * depth_m);
+            let ahead = self.ahead(axis);
+            let late = i32::from(self.crossing(axis, guess + ahead) <= depth);
+            let early = i32::from(self.crossing(axis, guess + 1 - ahead) > depth);
+            cell[axis] = guess + (late - early) * (2 * ahead - 1);
+        }
+        cell
+    }
+
+    /// Where the ray leaves a block.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    pub fn leaves(&self, block: [i32; 3]) -> Depth {
+        let out = |axis: usize| self.crossing(axis, (block[axis] + self.ahead(axis)) * BLOCK_SIDE as i32);
+        out(0).min(out(1)).min(out(2))
     }
 }

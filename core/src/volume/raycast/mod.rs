@@ -10,7 +10,7 @@
 //! that have corners on both sides (`signs`, `surface`), and these to the range of depths each eight pixels can meet (`ranges`). A cell
 //! without its bit cannot stop a ray, so leaving it out changes nothing; the tests compare with a walk through every cell.
 //!
-//! Memory: 11 bytes a pixel for the images, 8 bytes for eight pixels, 236 bytes per `visible_blocks` and 8 bytes for the next power of two
+//! Memory: 11 bytes a pixel for the images, 8 bytes for eight pixels, 300 bytes per `visible_blocks` and 8 bytes for the next power of two
 //! of twice their number. Time: linear in blocks in view and in pixels.
 //!
 //! When more blocks are in view than `visible_blocks`, the picture ends nearer, and the report says where.
@@ -95,13 +95,7 @@ impl<'b> Band<'b> {
         let (normal, normal_low) = self.normal.split_at_mut(at);
         let (colour, colour_low) = self.colour.split_at_mut(at);
         let (weight, weight_low) = self.weight.split_at_mut(at);
-        let low = Band {
-            first_row: self.first_row + rows,
-            depth_m: depth_low,
-            normal: normal_low,
-            colour: colour_low,
-            weight: weight_low,
-        };
+        let low = Band { first_row: self.first_row + rows, depth_m: depth_low, normal: normal_low, colour: colour_low, weight: weight_low };
         (Band { first_row: self.first_row, depth_m, normal, colour, weight }, low)
     }
 }
@@ -153,15 +147,9 @@ impl<'s> Raycaster<'s> {
         }
         let marcher = Marcher { surface: &self.surface, blocks: &volume.blocks, eye: &eye, min_weight };
         let ranges = &self.ranges;
-        let whole = Band {
-            first_row: 0,
-            depth_m: self.depth_m,
-            normal: self.normal,
-            colour: self.colour,
-            weight: self.weight,
-        }
-        .split(view.height, view.width)
-        .0;
+        let whole = Band { first_row: 0, depth_m: self.depth_m, normal: self.normal, colour: self.colour, weight: self.weight }
+            .split(view.height, view.width)
+            .0;
         let rows = view.height.div_ceil(4);
         let (high, low) = whole.split(2 * rows, view.width);
         let ((a, b), (c, d)) = (high.split(rows, view.width), low.split(rows, view.width));
@@ -209,7 +197,7 @@ impl<'s> Raycaster<'s> {
         footprint.set_use::<[i32; 3]>("raycast.local", now, peak);
         footprint.set_use::<[u32; 8]>("raycast.slots", now, peak);
         footprint.set_use::<[signs::Layers; 2]>("raycast.signs", now, peak);
-        footprint.set_use::<signs::Layers>("raycast.cells", now, peak);
+        footprint.set_use::<signs::Cells>("raycast.cells", now, peak);
     }
 }
 

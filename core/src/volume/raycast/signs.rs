@@ -3,6 +3,7 @@
 //! A layer (one z) of a block is a 64-bit word: bit `x + 8 y`.
 
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS};
+use bytemuck::{Pod, Zeroable};
 
 /// One bit per lattice point or cell of a block, a word per layer.
 pub(super) type Layers = [u64; BLOCK_SIDE];
@@ -43,35 +44,45 @@ fn packed(flags: &[u8; LAYER]) -> u64 {
     bits
 }
 
-/// The cells of which a corner is set, given the points of the block (0) and of those after it in x (1), y (2), z (4).
-#[inline]
+/// For each cell, its corners combined by `join` (or, and), given the points of the block (0) and of those after it in x (1), y (2), z (4).
+#[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "n is 0 or 4, z below 8")]
-fn touched(points: [&Layers; 8]) -> Layers {
-    let along_x = |own: u64, next: u64| own | (own >> 1 & BUT_LAST_COLUMN) | (next & FIRST_COLUMN) << 7;
+fn joined(points: [Layers; 8], join: impl Fn(u64, u64) -> u64) -> Layers {
+    let along_x = |own: u64, next: u64| join(own, (own >> 1 & BUT_LAST_COLUMN) | (next & FIRST_COLUMN) << 7);
     let layer = |n: usize, z: usize| {
         let own = along_x(points[n][z], points[n + 1][z]);
-        own | own >> 8 | along_x(points[n + 2][z], points[n + 3][z]) << 56
+        join(own, own >> 8 | along_x(points[n + 2][z], points[n + 3][z]) << 56)
     };
     let mut cells = [0; BLOCK_SIDE];
     let mut above = layer(4, 0);
     for (z, cells) in cells.iter_mut().enumerate().rev() {
         let here = layer(0, z);
-        *cells = here | above;
+        *cells = join(here, above);
         above = here;
     }
     cells
 }
 
-/// The cells the surface runs through: with a corner before it and one behind.
-#[inline]
-pub(super) fn crossed(signs: [&[Layers; 2]; 8]) -> Layers {
-    let before = touched(signs.map(|[before, _]| before));
-    let behind = touched(signs.map(|[_, behind]| behind));
-    let mut cells = [0; BLOCK_SIDE];
-    for (cells, (before, behind)) in cells.iter_mut().zip(before.into_iter().zip(behind)) {
-        *cells = before & behind;
+/// Cells of a block, a bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Cells {
+    /// Those the surface runs through: with a corner before it and one behind.
+    pub crossed: Layers,
+    /// Those of which all corners were seen.
+    pub whole: Layers,
+}
+
+/// The cells of a block, given the signs of its points (0) and of those after it in x (1), y (2), z (4).
+pub(super) fn cells(signs: [&[Layers; 2]; 8]) -> Cells {
+    let [mut before, mut behind, mut seen] = [[[0; BLOCK_SIDE]; 8]; 3];
+    for (signs, ((before, behind), seen)) in signs.iter().zip(before.iter_mut().zip(&mut behind).zip(&mut seen)) {
+        [*before, *behind] = **signs;
+        seen.iter_mut().zip(before.iter().zip(behind.iter())).for_each(|(seen, (before, behind))| *seen = before | behind);
     }
-    cells
+    let mut crossed = joined(before, |a, b| a | b);
+    crossed.iter_mut().zip(joined(behind, |a, b| a | b)).for_each(|(crossed, behind)| *crossed &= behind);
+    Cells { crossed, whole: joined(seen, |a, b| a & b) }
 }
 
 #[cfg(test)]
@@ -90,18 +101,20 @@ mod tests {
             }
             weight.iter_mut().flatten().for_each(|value| *value = random.below(9) as u8);
             let signs: [_; 8] = core::array::from_fn(|n| of_block(&sdf[n], &weight[n], 2));
-            let cells = crossed(signs.each_ref());
+            let cells = cells(signs.each_ref());
             for cell in 0..BLOCK_VOXELS {
-                let (mut before, mut behind) = (false, false);
+                let (mut before, mut behind, mut whole) = (false, false, true);
                 for corner in 0..8 {
                     let [x, y, z] = [0, 1, 2].map(|axis| (cell >> (3 * axis) & 7) + (corner >> axis & 1));
                     let block = x / 8 + 2 * (y / 8) + 4 * (z / 8);
                     let voxel = x % 8 + 8 * (y % 8) + 64 * (z % 8);
                     let seen = weight[block][voxel] >= 2;
+                    whole &= seen;
                     before |= seen && sdf[block][voxel] > 0;
                     behind |= seen && sdf[block][voxel] <= 0;
                 }
-                assert_eq!(cells[cell >> 6] >> (cell & 63) & 1 == 1, before && behind);
+                let bit = |layers: &Layers| layers[cell >> 6] >> (cell & 63) & 1 == 1;
+                assert_eq!((bit(&cells.crossed), bit(&cells.whole)), (before && behind, whole));
             }
         }
     }

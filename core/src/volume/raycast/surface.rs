@@ -3,7 +3,10 @@
 //! Made anew for every picture: blocks are culled, their signs turned into bits, the bits of neighbours joined into crossed cells. Then a
 //! ray asks one bit per cell, and most blocks not at all: only those with crossed cells remain in the table.
 
-use super::{eye::Eye, signs};
+use super::{
+    eye::Eye,
+    signs::{self, Cells},
+};
 use crate::{
     executor::{Executor, join4},
     memory::{Capacity, Carver, SlabError, region_bytes},
@@ -23,7 +26,7 @@ pub(super) struct Surface<'s> {
     /// The block's own slot and those of the blocks after it in x (1), y (2), z (4); [`NONE`] where there is none.
     slots: &'s mut [[u32; 8]],
     signs: &'s mut [[signs::Layers; 2]],
-    cells: &'s mut [signs::Layers],
+    cells: &'s mut [Cells],
     /// Keys and entries, an open-addressed hash table with linear probes.
     table: &'s mut [u64],
     len: usize,
@@ -60,7 +63,7 @@ impl<'s> Surface<'s> {
         region_bytes::<[i32; 3]>(entries)
             + region_bytes::<[u32; 8]>(entries)
             + region_bytes::<[signs::Layers; 2]>(entries)
-            + region_bytes::<signs::Layers>(entries)
+            + region_bytes::<Cells>(entries)
             + region_bytes::<u64>(Self::table_len(entries))
     }
 
@@ -83,7 +86,7 @@ impl<'s> Surface<'s> {
         self.index(|_| true);
         self.read_signs(volume, min_weight, executor);
         self.join_neighbours(executor);
-        self.index(|cells| cells.iter().any(|&layer| layer != 0));
+        self.index(|cells| cells.crossed.iter().any(|&layer| layer != 0));
         in_view
     }
 
@@ -129,7 +132,7 @@ impl<'s> Surface<'s> {
     }
 
     /// Fills the table with the entries whose cells are `wanted`.
-    fn index(&mut self, wanted: impl Fn(&signs::Layers) -> bool) {
+    fn index(&mut self, wanted: impl Fn(&Cells) -> bool) {
         let count = self.cells.iter().take(self.len).filter(|cells| wanted(cells)).count();
         let len = Self::table_len(count);
         self.shift = 64 - len.trailing_zeros();
@@ -187,7 +190,7 @@ impl<'s> Surface<'s> {
                     *slot = slots[0];
                 }
             }
-            let cells = signs::crossed(around);
+            let cells = signs::cells(around);
             if let (Some(to), Some(all)) = (self.cells.get_mut(at), self.slots.get_mut(at)) {
                 *to = cells;
                 *all = slots;
@@ -213,9 +216,9 @@ impl<'s> Surface<'s> {
         }
     }
 
-    /// The crossed cells of an entry.
+    /// The cells of an entry.
     #[inline]
-    pub fn cells(&self, entry: usize) -> Option<&signs::Layers> {
+    pub fn cells(&self, entry: usize) -> Option<&Cells> {
         self.cells.get(entry)
     }
 
@@ -227,7 +230,7 @@ impl<'s> Surface<'s> {
 
     /// All blocks in view with their crossed cells, in slot order.
     pub fn blocks(&self) -> impl Iterator<Item = ([i32; 3], &signs::Layers)> {
-        self.local.iter().copied().zip(self.cells.iter()).take(self.len)
+        self.local.iter().copied().zip(self.cells.iter().map(|cells| &cells.crossed)).take(self.len)
     }
 
     /// Blocks in use.
