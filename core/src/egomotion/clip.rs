@@ -39,12 +39,7 @@ fn numbers(path: &Path) -> Option<Vec<f64>> {
 fn rig(path: &Path) -> Option<StereoRig> {
     let values = numbers(path)?;
     let (p0, p1) = (values.get(..12)?, values.get(12..24)?);
-    Some(StereoRig {
-        focal_px: p0[0],
-        center_u_px: p0[2],
-        center_v_px: p0[6],
-        baseline_m: -p1[3] / p1[0],
-    })
+    Some(StereoRig { focal_px: p0[0], center_u_px: p0[2], center_v_px: p0[6], baseline_m: -p1[3] / p1[0] })
 }
 
 fn poses(path: &Path) -> Option<Vec<Matrix4<f64>>> {
@@ -100,9 +95,7 @@ fn judge(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors {
             a += length(&between(truth, i - 1, i));
             b += length(&between(estimate, i - 1, i));
             let e = error(i - 1, i);
-            for k in 0..3 {
-                mean[k] += e[(k, 3)] / (frames - 1) as f64 * 100.0;
-            }
+            for k in 0..3 { mean[k] += e[(k, 3)] / (frames - 1) as f64 * 100.0; }
         }
         println!("path {a:.3} m, estimated {b:.3} m: ratio {:.5}; mean error cm {mean:.3?}", b / a);
     }
@@ -124,10 +117,7 @@ fn judge(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors {
 fn run(name: &str, flow: &SceneFlowConfig, config: &EgomotionConfig) -> Option<Vec<Matrix4<f64>>> {
     let folder = root().join("sequences").join(name);
     let rig = rig(&folder.join("calib.txt"))?;
-    let capacity = Capacity {
-        features: std::env::var("FEAT").map_or(16_000, |x| x.parse().unwrap()),
-        ..Capacity::ONBOARD
-    };
+    let capacity = Capacity { features: std::env::var("FEAT").map_or(16_000, |x| x.parse().unwrap()), ..Capacity::ONBOARD };
     let bytes = FlowMatcher::bytes(&capacity) + Estimator::bytes(&capacity);
     let mut slab: Vec<[u64; 8]> = vec![[0; 8]; bytes / 64 + 1];
     let slab: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
@@ -155,9 +145,7 @@ fn run(name: &str, flow: &SceneFlowConfig, config: &EgomotionConfig) -> Option<V
             let chosen: std::collections::HashSet<u32> = matcher.selection().iter().copied().collect();
             for (i, m) in matcher.refined().iter().enumerate() {
                 let all = [m.previous_left, m.previous_right, m.current_left, m.current_right];
-                for x in all.as_flattened() {
-                    text += &format!("{x} ");
-                }
+                for x in all.as_flattened() { text += &format!("{x} "); }
                 text += &format!("{}\n", u8::from(chosen.contains(&(i as u32))));
             }
             fs::write(format!("{dir}/{name}_{frame:03}.txt"), text).unwrap();
@@ -216,34 +204,15 @@ fn experiment() {
     let var = |name: &str| std::env::var(name).ok().and_then(|x| x.parse::<f64>().ok());
     let mut flow = SceneFlowConfig::default();
     let mut config = EgomotionConfig::default();
-    if let Some(x) = var("THR") {
-        flow.response_min = x as u16
-    }
-    if let Some(x) = var("BUCKET") {
-        flow.bucket_px = x as u16
-    }
-    if let Some(x) = var("PER") {
-        flow.bucket_matches = x as u8
-    }
-    if let Some(x) = var("SUP") {
-        flow.support_min = x as u8
-    }
-    if let Some(x) = var("TOL") {
-        flow.flow_tolerance_px = x as f32;
-        flow.disparity_tolerance_px = x as f32
-    }
-    if let Some(x) = var("REFINE") {
-        flow.refine = x > 0.0
-    }
-    if let Some(x) = var("IN") {
-        config.inlier_px = x as f32
-    }
-    if let Some(x) = var("IN2") {
-        config.refined_inlier_px = x as f32
-    }
-    if let Some(x) = var("SIDE") {
-        config.side_knee = x
-    }
+    if let Some(x) = var("THR") { flow.response_min = x as u16 }
+    if let Some(x) = var("BUCKET") { flow.bucket_px = x as u16 }
+    if let Some(x) = var("PER") { flow.bucket_matches = x as u8 }
+    if let Some(x) = var("SUP") { flow.support_min = x as u8 }
+    if let Some(x) = var("TOL") { flow.flow_tolerance_px = x as f32; flow.disparity_tolerance_px = x as f32 }
+    if let Some(x) = var("REFINE") { flow.refine = x > 0.0 }
+    if let Some(x) = var("IN") { config.inlier_px = x as f32 }
+    if let Some(x) = var("IN2") { config.refined_inlier_px = x as f32 }
+    if let Some(x) = var("SIDE") { config.side_knee = x }
     for clip in ["06", "r1405"] {
         let trajectory = run(clip, &flow, &config).unwrap();
         let truths = if clip == "06" { vec!["06.txt"] } else { vec!["r1405.txt", "r1405.vo.txt"] };

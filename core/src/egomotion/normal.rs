@@ -29,17 +29,16 @@ pub(super) struct Posed {
 
 impl Posed {
     pub(super) fn new(motion: &Transform) -> Self {
-        Self {
-            rotation: motion.rotation.to_rotation_matrix().into_inner(),
-            translation: motion.translation.vector,
-        }
+        Self { rotation: motion.rotation.to_rotation_matrix().into_inner(), translation: motion.translation.vector }
     }
 
     /// Where a point is in the current camera; `None` behind it.
     fn carry(&self, point: &Point) -> Option<[f64; 3]> {
         let (r, t, [x, y, z]) = (&self.rotation, &self.translation, point.xyz);
         let depth = r.m31 * x + r.m32 * y + r.m33 * z + t.z;
-        (depth > DEPTH_MIN_M).then(|| [r.m11 * x + r.m12 * y + r.m13 * z + t.x, r.m21 * x + r.m22 * y + r.m23 * z + t.y, depth])
+        (depth > DEPTH_MIN_M).then(|| {
+            [r.m11 * x + r.m12 * y + r.m13 * z + t.x, r.m21 * x + r.m22 * y + r.m23 * z + t.y, depth]
+        })
     }
 }
 

@@ -58,7 +58,8 @@ const fn sparse(capacity: &Capacity) -> usize {
 impl<'s> Camera<'s> {
     pub(super) const fn bytes(capacity: &Capacity) -> usize {
         let pixels = capacity.pixels();
-        let frame = region_bytes::<u8>(pixels) + Features::bytes(capacity, capacity.features) + Features::bytes(capacity, sparse(capacity));
+        let frame =
+            region_bytes::<u8>(pixels) + Features::bytes(capacity, capacity.features) + Features::bytes(capacity, sparse(capacity));
         2 * frame
             + region_bytes::<u16>(pixels)
             + 2 * region_bytes::<i16>(pixels)
@@ -124,10 +125,6 @@ impl<'s> Camera<'s> {
         let mut dropped = found.saturating_sub(self.candidates.len());
         dropped += frame.dense.fill(candidates.clone(), gradient, width, height);
         dropped += frame.sparse.fill(candidates.filter(|candidate| candidate.sparse == 1), gradient, width, height);
-        FeatureCount {
-            dense: frame.dense.len() as u32,
-            sparse: frame.sparse.len() as u32,
-            dropped: dropped as u32,
-        }
+        FeatureCount { dense: frame.dense.len() as u32, sparse: frame.sparse.len() as u32, dropped: dropped as u32 }
     }
 }

@@ -106,7 +106,9 @@ impl<'s> Features<'s> {
             self.clear();
             return candidates.count();
         };
-        let key = |c: Candidate| (usize::from(c.class) * self.bands + usize::from(c.v) / CELL_V) * self.cells + usize::from(c.u) / CELL_U;
+        let key = |c: Candidate| {
+            (usize::from(c.class) * self.bands + usize::from(c.v) / CELL_V) * self.cells + usize::from(c.u) / CELL_U
+        };
         // Count, turn counts into starts one place to the right, then place: each cell's cursor ends as the next one's start.
         start.fill(0);
         for candidate in kept.clone() {

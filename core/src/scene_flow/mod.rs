@@ -21,3 +21,8 @@ pub use config::SceneFlowConfig;
 pub use matcher::FlowMatcher;
 pub use matches::Match;
 pub use report::{FlowReport, FlowStatus, PassCount};
+
+#[cfg(test)]
+pub(crate) mod room;
+#[cfg(test)]
+pub(crate) mod tests;

@@ -28,12 +28,7 @@ pub(super) fn learn(
     bins: &mut [Reach],
 ) -> usize {
     let (columns, rows) = (width.div_ceil(BIN_PX), height.div_ceil(BIN_PX));
-    let nothing = Reach {
-        to_previous_right: EMPTY,
-        to_current_right: EMPTY,
-        to_current_left: EMPTY,
-        to_previous_left: EMPTY,
-    };
+    let nothing = Reach { to_previous_right: EMPTY, to_current_right: EMPTY, to_current_left: EMPTY, to_previous_left: EMPTY };
     bins.fill(nothing);
     for m in matches {
         let (column, row) = (m.previous_left[0] as usize / BIN_PX, m.previous_left[1] as usize / BIN_PX);

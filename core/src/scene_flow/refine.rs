@@ -7,8 +7,8 @@
 use super::matches::Match;
 
 /// Side of a patch, px.
-const SIDE: usize = 11;
-const HALF: f64 = 5.0;
+const SIDE: usize = 8;
+const HALF: f64 = 4.0;
 const AREA: f64 = (SIDE * SIDE) as f64;
 /// Most steps per image.
 const STEPS: usize = 6;
@@ -86,15 +86,7 @@ impl Template {
             return None;
         }
         let inverse = [vv / determinant, -uv / determinant, uu / determinant];
-        Some(Self {
-            pixel,
-            along,
-            down,
-            mean,
-            share: with.map(|with| with / pattern),
-            inverse,
-            texture,
-        })
+        Some(Self { pixel, along, down, mean, share: with.map(|with| with / pattern), inverse, texture })
     }
 
     /// Where the patch is in another image, begun at (u, v).
@@ -156,7 +148,10 @@ impl Template {
         let down = f64::from(sum_products(&self.down, error)) - self.mean[2] * total - self.share[1] * pattern;
         // Gradients are doubled and errors in 1/32 grey levels.
         let scale = 2.0 / 32.0;
-        [scale * (self.inverse[0] * along + self.inverse[1] * down), scale * (self.inverse[1] * along + self.inverse[2] * down)]
+        [
+            scale * (self.inverse[0] * along + self.inverse[1] * down),
+            scale * (self.inverse[1] * along + self.inverse[2] * down),
+        ]
     }
 }
 

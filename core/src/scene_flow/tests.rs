@@ -1,0 +1,282 @@
+use super::{
+    FlowMatcher, FlowStatus, Match, SceneFlowConfig,
+    bucket::select,
+    cells::{Cells, Shape},
+    circle::{Corners, Reach},
+    features::{DESCRIPTOR, Features, Window},
+    refine::{Images, Pixels, refine},
+    room::{HEIGHT, WIDTH, see},
+    support::support,
+    suppression::{CLASSES, Candidate},
+};
+use crate::{
+    executor::{Executor, Serial},
+    geometry::{Transform, exp},
+    image::View,
+    memory::{Capacity, Carver, Slab},
+    random::Random,
+};
+use nalgebra::Vector3;
+use std::{boxed::Box, vec, vec::Vec};
+
+pub(crate) const CAPACITY: Capacity = Capacity { image_width: WIDTH, image_height: HEIGHT, features: 4_000, matches: 3_000, ..Capacity::TINY };
+const BYTES: usize = FlowMatcher::bytes(&CAPACITY);
+
+/// Really at once, to show that it makes no difference.
+pub(crate) struct Threads;
+
+impl Executor for Threads {
+    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
+    where
+        A: FnOnce() -> RA + Send,
+        B: FnOnce() -> RB + Send,
+        RA: Send,
+        RB: Send,
+    {
+        std::thread::scope(|scope| {
+            let b = scope.spawn(b);
+            (a(), b.join().unwrap())
+        })
+    }
+}
+
+pub(crate) fn slab() -> Box<Slab<BYTES>> {
+    Box::new(Slab::ZERO)
+}
+
+fn view(pixels: &[u8]) -> View<'_, u8> {
+    View::new(pixels, WIDTH, HEIGHT).unwrap()
+}
+
+fn forward(metres: f64, turn_rad: f64) -> Transform {
+    exp(Vector3::new(0.0, turn_rad, 0.0), Vector3::new(0.05, 0.0, metres))
+}
+
+#[test]
+fn cuts_exactly_the_bytes_it_names() {
+    let mut slab = slab();
+    let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
+    FlowMatcher::carve(&CAPACITY, &mut carver).unwrap();
+    assert_eq!(carver.footprint().bytes(), BYTES);
+    // The images and all that grows with them: 14 bytes per pixel of the pair, and the lists.
+    let lists = 2 * 5 * 40 * CAPACITY.features + 88 * CAPACITY.matches + 200_000;
+    assert!(BYTES < 24 * CAPACITY.pixels() + lists, "{BYTES}");
+}
+
+#[test]
+fn matches_lie_where_the_room_says_and_two_threads_change_nothing() {
+    let (first, second) = (see(&Transform::identity()), see(&forward(0.4, 0.01)));
+    let mut slabs = [slab(), slab()];
+    let [a, b] = &mut slabs;
+    let mut serial = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut a.0, BYTES).unwrap()).unwrap();
+    let mut joined = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut b.0, BYTES).unwrap()).unwrap();
+    let config = SceneFlowConfig::default();
+    let report = serial.push(&config, view(&first[0]), view(&first[1]), &Serial);
+    assert_eq!(report.status, FlowStatus::First);
+    assert!(serial.sparse().is_empty() && serial.refined().is_empty());
+    joined.push(&config, view(&first[0]), view(&first[1]), &Threads);
+    let report = serial.push(&config, view(&second[0]), view(&second[1]), &Serial);
+    assert_eq!(report, joined.push(&config, view(&second[0]), view(&second[1]), &Threads));
+    assert_eq!(report.status, FlowStatus::Matched);
+    assert!(report.refined > 200 && report.sparse.closed > 30, "{report:?}");
+    let bits = |matches: &[Match]| bytemuck::cast_slice::<Match, u32>(matches).to_vec();
+    assert_eq!(bits(serial.sparse()), bits(joined.sparse()));
+    assert_eq!(bits(serial.refined()), bits(joined.refined()));
+    assert_eq!(serial.selection(), joined.selection());
+    // Rectified: partners stand in one row. Nine of ten within a fifth of a pixel.
+    let level = |m: &&Match| (m.current_left[1] - m.current_right[1]).abs() < 0.2;
+    assert!(serial.refined().iter().filter(level).count() * 10 > serial.refined().len() * 9);
+    assert!(serial.refined().iter().all(|m| m.previous_disparity_px() > 0.0 && m.current_disparity_px() > 0.0));
+}
+
+#[test]
+fn another_size_or_too_large_a_frame_begins_anew() {
+    let mut slab = slab();
+    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap()).unwrap();
+    let config = SceneFlowConfig::default();
+    let pixels = vec![7; (WIDTH + 1) * HEIGHT];
+    let mut push = |left: [usize; 2], right: [usize; 2]| {
+        let image = |[width, height]: [usize; 2]| View::new(&pixels, width, height).unwrap();
+        matcher.push(&config, image(left), image(right), &Serial).status
+    };
+    assert_eq!(push([WIDTH, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::First);
+    assert_eq!(push([WIDTH, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::Matched);
+    assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH - 1, HEIGHT]), FlowStatus::First);
+    assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::Refused);
+    assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH - 1, HEIGHT]), FlowStatus::First);
+    assert_eq!(push([WIDTH + 1, HEIGHT], [WIDTH + 1, HEIGHT]), FlowStatus::Refused);
+}
+
+#[test]
+fn noise_and_the_smallest_images_do_no_harm() {
+    let mut slab = slab();
+    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap()).unwrap();
+    let config = SceneFlowConfig { response_min: 1, support_min: 0, ..SceneFlowConfig::default() };
+    let mut random = Random::new(5);
+    for [width, height] in [[1, 1], [5, 5], [16, 16], [17, 17], [18, 40], [1, HEIGHT], [WIDTH, 1], [WIDTH, HEIGHT], [199, 77]] {
+        for _ in 0..3 {
+            let [left, right] = [(); 2].map(|()| (0..width * height).map(|_| random.next_u32() as u8).collect::<Vec<u8>>());
+            let image = |pixels| View::new(pixels, width, height).unwrap();
+            let report = matcher.push(&config, image(&left), image(&right), &Serial);
+            assert!(report.bucketed <= report.refined && report.refined <= report.dense.closed);
+        }
+    }
+}
+
+#[test]
+fn full_lists_drop_and_count() {
+    const SMALL: Capacity = Capacity { features: 300, matches: 40, ..CAPACITY };
+    let bytes = FlowMatcher::bytes(&SMALL);
+    let mut slab = slab();
+    let mut matcher = FlowMatcher::carve(&SMALL, &mut Carver::new(&mut slab.0, bytes).unwrap()).unwrap();
+    let config = SceneFlowConfig::default();
+    let picture = see(&Transform::identity());
+    matcher.push(&config, view(&picture[0]), view(&picture[1]), &Serial);
+    let report = matcher.push(&config, view(&picture[0]), view(&picture[1]), &Serial);
+    assert_eq!(report.left.dense, 300);
+    assert!(report.left.dropped > 0 && report.dense.dropped > 0, "{report:?}");
+    assert_eq!(report.dense.closed - report.dense.dropped, 40);
+}
+
+/// Features with random descriptors.
+fn scatter<'s>(carver: &mut Carver<'s>, random: &mut Random, count: usize) -> (Features<'s>, Vec<Candidate>) {
+    let mut features = Features::carve(&CAPACITY, carver, count, ["at", "descriptor", "cell"]).unwrap();
+    let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|_| random.next_u32() as u16).collect();
+    let place = |random: &mut Random| Candidate {
+        u: 8 + random.below(WIDTH as u32 - 16) as u16,
+        v: 8 + random.below(HEIGHT as u32 - 16) as u16,
+        class: random.below(CLASSES as u32) as u8,
+        sparse: 0,
+    };
+    let candidates: Vec<Candidate> = (0..count).map(|_| place(random)).collect();
+    assert_eq!(features.fill(candidates.iter().copied(), &gradient, WIDTH, HEIGHT), 0);
+    (features, candidates)
+}
+
+#[test]
+fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
+    let mut slab = slab();
+    let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
+    let mut random = Random::new(8);
+    let (features, candidates) = scatter(&mut carver, &mut random, 500);
+    for class in 0..CLASSES {
+        let members = candidates.iter().filter(|c| usize::from(c.class) == class).count();
+        assert_eq!((0..features.len()).filter(|&i| features.class(i) == class).count(), members);
+        for _ in 0..100 {
+            let [u, v] = [random.below(500) as i32 - 50, random.below(250) as i32 - 50];
+            let window = Window { u_min: u, u_max: u + random.below(90) as i32, v_min: v, v_max: v + random.below(60) as i32 };
+            let sought: [u8; DESCRIPTOR] = std::array::from_fn(|_| random.next_u32() as u8);
+            let inside = |i: &usize| {
+                let [u, v] = features.at(*i).unwrap().map(i32::from);
+                features.class(*i) == class && (window.u_min..=window.u_max).contains(&u) && (window.v_min..=window.v_max).contains(&v)
+            };
+            let sad = |i: &usize| -> u32 {
+                sought.iter().zip(features.descriptor(*i).unwrap()).map(|(a, b)| u32::from(a.abs_diff(*b))).sum()
+            };
+            let expected = (0..features.len()).filter(inside).min_by_key(|i| (sad(i), *i));
+            assert_eq!(features.nearest(class, window, &sought), expected);
+        }
+    }
+}
+
+#[test]
+fn only_circles_that_return_to_their_beginning_close() {
+    let mut slab = slab();
+    let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
+    let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|i| (i as u16).wrapping_mul(40_503)).collect();
+    let mut place = |u: u16, v: u16, twin: bool| {
+        let mut features = Features::carve(&CAPACITY, &mut carver, 4, ["at", "descriptor", "cell"]).unwrap();
+        let candidates = [Candidate { u, v, class: 2, sparse: 0 }, Candidate { u: u + 1, v, class: 2, sparse: 0 }];
+        features.fill(candidates.into_iter().take(1 + usize::from(twin)), &gradient, WIDTH, HEIGHT);
+        features
+    };
+    let images = [place(200, 60, true), place(190, 60, false), place(196, 64, false), place(210, 64, false)];
+    let [previous_left, previous_right, current_right, current_left] = &images;
+    let corners = Corners { previous_left, previous_right, current_right, current_left };
+    let mut traced = [[0; 3]; 4];
+    let config = SceneFlowConfig::default();
+    corners.trace(|_| Reach::widest(&config), &mut traced, &Serial);
+    let mut matches = [Match::default(); 4];
+    // Both features of the first image lead to the same partners, which lead back to one of them.
+    assert_eq!(corners.gather(&traced, &mut matches), 1);
+    assert_eq!(matches[0].current_left, [210.0, 64.0]);
+    // The same circle with the right camera's features to the right of the left one's: behind the camera.
+    let corners = Corners { previous_left: previous_right, previous_right: previous_left, current_right, current_left };
+    corners.trace(|_| Reach::widest(&config), &mut traced, &Serial);
+    assert_eq!(corners.gather(&traced, &mut matches), 0);
+}
+
+/// Matches on a grid that all move alike.
+fn crowd() -> Vec<Match> {
+    let at = |i: usize| [40.0 + 12.0 * (i % 12) as f32, 40.0 + 12.0 * (i / 12) as f32];
+    (0..60)
+        .map(|i| {
+            let [u, v] = at(i);
+            Match {
+                previous_left: [u, v],
+                previous_right: [u - 9.0, v],
+                current_left: [u + 3.0, v + 1.0],
+                current_right: [u - 7.0, v + 1.0],
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_match_that_moves_unlike_its_neighbours_loses_their_support() {
+    let mut slab = slab();
+    let mut cells = Cells::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap()).unwrap();
+    let config = SceneFlowConfig::default();
+    let mut matches = crowd();
+    matches[17].current_left[0] += 6.0;
+    matches[31].previous_right[0] -= 6.0;
+    matches.push(Match { previous_left: [380.0, 150.0], previous_right: [371.0, 150.0], ..matches[0] });
+    let mut keep = vec![9; matches.len()];
+    support(&matches, Shape::new(WIDTH, HEIGHT, 16), &config, &mut cells, &mut vec![[0.0; 4]; 100], &mut keep);
+    let lost: Vec<usize> = (0..matches.len()).filter(|&i| keep[i] == 0).collect();
+    assert_eq!(lost, [17, 31, 60], "the two that disagree and the one that is alone");
+    let all = SceneFlowConfig { support_min: 0, ..config };
+    support(&matches, Shape::new(WIDTH, HEIGHT, 16), &all, &mut cells, &mut vec![[0.0; 4]; 100], &mut keep);
+    assert!(keep.iter().all(|&keep| keep == 1));
+}
+
+#[test]
+fn each_cell_gives_its_best_few() {
+    let mut slab = slab();
+    let mut cells = Cells::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap()).unwrap();
+    let matches = crowd();
+    let score: Vec<f32> = (0..matches.len()).map(|i| (i * 37 % 60) as f32).collect();
+    let shape = Shape::new(WIDTH, HEIGHT, 50);
+    let mut selection = [0; 100];
+    let selected = select(&matches, &score, shape, 2, &mut cells, &mut selection);
+    let mut expected = Vec::new();
+    for row in 0..shape.rows {
+        for column in 0..shape.columns {
+            let mut members: Vec<usize> = (0..matches.len()).filter(|&i| shape.cell(&matches[i]) == [column, row]).collect();
+            members.sort_by(|&a, &b| score[b].total_cmp(&score[a]));
+            expected.extend(members.into_iter().take(2).map(|i| i as u32));
+        }
+    }
+    assert_eq!(&selection[..selected], expected);
+}
+
+#[test]
+fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
+    let texture = |u: f64, v: f64| 100.0 + 40.0 * (u * 0.7).sin() * (v * 0.6).cos() + 25.0 * (u * 0.3 + v * 0.8).sin();
+    let render = |du: f64, dv: f64, gain: f64, offset: f64| -> Vec<u8> {
+        (0..64 * 64).map(|i| (gain * texture(f64::from(i % 64) - du, f64::from(i / 64) - dv) + offset).round() as u8).collect()
+    };
+    let images = [render(0.0, 0.0, 1.0, 0.0), render(-6.3, 0.0, 1.15, 9.0), render(2.45, -1.7, 1.0, 0.0), render(-3.8, -1.62, 1.15, -7.0)];
+    let [previous_left, previous_right, current_left, current_right] =
+        [&images[0], &images[1], &images[2], &images[3]].map(|data| Pixels { data, width: 64 });
+    let coarse = Match { previous_left: [30.0, 31.0], previous_right: [24.0, 31.0], current_left: [33.0, 30.0], current_right: [26.0, 29.0] };
+    let images = Images { previous_left, previous_right, current_left, current_right };
+    let (fine, _) = refine(&coarse, images).unwrap();
+    let near = |found: [f32; 2], u: f32, v: f32| (found[0] - u).abs() < 0.04 && (found[1] - v).abs() < 0.04;
+    assert!(near(fine.previous_right, 23.7, 31.0), "{fine:?}");
+    assert!(near(fine.current_left, 32.45, 29.3), "{fine:?}");
+    assert!(near(fine.current_right, 26.2, 29.38), "{fine:?}");
+    assert!(refine(&Match { current_left: [40.0, 45.0], ..coarse }, images).is_none(), "a lost patch is no match");
+    let flat = Pixels { data: &[50; 64 * 64], width: 64 };
+    assert!(refine(&coarse, Images { previous_left: flat, ..images }).is_none(), "nothing to hold on to");
+}
