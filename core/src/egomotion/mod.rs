@@ -12,3 +12,5 @@ pub use track::Egomotion;
 
 #[cfg(test)]
 mod clip;
+#[cfg(test)]
+mod tests;
