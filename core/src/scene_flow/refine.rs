@@ -11,11 +11,11 @@ const SIDE: usize = 8;
 const HALF: f64 = 4.0;
 const AREA: f64 = (SIDE * SIDE) as f64;
 /// Most steps per image.
-const STEPS: usize = 6;
+const STEPS: usize = 8;
 /// A patch farther than this from where the circle put it is lost, px.
 const FARTHEST_PX: f64 = 1.75;
 /// A step below this is the last one, px.
-const SMALL_STEP_PX: f64 = 0.03;
+const SMALL_STEP_PX: f64 = 0.06;
 /// Smallest eigenvalue of a patch's structure matrix (of doubled gradients) below which it cannot be placed.
 const TEXTURE_MIN: f64 = 2_000.0;
 
