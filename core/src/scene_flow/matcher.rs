@@ -7,7 +7,7 @@ use super::{
     cells::{CELL_MIN_PX, Cells, Shape},
     circle::{Corners, Reach},
     matches::Match,
-    prior::{BIN_PX, bins, learn},
+    prior::Prior,
     refine::{Images, Pixels, refine},
     report::{FlowReport, FlowStatus, PassCount},
     support::{Motion, support},
@@ -30,7 +30,7 @@ pub struct FlowMatcher<'s> {
     last: Option<[usize; 2]>,
     capacity: [usize; 2],
     traced: &'s mut [[u32; 3]],
-    reach: &'s mut [Reach],
+    prior: Prior<'s>,
     cells: Cells<'s>,
     motion: &'s mut [Motion],
     keep: &'s mut [u8],
@@ -92,7 +92,7 @@ impl<'s> FlowMatcher<'s> {
         let matches = capacity.matches;
         2 * Camera::bytes(capacity)
             + region_bytes::<[u32; 3]>(capacity.features)
-            + region_bytes::<Reach>(bins(capacity))
+            + Prior::bytes(capacity)
             + Cells::bytes(capacity)
             + region_bytes::<Motion>(matches)
             + region_bytes::<u8>(matches)
@@ -111,7 +111,7 @@ impl<'s> FlowMatcher<'s> {
             last: None,
             capacity: [capacity.image_width, capacity.image_height],
             traced: carver.cut("scene_flow.circle", capacity.features)?,
-            reach: carver.cut("scene_flow.reach", bins(capacity))?,
+            prior: Prior::carve(capacity, carver)?,
             cells: Cells::carve(capacity, carver)?,
             motion: carver.cut("scene_flow.motion", matches)?,
             keep: carver.cut("scene_flow.keep", matches)?,
@@ -170,8 +170,9 @@ impl<'s> FlowMatcher<'s> {
             report.status = FlowStatus::First;
             return report;
         }
-        let columns = self.sparse_pass(config, size, executor, &mut report.sparse);
-        let closed = self.dense_pass(config, size, columns, executor, &mut report.dense);
+        report.sparse = self.sparse_pass(config, size, executor);
+        let closed;
+        (report.dense, closed) = self.dense_pass(config, size, executor);
         self.refine_supported(config, size, closed);
         report.refined = self.refined_len as u32;
         report.unrefined = closed as u32 - report.dense.unsupported - report.refined;
@@ -182,14 +183,8 @@ impl<'s> FlowMatcher<'s> {
         report
     }
 
-    /// Matches the sparse features and learns from the supported ones where to look. Returns the bins in a row.
-    fn sparse_pass<E: Executor>(
-        &mut self,
-        config: &SceneFlowConfig,
-        [width, height]: [usize; 2],
-        executor: &E,
-        count: &mut PassCount,
-    ) -> usize {
+    /// Matches the sparse features and learns from the supported ones where to look.
+    fn sparse_pass<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], executor: &E) -> PassCount {
         let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
         let corners = Corners {
             previous_left: &left_before.sparse,
@@ -205,25 +200,17 @@ impl<'s> FlowMatcher<'s> {
         let shape = Shape::new(width, height, SPARSE_CELL_PX);
         support(matches, shape, config, &mut self.cells, self.motion, self.keep);
         let kept = matches.iter().zip(&*self.keep).filter(|&(_, &keep)| keep == 1).map(|(m, _)| *m);
-        *count = PassCount {
+        self.prior.learn(kept.clone(), width, height, config);
+        PassCount {
             closed: closed as u32,
             dropped: (closed - self.sparse_len) as u32,
-            unsupported: (self.sparse_len - kept.clone().count()) as u32,
-        };
-        let used = width.div_ceil(BIN_PX) * height.div_ceil(BIN_PX);
-        learn(kept, width, height, config, self.reach.get_mut(..used).unwrap_or(&mut []))
+            unsupported: (self.sparse_len - kept.count()) as u32,
+        }
     }
 
     /// Matches all features within what the sparse pass learned; leaves the matches in `refined` and who is supported in `keep`.
-    /// Returns how many there are.
-    fn dense_pass<E: Executor>(
-        &mut self,
-        config: &SceneFlowConfig,
-        [width, height]: [usize; 2],
-        columns: usize,
-        executor: &E,
-        count: &mut PassCount,
-    ) -> usize {
+    /// Returns its counts and how many there are.
+    fn dense_pass<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], executor: &E) -> (PassCount, usize) {
         let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
         let corners = Corners {
             previous_left: &left_before.dense,
@@ -232,19 +219,15 @@ impl<'s> FlowMatcher<'s> {
             current_left: &left.dense,
         };
         let widest = Reach::widest(config);
-        let reach = &*self.reach;
-        let learned = |[u, v]: [u16; 2]| {
-            let bin = usize::from(v) / BIN_PX * columns + usize::from(u) / BIN_PX;
-            reach.get(bin).copied().unwrap_or(widest)
-        };
-        corners.trace(learned, self.traced, executor);
+        let prior = &self.prior;
+        corners.trace(|at| prior.reach(at).unwrap_or(widest), self.traced, executor);
         let closed = corners.gather(self.traced, self.refined);
         let kept = closed.min(self.refined.len());
         let matches = self.refined.get(..kept).unwrap_or(&[]);
         support(matches, Shape::new(width, height, CELL_MIN_PX), config, &mut self.cells, self.motion, self.keep);
         let supported = self.keep.iter().take(kept).filter(|&&keep| keep == 1).count();
-        *count = PassCount { closed: closed as u32, dropped: (closed - kept) as u32, unsupported: (kept - supported) as u32 };
-        kept
+        let count = PassCount { closed: closed as u32, dropped: (closed - kept) as u32, unsupported: (kept - supported) as u32 };
+        (count, kept)
     }
 
     /// Refines the supported among the first `closed` matches and closes the gaps the others leave.

@@ -48,24 +48,23 @@ pub(super) fn suppress(blob: Field<'_>, corner: Field<'_>, response_min: i16, ex
         return;
     }
     let end = (blob.response.len() / width).saturating_sub(FEATURE_MARGIN);
+    let Some(extremes) = extremes.get_mut(..2 * width) else { return };
     let (low, high) = extremes.split_at_mut(width);
     for top in (FEATURE_MARGIN..end).step_by(BLOCK) {
         let rows = if end - top < BLOCK { end - top } else { BLOCK };
         for (class, field) in [(0, blob), (2, corner)] {
             column_extremes(field, top, rows, low, high);
-            let blocks = |row: &[i16]| FEATURE_MARGIN..row.len() - FEATURE_MARGIN;
-            let pairs = low.get(blocks(low)).unwrap_or(&[]).chunks(BLOCK).zip(high.get(blocks(high)).unwrap_or(&[]).chunks(BLOCK));
-            for (left, (low, high)) in (FEATURE_MARGIN..).step_by(BLOCK).zip(pairs) {
-                let block = Block { left, columns: low.len(), top, rows };
-                let strongest = high.iter().fold(i16::MIN, |best, &x| if x > best { x } else { best });
-                if strongest >= response_min
-                    && let Some(found) = peak_of_block::<1>(field, block, strongest)
+            for left in (FEATURE_MARGIN..width - FEATURE_MARGIN).step_by(BLOCK) {
+                let columns = if width - FEATURE_MARGIN - left < BLOCK { width - FEATURE_MARGIN - left } else { BLOCK };
+                let block = Block { left, columns, top, rows };
+                let (low, high) = (around(low, left), around(high, left));
+                if let Some(strongest) = strongest::<1>(high, columns, response_min)
+                    && let Some(found) = peak_of_block::<1>(field, block, high, strongest)
                 {
                     emit(Candidate { class, ..found });
                 }
-                let strongest = -low.iter().fold(i16::MAX, |best, &x| if x < best { x } else { best });
-                if strongest >= response_min
-                    && let Some(found) = peak_of_block::<-1>(field, block, strongest)
+                if let Some(strongest) = strongest::<-1>(low, columns, response_min)
+                    && let Some(found) = peak_of_block::<-1>(field, block, low, strongest)
                 {
                     emit(Candidate { class: class + 1, ..found });
                 }
@@ -82,6 +81,22 @@ struct Block {
     rows: usize,
 }
 
+/// Columns of a block and [`DENSE_RADIUS`] on each side.
+const AROUND: usize = BLOCK + 2 * DENSE_RADIUS;
+
+/// The columns' extremes in and beside the block that begins at `left`.
+fn around(row: &[i16], left: usize) -> &[i16; AROUND] {
+    const NONE: &[i16; AROUND] = &[0; AROUND];
+    row.get(left - DENSE_RADIUS..).and_then(|row| row.first_chunk()).unwrap_or(NONE)
+}
+
+/// The strongest of the block's columns, if it reaches the threshold.
+fn strongest<const SIGN: i16>(extremes: &[i16; AROUND], columns: usize, response_min: i16) -> Option<i16> {
+    let columns = extremes.iter().skip(DENSE_RADIUS).take(columns);
+    let strongest = columns.fold(i16::MIN, |best, &x| if x * SIGN > best { x * SIGN } else { best });
+    (strongest >= response_min).then_some(strongest)
+}
+
 /// Smallest and largest response of each column over the rows of a block row.
 fn column_extremes(field: Field<'_>, top: usize, rows: usize, low: &mut [i16], high: &mut [i16]) {
     low.fill(i16::MAX);
@@ -94,11 +109,16 @@ fn column_extremes(field: Field<'_>, top: usize, rows: usize, low: &mut [i16], h
     }
 }
 
-/// The first pixel of the block whose `SIGN` times response is `strongest`, if it is a peak.
-fn peak_of_block<const SIGN: i16>(field: Field<'_>, block: Block, strongest: i16) -> Option<Candidate> {
+/// The first pixel of the block whose `SIGN` times response is `strongest`, if it is a peak. `extremes` are those of the columns around.
+fn peak_of_block<const SIGN: i16>(field: Field<'_>, block: Block, extremes: &[i16; AROUND], strongest: i16) -> Option<Candidate> {
     for v in block.top..block.top + block.rows {
         let row = field.response.get(v * field.width + block.left..)?.get(..block.columns)?;
         if let Some(column) = row.iter().position(|&x| x * SIGN == strongest) {
+            // Most candidates fall to a stronger column beside them, before any pixel is read.
+            let beside = extremes.get(column..=column + 2 * DENSE_RADIUS)?;
+            if beside.iter().fold(false, |beaten, &x| beaten | (x * SIGN > strongest)) {
+                return None;
+            }
             let u = block.left + column;
             let peak = is_peak::<SIGN, DENSE_RADIUS>(field, u, v, strongest);
             let sparse = peak && is_peak::<SIGN, SPARSE_RADIUS>(field, u, v, strongest);
@@ -111,14 +131,13 @@ fn peak_of_block<const SIGN: i16>(field: Field<'_>, block: Block, strongest: i16
 /// Whether no response around (u, v) is stronger, nor as strong and earlier.
 fn is_peak<const SIGN: i16, const RADIUS: usize>(field: Field<'_>, u: usize, v: usize, strongest: i16) -> bool {
     let (left, top) = (u.saturating_sub(RADIUS), v.saturating_sub(RADIUS));
-    let right = if u + RADIUS < field.width { u + RADIUS + 1 } else { field.width };
-    for (row, y) in field.response.chunks_exact(field.width).skip(top).take(v + RADIUS + 1 - top).zip(top..) {
-        let around = row.get(left..right).unwrap_or(&[]);
+    let columns = if u + RADIUS < field.width { u + RADIUS + 1 - left } else { field.width - left };
+    for y in top..=v + RADIUS {
+        let Some(row) = field.response.get(y * field.width + left..).and_then(|rest| rest.get(..columns)) else { break };
         // As strong is too strong before (u, v) in scan order, and allowed from there on.
-        let (before, after) = if y < v { (around, [].as_slice()) } else { around.split_at(if y > v { 0 } else { u - left }) };
-        let beaten = before.iter().fold(false, |beaten, &x| beaten | (x * SIGN >= strongest))
-            | after.iter().fold(false, |beaten, &x| beaten | (x * SIGN > strongest));
-        if beaten {
+        let bound = if y < v { strongest } else { strongest + 1 };
+        let beaten = row.iter().fold(false, |beaten, &x| beaten | (x * SIGN >= bound));
+        if beaten || (y == v && row.iter().take(u - left).any(|&x| x * SIGN == strongest)) {
             return false;
         }
     }
