@@ -1,0 +1,56 @@
+//! Where the camera is: along the street at constant speed, with a driver's and a car's small motions.
+
+use dynvox_core::geometry::{StereoRig, Transform, exp};
+use nalgebra::Vector3;
+
+use super::config::StreetConfig;
+use super::draws::Dice;
+use super::path::Stretch;
+use super::raster::Pinhole;
+
+/// Amplitude and frequency of each small motion, two waves each.
+const PITCH: [(f64, f64); 2] = [(0.0040, 0.53), (0.0018, 1.37)];
+const ROLL: [(f64, f64); 2] = [(0.0035, 0.31), (0.0020, 0.97)];
+const YAW: [(f64, f64); 2] = [(0.0080, 0.17), (0.0015, 0.71)];
+const BOUNCE_M: [(f64, f64); 2] = [(0.012, 0.61), (0.006, 1.53)];
+const DRIFT_M: [(f64, f64); 2] = [(0.14, 0.06), (0.03, 0.23)];
+
+/// How far along the street the camera is at a time, m.
+pub fn along_m(config: &StreetConfig, time_s: f64) -> f64 {
+    config.speed_m_s * time_s
+}
+
+/// Where the camera is at a time.
+pub fn t_street_camera(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64) -> Transform {
+    let mut dice = Dice::new(config.seed, 0xCA3E_2A, 0);
+    let mut wave = |parts: [(f64, f64); 2]| {
+        let turn = 2.0 * core::f64::consts::PI;
+        let sum: f64 = parts.iter().map(|&(size, rate)| size * libm::sin(turn * (rate * time_s + dice.unit()))).sum();
+        sum * config.shake
+    };
+    let (pitch, roll, yaw, bounce, drift) = (wave(PITCH), wave(ROLL), wave(YAW), wave(BOUNCE_M), wave(DRIFT_M));
+    let on_road = stretch.t_street_local(along_m(config, time_s), drift, yaw);
+    let height = Vector3::new(0.0, bounce - config.camera_height_m, 0.0);
+    on_road * exp(Vector3::zeros(), height) * exp(Vector3::new(pitch, 0.0, 0.0), Vector3::zeros()) * exp(Vector3::new(0.0, 0.0, roll), Vector3::zeros())
+}
+
+/// The rig of a configured street: KITTI's proportions.
+pub fn rig(config: &StreetConfig) -> StereoRig {
+    StereoRig {
+        focal_px: config.focal_px(),
+        center_u_px: 0.5 * (f64::from(config.width) - 1.0),
+        center_v_px: libm::floor(0.46 * f64::from(config.height)),
+        baseline_m: config.baseline_m,
+    }
+}
+
+/// The rig's cameras for the rasteriser.
+pub fn pinhole(config: &StreetConfig) -> Pinhole {
+    let rig = rig(config);
+    Pinhole {
+        width: config.width as usize,
+        height: config.height as usize,
+        focal_px: rig.focal_px,
+        center_px: (rig.center_u_px, rig.center_v_px),
+    }
+}

@@ -1,0 +1,294 @@
+//! The one place where the street's figures and their defaults stand.
+
+use serde::{Deserialize, Serialize};
+
+/// What the synthetic street looks like, who drives on it, and how its cameras see.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StreetConfig {
+    /// Chooses the street: houses, cars, trees, bends, noise.
+    pub seed: u64,
+    /// Image width, px, 32 to 8192.
+    pub width: u32,
+    /// Image height, px, 32 to 8192.
+    pub height: u32,
+    /// Frames a writer or a run takes; the street itself is endless.
+    pub frames: u32,
+    /// Frames a second, Hz.
+    pub rate_hz: f64,
+    /// Focal length, px; 0.58 of the width, as KITTI's, when absent.
+    pub focal_px: Option<f64>,
+    /// Distance between the cameras, m.
+    pub baseline_m: f64,
+    /// Height of the cameras above the road, m.
+    pub camera_height_m: f64,
+    /// Speed of the camera along the street, m/s.
+    pub speed_m_s: f64,
+    /// Whether the street bends; straight on otherwise.
+    pub curvature: bool,
+    /// Scale of the camera's pitch, roll and bounce; 0 is a rail.
+    pub shake: f64,
+    /// Noise of one colour channel at mid grey, grey levels (1 sigma): half the variance is read noise, half shot noise; 0 is off.
+    pub noise_sigma: f64,
+    /// How much brighter the right camera is, as a share of the light.
+    pub gain_difference: f64,
+    /// Noise of a LiDAR range, m (1 sigma).
+    pub lidar_noise_m: f64,
+    /// Share of parking places that are taken, 0 to 1.
+    pub parked_density: f64,
+    /// Who drives.
+    pub traffic: Traffic,
+}
+
+impl Default for StreetConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            width: 640,
+            height: 192,
+            frames: 120,
+            rate_hz: 10.0,
+            focal_px: None,
+            baseline_m: 0.54,
+            camera_height_m: 1.65,
+            speed_m_s: 9.0,
+            curvature: true,
+            shake: 1.0,
+            noise_sigma: 1.6,
+            gain_difference: 0.03,
+            lidar_noise_m: 0.0,
+            parked_density: 0.6,
+            traffic: Traffic::default(),
+        }
+    }
+}
+
+impl StreetConfig {
+    /// The same street with nobody driving: parked cars only.
+    pub fn static_street() -> Self {
+        Self { traffic: Traffic::None, ..Self::default() }
+    }
+
+    /// Focal length in use, px.
+    pub fn focal_px(&self) -> f64 {
+        self.focal_px.unwrap_or(0.58 * f64::from(self.width))
+    }
+
+    /// What is wrong with the figures, if anything, in one sentence.
+    pub fn problem(&self) -> Option<String> {
+        let positive = [
+            ("rate_hz", self.rate_hz),
+            ("focal_px", self.focal_px()),
+            ("baseline_m", self.baseline_m),
+            ("camera_height_m", self.camera_height_m),
+        ];
+        let held = [
+            ("speed_m_s", self.speed_m_s, 0.0, 60.0),
+            ("shake", self.shake, 0.0, 5.0),
+            ("noise_sigma", self.noise_sigma, 0.0, 50.0),
+            ("gain_difference", self.gain_difference, -0.5, 0.5),
+            ("lidar_noise_m", self.lidar_noise_m, 0.0, 5.0),
+            ("parked_density", self.parked_density, 0.0, 1.0),
+        ];
+        for (name, size) in [("width", self.width), ("height", self.height)] {
+            if !(32..=8192).contains(&size) {
+                return Some(format!("synth.{name} is {size}; it must lie within 32 to 8192 px"));
+            }
+        }
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Some(format!("synth.{name} is {value}; it must be a positive number"));
+            }
+        }
+        for (name, value, low, high) in held {
+            if !(low..=high).contains(&value) {
+                return Some(format!("synth.{name} is {value}; it must lie within {low} to {high}"));
+            }
+        }
+        self.traffic.problem()
+    }
+}
+
+/// Who drives on the street besides the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "mode", rename_all = "snake_case")]
+pub enum Traffic {
+    /// A static street with parked cars.
+    None,
+    /// Scripted cars and a thin endless flow.
+    Moving(MovingTraffic),
+}
+
+impl Default for Traffic {
+    fn default() -> Self {
+        Self::Moving(MovingTraffic::default())
+    }
+}
+
+impl Traffic {
+    fn problem(&self) -> Option<String> {
+        let Self::Moving(moving) = self else { return None };
+        for (name, gap) in [("oncoming_gap_m", moving.oncoming_gap_m), ("overtaking_gap_m", moving.overtaking_gap_m)] {
+            if !(gap == 0.0 || (30.0..=1e6).contains(&gap)) {
+                return Some(format!("synth.traffic.{name} is {gap}; it must be 0 (no such cars) or at least 30 m"));
+            }
+        }
+        let speeds = [moving.oncoming_speed_m_s, moving.overtaking_speed_m_s];
+        if speeds.into_iter().chain(moving.cars.iter().map(|car| car.profile.speed_m_s())).any(|speed| !(0.0..=60.0).contains(&speed)) {
+            return Some("a speed in synth.traffic lies outside 0 to 60 m/s".to_owned());
+        }
+        moving.cars.iter().find_map(|car| match car.profile {
+            SpeedProfile::Starting { acceleration_m_s2: rate, .. } | SpeedProfile::Stopping { deceleration_m_s2: rate, .. }
+                if !(rate.is_finite() && rate > 0.0) =>
+            {
+                Some(format!("an acceleration in synth.traffic is {rate}; it must be a positive number of m/s²"))
+            }
+            _ if !car.start_m.is_finite() => Some("a start_m in synth.traffic is not a number".to_owned()),
+            _ => None,
+        })
+    }
+}
+
+/// Moving traffic: a script and a flow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MovingTraffic {
+    /// Mean distance between oncoming cars, m; 0 for none.
+    pub oncoming_gap_m: f64,
+    /// Speed of the oncoming cars, m/s.
+    pub oncoming_speed_m_s: f64,
+    /// Mean distance between overtaking cars, m; 0 for none.
+    pub overtaking_gap_m: f64,
+    /// Speed of the overtaking cars, m/s.
+    pub overtaking_speed_m_s: f64,
+    /// Cars with a script of their own.
+    pub cars: Vec<ScriptedCar>,
+}
+
+impl Default for MovingTraffic {
+    fn default() -> Self {
+        let car = |kind, lane, to_lane, start_m, profile| ScriptedCar { kind, lane, to_lane, start_m, profile };
+        Self {
+            oncoming_gap_m: 70.0,
+            oncoming_speed_m_s: 8.0,
+            overtaking_gap_m: 90.0,
+            overtaking_speed_m_s: 13.0,
+            cars: vec![
+                car(CarKind::Hatchback, Lane::Ego, None, 40.0, SpeedProfile::Constant { speed_m_s: 12.0 }),
+                car(
+                    CarKind::Saloon,
+                    Lane::ParkedRight,
+                    Some(Lane::Ego),
+                    80.0,
+                    SpeedProfile::Starting { frame: 45, speed_m_s: 11.0, acceleration_m_s2: 2.2 },
+                ),
+                car(
+                    CarKind::Estate,
+                    Lane::Ego,
+                    Some(Lane::ParkedRight),
+                    95.0,
+                    SpeedProfile::Stopping { frame: 70, speed_m_s: 8.0, deceleration_m_s2: 2.0 },
+                ),
+            ],
+        }
+    }
+}
+
+/// One car with a script.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScriptedCar {
+    /// Its body.
+    pub kind: CarKind,
+    /// Where it is at frame 0.
+    pub lane: Lane,
+    /// Where it changes to: at once when it starts driving, just before it stands when it stops. Of the same direction as `lane`.
+    #[serde(default)]
+    pub to_lane: Option<Lane>,
+    /// How far ahead of the camera's start it is at frame 0, m along the street.
+    pub start_m: f64,
+    /// How it drives.
+    pub profile: SpeedProfile,
+}
+
+/// Speed over time; oncoming lanes drive towards the camera's start.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "profile", rename_all = "snake_case", deny_unknown_fields)]
+pub enum SpeedProfile {
+    /// The same speed for ever.
+    Constant {
+        /// Speed, m/s.
+        speed_m_s: f64,
+    },
+    /// Stands until a frame, then gathers speed.
+    Starting {
+        /// First frame at which the brakes are off.
+        frame: u32,
+        /// Speed in the end, m/s.
+        speed_m_s: f64,
+        /// How fast it gathers speed, m/s².
+        acceleration_m_s2: f64,
+    },
+    /// Drives until a frame, then slows to a stand.
+    Stopping {
+        /// First frame at which it brakes.
+        frame: u32,
+        /// Speed before, m/s.
+        speed_m_s: f64,
+        /// How fast it slows, m/s².
+        deceleration_m_s2: f64,
+    },
+}
+
+impl SpeedProfile {
+    fn speed_m_s(&self) -> f64 {
+        match *self {
+            Self::Constant { speed_m_s } | Self::Starting { speed_m_s, .. } | Self::Stopping { speed_m_s, .. } => speed_m_s,
+        }
+    }
+}
+
+/// A strip of the street.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lane {
+    /// The camera's own lane.
+    Ego,
+    /// The lane to its left, same direction.
+    Overtaking,
+    /// The lane beyond, against the camera.
+    Oncoming,
+    /// The parking strip on the camera's side.
+    ParkedRight,
+    /// The parking strip on the other side.
+    ParkedLeft,
+}
+
+/// The bodies there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CarKind {
+    /// A small car with a steep tail.
+    Hatchback,
+    /// Three boxes: bonnet, cabin, boot.
+    Saloon,
+    /// A long roof and a steep tail.
+    Estate,
+    /// High and upright.
+    Offroad,
+    /// A delivery van; its class is van, all others are cars.
+    Van,
+}
+
+impl CarKind {
+    /// All bodies.
+    pub const ALL: [Self; 5] = [Self::Hatchback, Self::Saloon, Self::Estate, Self::Offroad, Self::Van];
+
+    /// Class name in the files' vocabulary.
+    pub const fn class(self) -> &'static str {
+        match self {
+            Self::Van => "van",
+            _ => "car",
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! One frame and its truth.
+
+use dynvox_core::geometry::Transform;
+
+/// A stereo pair and everything true about it. Images are row by row, `width` x `height`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SynthFrame {
+    /// Number of the frame.
+    pub index: u32,
+    /// Time since frame 0, s.
+    pub time_s: f64,
+    /// Image width, px.
+    pub width: usize,
+    /// Image height, px.
+    pub height: usize,
+    /// Left colour image.
+    pub left_rgb: Vec<[u8; 3]>,
+    /// Right colour image.
+    pub right_rgb: Vec<[u8; 3]>,
+    /// Left grey image: integer luma of the colour.
+    pub left_grey: Vec<u8>,
+    /// Right grey image.
+    pub right_grey: Vec<u8>,
+    /// Exact depth along z of the ray through each left pixel's centre, m; 0 where the sky is seen.
+    pub depth_m: Vec<f32>,
+    /// What each left pixel's centre sees: k is `objects[k - 1]`, 0 is no car.
+    pub instances: Vec<u8>,
+    /// Camera to world; the world is the left camera of frame 0.
+    pub t_world_camera: Transform,
+    /// Every car near the camera, seen or not, by rising number.
+    pub objects: Vec<ObjectTruth>,
+}
+
+impl SynthFrame {
+    /// Whether a left pixel sees a car that moves.
+    pub fn is_moving(&self, pixel: usize) -> bool {
+        let instance = self.instances.get(pixel).copied().unwrap_or(0);
+        instance > 0 && self.objects.get(usize::from(instance) - 1).is_some_and(|object| object.moving)
+    }
+}
+
+/// A car's truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectTruth {
+    /// The car's number for ever, over all frames.
+    pub id: u32,
+    /// Its class: `car` or `van`.
+    pub class: &'static str,
+    /// Car to world: x right, y down, z forward, origin in the middle of its footprint on the road.
+    pub t_world_object: Transform,
+    /// Width, height, length of the box around it: x within ±width/2, y within -height..0, z within ±length/2.
+    pub dimensions_m: [f64; 3],
+    /// Whether it drives at this frame.
+    pub moving: bool,
+    /// How fast, m/s.
+    pub speed_m_s: f64,
+}

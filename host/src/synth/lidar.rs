@@ -1,0 +1,205 @@
+//! A spinning LiDAR above the camera: 64 beams, 2000 directions, one revolution without the camera's motion in it.
+//!
+//! Every beam is tested against every triangle that may cross it, so ranges are exact before noise. Axes are the sensor's: x forward,
+//! y left, z up. Time: a few tens of milliseconds a scan.
+
+use dynvox_core::geometry::Transform;
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use super::draws::{hash, unit};
+use super::mesh::Point;
+use super::paint::Spot;
+use super::scene::Scene;
+use super::street::Street;
+
+const BEAMS: usize = 64;
+const DIRECTIONS: usize = 2000;
+/// Work is cut into this many sectors.
+const SECTORS: usize = 10;
+const TOP_DEG: f64 = 2.0;
+const BOTTOM_DEG: f64 = -24.8;
+const RANGE_M: (f64, f64) = (1.0, 80.0);
+/// Place of the sensor in the left camera, m.
+const PLACE_M: [f64; 3] = [0.0, -0.08, -0.27];
+const TURN: f64 = 2.0 * core::f64::consts::PI;
+
+/// A triangle as the beams see it.
+struct Face {
+    /// Barycentric weight of each corner over range, as a plane through the sensor.
+    planes: [Point; 3],
+    thing: u32,
+    triangle: u32,
+    /// First direction and how many.
+    directions: (i64, i64),
+    beams: (usize, usize),
+}
+
+impl Street {
+    /// Sensor to left camera.
+    pub fn t_camera_lidar(&self) -> Transform {
+        let turn = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+        Isometry3::from_parts(Translation3::from(Vector3::from(PLACE_M)), rotation)
+    }
+
+    /// One scan at frame `index`: x forward, y left, z up in metres, and reflectance 0 to 1; beam by beam from the top, each from behind
+    /// over the right side, the front and the left side.
+    pub fn lidar(&self, index: u32) -> Vec<[f32; 4]> {
+        let around = self.surroundings(index);
+        let scene = &around.scene;
+        let faces: Vec<Face> = (0..scene.things.len()).into_par_iter().flat_map_iter(|number| self.faces(scene, number)).collect();
+        let sectors: Vec<Vec<(f64, u32)>> = (0..SECTORS).into_par_iter().map(|sector| scan(&faces, sector)).collect();
+        let width = DIRECTIONS / SECTORS;
+        let mut points = Vec::new();
+        for beam in 0..BEAMS {
+            for direction in 0..DIRECTIONS {
+                let (nearness, face) = sectors[direction / width][beam * width + direction % width];
+                if nearness > 1.0 / RANGE_M.1 && nearness < 1.0 / RANGE_M.0 {
+                    points.push(self.echo(scene, &faces[face as usize], index, (beam, direction), 1.0 / nearness));
+                }
+            }
+        }
+        points
+    }
+
+    fn faces(&self, scene: &Scene, number: usize) -> Vec<Face> {
+        let thing = &scene.things[number];
+        let mesh = thing.mesh(self.bodies());
+        let to_sensor = |place: Point| {
+            let camera = thing.to_camera.point(place) - Vector3::from(PLACE_M);
+            Point::new(camera.z, -camera.x, -camera.y)
+        };
+        if to_sensor(mesh.middle_m).norm() > RANGE_M.1 + mesh.radius_m {
+            return Vec::new();
+        }
+        let places: Vec<Point> = mesh.vertices.iter().map(|vertex| to_sensor(vertex.place_m)).collect();
+        let face = |(triangle, face): (usize, &super::mesh::Triangle)| {
+            let corners = face.corners.map(|corner| places[corner as usize]);
+            let [a, b, c] = corners;
+            let planes = [b.cross(&c), c.cross(&a), a.cross(&b)];
+            let volume = a.dot(&planes[0]);
+            let hidden = volume > 0.0 && !mesh.surfaces[face.surface as usize].two_sided;
+            if volume.abs() < 1e-14 || hidden {
+                return None;
+            }
+            let (directions, beams) = reach(corners)?;
+            Some(Face { planes: planes.map(|plane| plane / volume), thing: number as u32, triangle: triangle as u32, directions, beams })
+        };
+        mesh.triangles.iter().enumerate().filter_map(face).collect()
+    }
+
+    fn echo(&self, scene: &Scene, face: &Face, index: u32, (beam, direction): (usize, usize), range_m: f64) -> [f32; 4] {
+        let ray = ray(beam, direction);
+        let thing = &scene.things[face.thing as usize];
+        let mesh = thing.mesh(self.bodies());
+        let triangle = &mesh.triangles[face.triangle as usize];
+        let shares = face.planes.map(|plane| (plane.dot(&ray) * range_m) as f32);
+        let mix = |value: fn(&super::mesh::Vertex) -> [f32; 3]| {
+            let [a, b, c] = triangle.corners.map(|corner| value(&mesh.vertices[corner as usize]));
+            [0, 1, 2].map(|k| shares[0] * a[k] + shares[1] * b[k] + shares[2] * c[k])
+        };
+        let spread = (0.003 * range_m) as f32;
+        let spot =
+            Spot { surface_m: mix(|vertex| vertex.surface_m), footprint_m: [spread; 3], own_normal: mix(|vertex| vertex.normal) };
+        let painted = self.painter().paint(&mesh.surfaces[triangle.surface as usize], &spot, thing.coat);
+        let [red, green, blue] = painted.tone;
+        let noise_m = self.config().lidar_noise_m;
+        let range_m = if noise_m > 0.0 { range_m + noise_m * normal(self.config().seed, index, (beam, direction)) } else { range_m };
+        let place = ray * range_m;
+        [place.x as f32, place.y as f32, place.z as f32, (0.4 * red + 0.4 * green + 0.2 * blue).clamp(0.0, 1.0)]
+    }
+}
+
+/// A nearly normal draw for one echo.
+fn normal(seed: u64, index: u32, (beam, direction): (usize, usize)) -> f64 {
+    let bits = hash(seed ^ 0x11DA2, i64::from(index), (beam * DIRECTIONS + direction) as i64);
+    let sum: f32 = (0..4).map(|k| unit(((bits >> (16 * k)) as u32) << 16)).sum();
+    f64::from(sum - 2.0) * 1.732
+}
+
+fn elevation(beam: usize) -> f64 {
+    (TOP_DEG + (BOTTOM_DEG - TOP_DEG) * beam as f64 / (BEAMS - 1) as f64) * (TURN / 360.0)
+}
+
+/// Azimuth of a direction: direction 0 looks backwards.
+fn azimuth(direction: f64) -> f64 {
+    TURN * ((direction + 0.5) / DIRECTIONS as f64 - 0.5)
+}
+
+fn ray(beam: usize, direction: usize) -> Point {
+    let (up, around) = (elevation(beam), azimuth(direction as f64));
+    Point::new(libm::cos(up) * libm::cos(around), libm::cos(up) * libm::sin(around), libm::sin(up))
+}
+
+/// Directions and beams a triangle may meet, a little more rather than less.
+fn reach(corners: [Point; 3]) -> Option<((i64, i64), (usize, usize))> {
+    let angles = corners.map(|corner| libm::atan2(corner.y, corner.x));
+    let turns = angles.map(|angle| {
+        let turn = angle - angles[0];
+        turn - TURN * libm::round(turn / TURN)
+    });
+    let (low, high) = turns.iter().fold((0.0_f64, 0.0_f64), |(low, high), &turn| (low.min(turn), high.max(turn)));
+    let around = high - low >= 0.5 * TURN;
+    let per_rad = DIRECTIONS as f64 / TURN;
+    let directions = if around {
+        (0, DIRECTIONS as i64)
+    } else {
+        let first = libm::floor((angles[0] + low + 0.5 * TURN) * per_rad - 0.5) as i64;
+        let last = libm::ceil((angles[0] + high + 0.5 * TURN) * per_rad - 0.5) as i64;
+        (first, last - first + 1)
+    };
+    let flat = |p: Point| libm::sqrt(p.x * p.x + p.y * p.y);
+    let near = if around { 1e-6 } else { (0..3).map(|k| segment_distance(corners[k], corners[(k + 1) % 3])).fold(f64::MAX, f64::min) };
+    let far = corners.map(flat).into_iter().fold(0.0, f64::max);
+    let (bottom, top) = corners.iter().fold((f64::MAX, f64::MIN), |(low, high), corner| (low.min(corner.z), high.max(corner.z)));
+    let angle = |height: f64, outward: bool| libm::atan2(height, if (height > 0.0) == outward { near.max(1e-6) } else { far });
+    let step = (TOP_DEG - BOTTOM_DEG) * (TURN / 360.0) / (BEAMS - 1) as f64;
+    let beam = |angle: f64| (elevation(0) - angle) / step;
+    let (first, last) = (libm::floor(beam(angle(top, true))), libm::ceil(beam(angle(bottom, false))));
+    if last < 0.0 || first > (BEAMS - 1) as f64 {
+        return None;
+    }
+    Some((directions, (first.max(0.0) as usize, last.min((BEAMS - 1) as f64) as usize)))
+}
+
+/// Distance of a segment from the vertical axis.
+fn segment_distance(a: Point, b: Point) -> f64 {
+    let (dx, dy) = (b.x - a.x, b.y - a.y);
+    let length = dx * dx + dy * dy;
+    let along = if length > 0.0 { (-(a.x * dx + a.y * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
+    let (x, y) = (a.x + along * dx, a.y + along * dy);
+    libm::sqrt(x * x + y * y)
+}
+
+/// Nearest face of every beam in one sector: (1 / range, face).
+fn scan(faces: &[Face], sector: usize) -> Vec<(f64, u32)> {
+    let width = DIRECTIONS / SECTORS;
+    let start = (sector * width) as i64;
+    let rays: Vec<Point> = (0..BEAMS).flat_map(|beam| (0..width).map(move |k| ray(beam, sector * width + k))).collect();
+    let mut nearest = vec![(0.0, u32::MAX); BEAMS * width];
+    for (number, face) in faces.iter().enumerate() {
+        let (first, count) = face.directions;
+        // The face's directions may pass the seam at the back: look one turn to either side.
+        for shift in [-(DIRECTIONS as i64), 0, DIRECTIONS as i64] {
+            let from = (first + shift - start).max(0);
+            let to = (first + shift + count - start).min(width as i64);
+            if from >= to {
+                continue;
+            }
+            for beam in face.beams.0..=face.beams.1 {
+                for k in from as usize..to as usize {
+                    let slot = beam * width + k;
+                    let shares = [0, 1, 2].map(|corner| face.planes[corner].dot(&rays[slot]));
+                    if shares.iter().all(|&share| share >= 0.0) {
+                        let nearness = shares[0] + shares[1] + shares[2];
+                        if nearness > nearest[slot].0 {
+                            nearest[slot] = (nearness, number as u32);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    nearest
+}

@@ -1,0 +1,93 @@
+//! Sun, sky and haze; linear light to grey levels.
+
+use nalgebra::Vector3;
+
+use super::paint::{Painted, above};
+use super::surface::Tone;
+use super::texture::Ripmap;
+
+type Direction = Vector3<f32>;
+
+const SUN: Tone = [2.75, 2.50, 2.15];
+const SKY: Tone = [0.50, 0.60, 0.76];
+const BOUNCE: Tone = [0.30, 0.27, 0.23];
+const HAZE: Tone = [0.74, 0.80, 0.86];
+const HAZE_M: f32 = 420.0;
+
+/// Sky, clouds and ground mirrored or seen.
+pub struct Light {
+    /// Direction to the sun in the street's frame.
+    pub to_sun: Direction,
+}
+
+impl Light {
+    /// Light that leaves a surface towards the eye. `sunlit` and `open` are the shares of sun and sky that reach it.
+    pub fn shade(&self, painted: &Painted, normal: Direction, to_eye: Direction, sunlit: f32, open: f32, thin: bool) -> Tone {
+        let facing = normal.dot(&self.to_sun);
+        // Leaves let light through.
+        let direct = if thin { 0.30 + 0.45 * facing.max(-0.4 * facing) } else { facing.max(0.0) };
+        let up = 0.5 - 0.5 * normal.y;
+        let open = open * painted.open;
+        let mut light = [0.0; 3];
+        for (k, out) in light.iter_mut().enumerate() {
+            let around = SKY[k] * (0.25 + 0.75 * up) + BOUNCE[k] * (1.0 - up);
+            *out = painted.tone[k] * (SUN[k] * direct * sunlit + around * open);
+        }
+        if painted.gloss > 0.03 {
+            let cosine = normal.dot(&to_eye).clamp(0.0, 1.0);
+            let mirrored = normal * (2.0 * normal.dot(&to_eye)) - to_eye;
+            let grazing = (1.0 - cosine) * (1.0 - cosine);
+            let share = painted.gloss * (0.35 + 0.65 * grazing);
+            let sky = above(-0.05, -mirrored.y, 0.5);
+            let (wall, road) = (0.22, 0.14);
+            let low = wall + (road - wall) * above(0.0, mirrored.y, 0.3);
+            let spark = mirrored.dot(&self.to_sun).max(0.0);
+            let spark = spark * spark;
+            let spark = spark * spark;
+            let spark = spark * spark * spark;
+            let spark = spark * spark * spark;
+            for (k, out) in light.iter_mut().enumerate() {
+                let seen = low + (HAZE[k] * 1.1 - low) * sky;
+                *out += share * (seen * open + 2.2 * sunlit * spark);
+            }
+        }
+        light
+    }
+
+    /// The sky in a direction.
+    pub fn sky(&self, direction: Direction, noise: &Ripmap) -> Tone {
+        let up = -direction.y;
+        if up < 0.0 {
+            return [0.40, 0.42, 0.40];
+        }
+        let height = up.sqrt();
+        let zenith = [0.13, 0.30, 0.72];
+        let mut tone = [0, 1, 2].map(|k| HAZE[k] * 1.12 + (zenith[k] - HAZE[k] * 1.12) * height * 0.95);
+        let near = direction.dot(&self.to_sun).max(0.0);
+        let glow = near * near * near * near;
+        // Clouds hang on a ceiling; near the horizon they are small and many.
+        let scale = 5.0 / (up + 0.10);
+        let (x, z) = (direction.x * scale, direction.z * scale);
+        let mass = noise.at(x, z, 0.25, 0.25) + 0.35 * noise.at(x * 3.1, z * 3.1, 0.4, 0.4);
+        let cover = ((mass + 0.1) * 0.75).clamp(0.0, 1.0) * (up * 9.0).min(1.0);
+        let lit = 1.25 - 0.30 * (mass * 0.4).clamp(0.0, 1.0);
+        for (k, out) in tone.iter_mut().enumerate() {
+            let cloud = [1.0, 1.0, 1.02][k] * lit;
+            *out += (cloud - *out) * cover * cover * (3.0 - 2.0 * cover) * 0.85;
+            *out += glow * [0.5, 0.42, 0.3][k];
+        }
+        tone
+    }
+
+    /// A far surface through the air.
+    pub fn through_air(&self, light: Tone, depth_m: f32) -> Tone {
+        let share = depth_m / (depth_m + HAZE_M);
+        [0, 1, 2].map(|k| light[k] + (HAZE[k] - light[k]) * share)
+    }
+}
+
+/// Linear light as a grey level 0 to 255, before noise: a soft shoulder, then the root as the curve of the eye.
+pub fn develop(light: f32) -> f32 {
+    let soft = light * (1.0 + light * 0.16) / (1.0 + light * 0.95);
+    255.0 * soft.clamp(0.0, 1.0).sqrt()
+}

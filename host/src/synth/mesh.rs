@@ -1,0 +1,158 @@
+//! Triangle meshes and the few shapes the street is built from.
+
+use dynvox_core::geometry::Transform;
+use nalgebra::Vector3;
+
+use super::surface::Surface;
+
+/// A point in space, m.
+pub type Point = Vector3<f64>;
+
+/// A corner: place, texture coordinates in metres, normal.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex {
+    /// Place in the mesh's frame, m.
+    pub place_m: Point,
+    /// Surface coordinates, m: along, across or down, and a third the surface may use.
+    pub surface_m: [f32; 3],
+    /// Outward normal.
+    pub normal: [f32; 3],
+}
+
+/// Three corners and what covers them.
+#[derive(Clone, Copy, Debug)]
+pub struct Triangle {
+    /// Positions in `Mesh::vertices`, clockwise seen from outside in x right, y down.
+    pub corners: [u32; 3],
+    /// Position in `Mesh::surfaces`.
+    pub surface: u16,
+}
+
+/// A rigid thing.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Corners.
+    pub vertices: Vec<Vertex>,
+    /// Faces.
+    pub triangles: Vec<Triangle>,
+    /// Materials.
+    pub surfaces: Vec<Surface>,
+    /// Middle of the bounding sphere.
+    pub middle_m: Point,
+    /// Radius of the bounding sphere.
+    pub radius_m: f64,
+}
+
+impl Mesh {
+    /// Adds a material and returns its number.
+    pub fn surface(&mut self, surface: Surface) -> u16 {
+        self.surfaces.push(surface);
+        (self.surfaces.len() - 1) as u16
+    }
+
+    /// Adds a convex polygon that faces `outward`; texture coordinates come with the corners.
+    pub fn polygon(&mut self, surface: u16, outward: Point, corners: &[(Point, [f32; 3])]) {
+        let raw = (corners[1].0 - corners[0].0).cross(&(corners[2].0 - corners[0].0));
+        let flipped = raw.dot(&outward) < 0.0;
+        let scale = if flipped { -1.0 } else { 1.0 } / (raw.norm() + 1e-12);
+        let normal = [0, 1, 2].map(|k| (raw[k] * scale) as f32);
+        let first = self.vertices.len() as u32;
+        self.vertices.extend(corners.iter().map(|&(place_m, surface_m)| Vertex { place_m, surface_m, normal }));
+        for k in 1..corners.len() as u32 - 1 {
+            let (a, b) = if flipped { (k + 1, k) } else { (k, k + 1) };
+            self.triangles.push(Triangle { corners: [first, first + a, first + b], surface });
+        }
+    }
+
+    /// Adds a parallelogram from `origin` along `u` and `v`; texture coordinates are metres from `texture`.
+    pub fn sheet(&mut self, surface: u16, outward: Point, origin: Point, u: Point, v: Point, texture: [f64; 3]) {
+        let (lu, lv) = (u.norm(), v.norm());
+        let at = |a: f64, b: f64| [(texture[0] + a * lu) as f32, (texture[1] + b * lv) as f32, texture[2] as f32];
+        let corner = |a: f64, b: f64| (origin + u * a + v * b, at(a, b));
+        self.polygon(surface, outward, &[corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
+    }
+
+    /// Adds an upright box between two corners. `faces` lists what to leave out: -x, +x, -y (top), +y (bottom), -z, +z.
+    pub fn cuboid(&mut self, surface: u16, low: Point, high: Point, omit: &[usize]) {
+        let size = high - low;
+        for face in 0..6 {
+            if omit.contains(&face) {
+                continue;
+            }
+            let axis = face / 2;
+            let (u, v) = [(2, 1), (0, 2), (0, 1)][axis];
+            let mut outward = Point::zeros();
+            outward[axis] = if face % 2 == 0 { -1.0 } else { 1.0 };
+            let mut origin = low;
+            if face % 2 == 1 {
+                origin[axis] = high[axis];
+            }
+            let (mut along, mut across) = (Point::zeros(), Point::zeros());
+            along[u] = size[u];
+            across[v] = size[v];
+            self.sheet(surface, outward, origin, along, across, [origin[u], origin[v], 0.0]);
+        }
+    }
+
+    /// Adds a round bar from `from` to `to` with smooth normals, open at its ends.
+    pub fn bar(&mut self, surface: u16, from: (Point, f64), to: (Point, f64), sides: u32) {
+        let axis = to.0 - from.0;
+        let length = axis.norm();
+        let helper = if axis.y.abs() > 0.9 * length { Point::x() } else { Point::y() };
+        let u = axis.cross(&helper).normalize();
+        let v = axis.cross(&u).normalize();
+        let first = self.vertices.len() as u32;
+        for k in 0..=sides {
+            let angle = 2.0 * core::f64::consts::PI * f64::from(k % sides) / f64::from(sides);
+            let out = u * libm::cos(angle) + v * libm::sin(angle);
+            let round = 2.0 * core::f64::consts::PI * from.1 * f64::from(k) / f64::from(sides);
+            for (end, down) in [(from, 0.0), (to, length)] {
+                self.vertices.push(Vertex {
+                    place_m: end.0 + out * end.1,
+                    surface_m: [round as f32, down as f32, 0.0],
+                    normal: [out.x as f32, out.y as f32, out.z as f32],
+                });
+            }
+        }
+        for k in 0..sides {
+            let (a, b) = (first + 2 * k, first + 2 * k + 2);
+            for corners in [[a, b, a + 1], [b, b + 1, a + 1]] {
+                self.facing(corners, surface);
+            }
+        }
+    }
+
+    /// Adds a triangle, turned so that it faces the way its first corner's normal does.
+    pub fn facing(&mut self, corners: [u32; 3], surface: u16) {
+        let [a, b, c] = corners.map(|k| self.vertices[k as usize]);
+        let raw = (b.place_m - a.place_m).cross(&(c.place_m - a.place_m));
+        let normal = [0, 1, 2].map(|k| f64::from(a.normal[k]) + f64::from(b.normal[k]) + f64::from(c.normal[k]));
+        let corners = if raw.dot(&Point::from(normal)) < 0.0 { [corners[0], corners[2], corners[1]] } else { corners };
+        self.triangles.push(Triangle { corners, surface });
+    }
+
+    /// Moves everything from vertex `first` on into another frame.
+    pub fn place(&mut self, first: usize, t_mesh_part: &Transform) {
+        let turn = t_mesh_part.rotation.to_rotation_matrix();
+        for vertex in &mut self.vertices[first..] {
+            vertex.place_m = turn * vertex.place_m + t_mesh_part.translation.vector;
+            let normal = turn * Point::from(vertex.normal.map(f64::from));
+            vertex.normal = [normal.x as f32, normal.y as f32, normal.z as f32];
+        }
+    }
+
+    /// Finds the bounding sphere; call it when the mesh is complete.
+    pub fn finish(mut self) -> Self {
+        let (low, high) = self.bounds_m();
+        self.middle_m = (low + high) * 0.5;
+        self.radius_m = self.vertices.iter().map(|vertex| (vertex.place_m - self.middle_m).norm()).fold(0.0, f64::max);
+        self
+    }
+
+    /// Smallest upright box around the mesh.
+    pub fn bounds_m(&self) -> (Point, Point) {
+        self.vertices.iter().fold((Point::repeat(1e9), Point::repeat(-1e9)), |(low, high), vertex| {
+            (low.inf(&vertex.place_m), high.sup(&vertex.place_m))
+        })
+    }
+}

@@ -1,0 +1,48 @@
+//! A synthetic street: seeded, endless, with exact truth about everything in it.
+//!
+//! A [`Street`] gives rectified stereo pairs in colour and grey with sensor noise, exact depth, instance masks, poses of the camera and
+//! of every car, and simulated LiDAR. Frame `i` depends on the configuration and `i` alone: frames may be asked for in any order, on any
+//! number of threads. Only plain arithmetic and `libm` are used, so that the pictures are the same bits on every machine.
+//!
+//! Memory: about a dozen [`PIECE_M`]-metre pieces of street near the camera and one frame's buffers, however far the camera drives.
+//! Time: see the tests; about linear in pixels. What can go wrong: a configuration out of range is refused by [`Street::new`].
+//!
+//! ```
+//! use dynvox::synth::{Street, StreetConfig};
+//! let street = Street::new(StreetConfig { width: 160, height: 48, ..StreetConfig::static_street() }).unwrap();
+//! let frame = street.frame(12);
+//! assert_eq!(frame.depth_m.len(), 160 * 48);
+//! ```
+
+mod camera;
+mod car;
+mod car_paint;
+mod config;
+mod draws;
+mod facade;
+mod frame;
+mod furniture;
+mod layout;
+mod lidar;
+mod light;
+mod mesh;
+mod paint;
+mod path;
+mod piece;
+mod raster;
+mod render;
+mod scene;
+mod sensor;
+mod shadow;
+mod street;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod texture;
+mod traffic;
+mod window_paint;
+
+pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
+pub use frame::{ObjectTruth, SynthFrame};
+pub use path::PIECE_M;
+pub use street::{Street, SynthError};

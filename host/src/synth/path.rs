@@ -1,0 +1,123 @@
+//! The street's reference line (the middle of the camera's lane): heading in closed form, position by Gauss–Legendre quadrature.
+//!
+//! The heading is a bounded sum of sines, so that the street never meets itself however long it gets. Positions are summed from the
+//! street's start piece by piece in one order: any frame, asked for alone, finds the same bits.
+
+use dynvox_core::geometry::{Transform, exp};
+use nalgebra::{Translation3, Vector3};
+
+use super::config::StreetConfig;
+use super::draws::Dice;
+
+/// Length of one piece of street, m: what is generated, kept and dropped together.
+pub const PIECE_M: f64 = 24.0;
+
+const TURN: f64 = 2.0 * core::f64::consts::PI;
+const AMPLITUDE_RAD: [f64; 2] = [0.42, 0.15];
+const WAVELENGTH_M: [f64; 2] = [330.0, 141.0];
+/// Five-point rule on -1..1: abscissae and weights.
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// The line's shape.
+#[derive(Clone, Debug)]
+pub struct Course {
+    amplitude_rad: [f64; 2],
+    phase_rad: [f64; 2],
+}
+
+impl Course {
+    /// The course of a configured street.
+    pub fn new(config: &StreetConfig) -> Self {
+        let mut dice = Dice::new(config.seed, 0x0C0_0125E, 0);
+        let amplitude_rad = if config.curvature { AMPLITUDE_RAD } else { [0.0; 2] };
+        Self { amplitude_rad, phase_rad: [TURN * dice.unit(), TURN * dice.unit()] }
+    }
+
+    /// Heading at arc length `s_m`, rad, positive to the right; 0 at the start.
+    pub fn heading_rad(&self, s_m: f64) -> f64 {
+        let wave = |k: usize| {
+            let phase = self.phase_rad[k];
+            self.amplitude_rad[k] * (libm::sin(TURN * s_m / WAVELENGTH_M[k] + phase) - libm::sin(phase))
+        };
+        if self.amplitude_rad[0] == 0.0 { 0.0 } else { wave(0) + wave(1) }
+    }
+
+    fn advance(&self, from_m: f64, to_m: f64) -> Vector3<f64> {
+        let (middle, half) = (0.5 * (from_m + to_m), 0.5 * (to_m - from_m));
+        GAUSS.iter().fold(Vector3::zeros(), |sum, &(x, weight)| {
+            let heading = self.heading_rad(middle + half * x);
+            sum + Vector3::new(libm::sin(heading), 0.0, libm::cos(heading)) * (weight * half)
+        })
+    }
+
+    /// The stretch of street from piece `first` to piece `last`, both included. Time: linear in the distance from the start.
+    pub fn stretch(&self, first: i64, last: i64) -> Stretch<'_> {
+        let step = |piece: i64| self.advance(piece as f64 * PIECE_M, (piece + 1) as f64 * PIECE_M);
+        let mut start = Vector3::zeros();
+        for piece in 0..first {
+            start += step(piece);
+        }
+        for piece in (first..0).rev() {
+            start -= step(piece);
+        }
+        let starts = (first..=last).scan(start, |next, piece| {
+            let this = *next;
+            *next += step(piece);
+            Some(this)
+        });
+        Stretch { course: self, first, starts_m: starts.collect() }
+    }
+}
+
+/// Positions along a part of the street.
+pub struct Stretch<'a> {
+    course: &'a Course,
+    first: i64,
+    starts_m: Vec<Vector3<f64>>,
+}
+
+impl Stretch<'_> {
+    /// Position on the reference line.
+    pub fn point(&self, s_m: f64) -> Vector3<f64> {
+        let last = self.starts_m.len() as i64 - 1;
+        let at = (libm::floor(s_m / PIECE_M) as i64 - self.first).clamp(0, last);
+        self.starts_m[at as usize] + self.course.advance((at + self.first) as f64 * PIECE_M, s_m)
+    }
+
+    /// The frame that stands on the road at `s_m`, `lateral_m` to the right of the reference line, turned by `yaw_rad` more than it.
+    pub fn t_street_local(&self, s_m: f64, lateral_m: f64, yaw_rad: f64) -> Transform {
+        let heading = self.course.heading_rad(s_m);
+        let right = Vector3::new(libm::cos(heading), 0.0, -libm::sin(heading));
+        let mut pose = exp(Vector3::new(0.0, heading + yaw_rad, 0.0), Vector3::zeros());
+        pose.translation = Translation3::from(self.point(s_m) + right * lateral_m);
+        pose
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_is_smooth_across_pieces_and_as_long_as_it_says() {
+        let config = StreetConfig::default();
+        let course = Course::new(&config);
+        let stretch = course.stretch(-2, 12);
+        let mut length = 0.0;
+        for step in 0..2400 {
+            let s = f64::from(step) * 0.1;
+            let delta = stretch.point(s + 0.1) - stretch.point(s);
+            let heading = course.heading_rad(s + 0.05);
+            assert!((delta - Vector3::new(libm::sin(heading), 0.0, libm::cos(heading)) * 0.1).norm() < 1e-6);
+            length += delta.norm();
+        }
+        assert!((length - 240.0).abs() < 1e-3);
+        assert_eq!(course.stretch(7, 8).point(180.0), stretch.point(180.0), "asked for alone, the same bits");
+    }
+}

@@ -1,0 +1,174 @@
+//! Visibility: which triangle each sample of a band of rows sees.
+//!
+//! Edges are planes through the eye (homogeneous rasterisation, Olano and Greer 1997), so nothing is clipped; the same three planes give
+//! exact inverse depth and perspective-correct barycentric coordinates anywhere in the pixel. A band's result depends on the order of the
+//! triangles alone.
+
+use nalgebra::Vector3;
+
+/// Nothing seen: the sky.
+pub const SKY: u32 = u32::MAX;
+/// Samples per pixel: the centre, which gives depth and masks, and four around it for colour at edges.
+pub const SAMPLES: usize = 5;
+/// Where they are, px from the pixel's centre.
+pub const OFFSETS_PX: [(f64, f64); SAMPLES] = [(0.0, 0.0), (-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125)];
+const NEAR_M: f64 = 0.05;
+
+/// A pinhole as the rasteriser needs it.
+#[derive(Clone, Copy)]
+pub struct Pinhole {
+    /// Image width, px.
+    pub width: usize,
+    /// Image height, px.
+    pub height: usize,
+    /// Focal length, px.
+    pub focal_px: f64,
+    /// Principal point, px.
+    pub center_px: (f64, f64),
+}
+
+/// A triangle set up for one view: each plane is (per column, per row, constant).
+#[derive(Clone, Copy)]
+pub struct Setup {
+    /// Barycentric weight of each corner over depth.
+    pub weights: [[f64; 3]; 3],
+    /// Which thing of the scene.
+    pub thing: u32,
+    /// Which triangle of it.
+    pub triangle: u32,
+    /// Surface group: samples of one group share one colour.
+    pub group: u32,
+    /// Columns it may touch, first and last.
+    pub columns: (i32, i32),
+    /// Rows it may touch, first and last.
+    pub rows: (i32, i32),
+}
+
+impl Setup {
+    /// Prepares a triangle of corners in camera coordinates; `None` where it cannot be seen.
+    pub fn new(pinhole: &Pinhole, corners: [Vector3<f64>; 3], two_sided: bool) -> Option<Self> {
+        let [a, b, c] = corners;
+        if a.z <= NEAR_M && b.z <= NEAR_M && c.z <= NEAR_M {
+            return None;
+        }
+        let planes = [b.cross(&c), c.cross(&a), a.cross(&b)];
+        let volume = a.dot(&planes[0]);
+        if volume.abs() < 1e-14 || (volume > 0.0 && !two_sided) {
+            return None;
+        }
+        let (columns, rows) = reach(pinhole, corners)?;
+        let scale = 1.0 / (volume * pinhole.focal_px);
+        let (u, v) = pinhole.center_px;
+        let weights = planes.map(|plane| {
+            let (x, y) = (plane.x * scale, plane.y * scale);
+            [x, y, plane.z * (1.0 / volume) - x * u - y * v]
+        });
+        Some(Self { weights, thing: 0, triangle: 0, group: 0, columns, rows })
+    }
+
+    /// Inverse depth's plane.
+    pub fn inverse_depth(&self) -> [f64; 3] {
+        let [a, b, c] = &self.weights;
+        [a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]]
+    }
+}
+
+/// Columns and rows a triangle may touch, its part behind the eye cut off.
+fn reach(pinhole: &Pinhole, corners: [Vector3<f64>; 3]) -> Option<((i32, i32), (i32, i32))> {
+    let (mut low, mut high) = ((f64::MAX, f64::MAX), (f64::MIN, f64::MIN));
+    let mut take = |point: Vector3<f64>| {
+        let scale = pinhole.focal_px / point.z;
+        let (u, v) = (point.x * scale + pinhole.center_px.0, point.y * scale + pinhole.center_px.1);
+        low = (low.0.min(u), low.1.min(v));
+        high = (high.0.max(u), high.1.max(v));
+    };
+    for k in 0..3 {
+        let (from, to) = (corners[k], corners[(k + 1) % 3]);
+        if from.z > NEAR_M {
+            take(from);
+        }
+        if (from.z > NEAR_M) != (to.z > NEAR_M) {
+            take(from + (to - from) * ((NEAR_M - from.z) / (to.z - from.z)));
+        }
+    }
+    let last = (pinhole.width as f64 - 1.0, pinhole.height as f64 - 1.0);
+    if high.0 < -0.5 || high.1 < -0.5 || low.0 > last.0 + 0.5 || low.1 > last.1 + 0.5 {
+        return None;
+    }
+    let span = |low: f64, high: f64, last: f64| ((low - 0.5).max(0.0) as i32, (high + 0.5).min(last) as i32);
+    Some((span(low.0, high.0, last.0), span(low.1, high.1, last.1)))
+}
+
+/// What a band of rows sees: for each sample an inverse depth and a setup's number.
+pub struct Band {
+    /// First row.
+    pub first_row: usize,
+    /// Rows.
+    pub rows: usize,
+    width: usize,
+    inverse_depth: Vec<f32>,
+    seen: Vec<u32>,
+}
+
+impl Band {
+    /// An empty band.
+    pub fn new(width: usize, first_row: usize, rows: usize) -> Self {
+        let samples = SAMPLES * rows * width;
+        Self { first_row, rows, width, inverse_depth: vec![0.0; samples], seen: vec![SKY; samples] }
+    }
+
+    /// The setups seen by a row's pixels at one sample.
+    pub fn row(&self, sample: usize, row: usize) -> &[u32] {
+        let start = (sample * self.rows + row) * self.width;
+        &self.seen[start..start + self.width]
+    }
+
+    /// Draws one triangle into all samples.
+    pub fn draw(&mut self, number: u32, setup: &Setup) {
+        let first = (setup.rows.0 as usize).max(self.first_row);
+        let last = (setup.rows.1 as usize).min(self.first_row + self.rows - 1);
+        let depth = setup.inverse_depth();
+        for (sample, (du, dv)) in OFFSETS_PX.into_iter().enumerate() {
+            for row in first..=last {
+                let v = row as f64 + dv;
+                let Some((from, to)) = span(setup, du, v) else { continue };
+                let start = (sample * self.rows + row - self.first_row) * self.width;
+                let begin = (depth[0] * (from as f64 + du) + depth[1] * v + depth[2]) as f32;
+                let slope = depth[0] as f32;
+                let range = start + from..=start + to;
+                let slots = self.inverse_depth[range.clone()].iter_mut().zip(&mut self.seen[range]);
+                for (k, (near, seen)) in slots.enumerate() {
+                    let here = begin + slope * k as i32 as f32;
+                    let closer = here > *near;
+                    *near = if closer { here } else { *near };
+                    *seen = if closer { number } else { *seen };
+                }
+            }
+        }
+    }
+}
+
+/// Columns of a row inside all three edges. A hair's breadth is added so that neighbours leave no crack.
+fn span(setup: &Setup, du: f64, v: f64) -> Option<(usize, usize)> {
+    const HAIR_PX: f64 = 1e-9;
+    let (mut from, mut to) = (f64::from(setup.columns.0), f64::from(setup.columns.1));
+    for [per_column, per_row, constant] in setup.weights {
+        let here = per_row * v + constant;
+        if per_column > 1e-13 {
+            let edge = -here / per_column - du - HAIR_PX;
+            from = if edge > from { edge } else { from };
+        } else if per_column < -1e-13 {
+            let edge = -here / per_column - du + HAIR_PX;
+            to = if edge < to { edge } else { to };
+        } else if here < 0.0 {
+            return None;
+        }
+    }
+    // `from` and `to` are not negative, so truncation is the floor.
+    if !(to >= 0.0 && from <= to) {
+        return None;
+    }
+    let (mut first, last) = (from as usize, to as usize);
+    first += usize::from((first as f64) < from);
+    (first <= last).then_some((first, last))
+}

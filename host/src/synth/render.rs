@@ -1,0 +1,229 @@
+//! Pictures of a scene: visibility first, then every visible surface is shaded once per pixel.
+//!
+//! The picture is cut into bands of fixed height; each is drawn and shaded by itself, so that the number of threads cannot matter.
+//! A pixel's depth and instance are those of the ray through its centre; its colour is the mean of five samples where they see
+//! different surfaces.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::light::{Light, develop};
+use super::mesh::{Mesh, Point};
+use super::paint::{Painter, Spot};
+use super::raster::{Band, OFFSETS_PX, Pinhole, SAMPLES, SKY, Setup};
+use super::scene::{Scene, Thing};
+use super::sensor::Sensor;
+use super::surface::{Kind, Tone};
+
+const BAND_ROWS: usize = 16;
+/// Group of the sky.
+const NO_GROUP: u32 = u32::MAX;
+
+/// What the pictures are made with.
+pub struct Renderer<'a> {
+    /// Painter.
+    pub painter: &'a Painter,
+    /// Sun and sky.
+    pub light: &'a Light,
+    /// Car bodies.
+    pub bodies: &'a [Mesh; 5],
+    /// Camera.
+    pub pinhole: Pinhole,
+}
+
+/// One camera's picture.
+pub struct Picture {
+    /// Colour, row by row.
+    pub rgb: Vec<[u8; 3]>,
+    /// Depth of the centre's ray, m; 0 for the sky.
+    pub depth_m: Vec<f32>,
+    /// Instance at the centre, 0 for none.
+    pub instances: Vec<u8>,
+}
+
+impl Renderer<'_> {
+    /// Draws the scene `offset_m` to the right of the left camera, with so much light let in.
+    pub fn picture(&self, scene: &Scene, offset_m: f64, gain: f32, sensor: &Sensor) -> Picture {
+        let parts: Vec<Vec<Setup>> =
+            scene.things.par_iter().enumerate().map(|(number, thing)| self.set_up(thing, number as u32, offset_m)).collect();
+        let setups: Vec<Setup> = parts.into_iter().flatten().collect();
+        let (width, height) = (self.pinhole.width, self.pinhole.height);
+        let bands = height.div_ceil(BAND_ROWS);
+        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
+        for (number, setup) in setups.iter().enumerate() {
+            let (first, last) = (setup.rows.0 as usize / BAND_ROWS, setup.rows.1 as usize / BAND_ROWS);
+            lists[first..=last].iter_mut().for_each(|list| list.push(number as u32));
+        }
+        let drawn: Vec<Picture> = lists
+            .par_iter()
+            .enumerate()
+            .map(|(index, list)| {
+                let first_row = index * BAND_ROWS;
+                let mut band = Band::new(width, first_row, BAND_ROWS.min(height - first_row));
+                for &number in list {
+                    band.draw(number, &setups[number as usize]);
+                }
+                Shading { renderer: self, scene, setups: &setups, offset_m, gain, sensor }.band(&band)
+            })
+            .collect();
+        let mut whole = Picture { rgb: Vec::new(), depth_m: Vec::new(), instances: Vec::new() };
+        for part in drawn {
+            whole.rgb.extend(part.rgb);
+            whole.depth_m.extend(part.depth_m);
+            whole.instances.extend(part.instances);
+        }
+        whole
+    }
+
+    fn set_up(&self, thing: &Thing, number: u32, offset_m: f64) -> Vec<Setup> {
+        let mesh = thing.mesh(self.bodies);
+        let shift = Point::new(offset_m, 0.0, 0.0);
+        let middle = thing.to_camera.point(mesh.middle_m) - shift;
+        if self.out_of_sight(middle, mesh.radius_m) {
+            return Vec::new();
+        }
+        let places: Vec<Point> = mesh.vertices.iter().map(|vertex| thing.to_camera.point(vertex.place_m) - shift).collect();
+        let mut setups = Vec::new();
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
+            let surface = &mesh.surfaces[triangle.surface as usize];
+            let corners = triangle.corners.map(|corner| places[corner as usize]);
+            if let Some(setup) = Setup::new(&self.pinhole, corners, surface.two_sided) {
+                let group = number << 12 | u32::from(triangle.surface);
+                setups.push(Setup { thing: number, triangle: index as u32, group, ..setup });
+            }
+        }
+        setups
+    }
+
+    fn out_of_sight(&self, middle: Point, radius_m: f64) -> bool {
+        let (u, v) = self.pinhole.center_px;
+        let sides = [
+            (u + 1.0, middle.x, 1.0),
+            (self.pinhole.width as f64 - u, middle.x, -1.0),
+            (v + 1.0, middle.y, 1.0),
+            (self.pinhole.height as f64 - v, middle.y, -1.0),
+        ];
+        let focal = self.pinhole.focal_px;
+        middle.z < -radius_m
+            || sides.iter().any(|&(reach, offset, sign)| {
+                let length = libm::sqrt(reach * reach + focal * focal);
+                (middle.z * reach + sign * offset * focal) / length < -radius_m
+            })
+    }
+}
+
+struct Shading<'a> {
+    renderer: &'a Renderer<'a>,
+    scene: &'a Scene,
+    setups: &'a [Setup],
+    offset_m: f64,
+    gain: f32,
+    sensor: &'a Sensor,
+}
+
+impl Shading<'_> {
+    fn group(&self, seen: u32) -> u32 {
+        if seen == SKY { NO_GROUP } else { self.setups[seen as usize].group }
+    }
+
+    fn band(&self, band: &Band) -> Picture {
+        let width = self.renderer.pinhole.width;
+        let count = band.rows * width;
+        let mut picture = Picture { rgb: Vec::with_capacity(count), depth_m: Vec::with_capacity(count), instances: Vec::with_capacity(count) };
+        for row in 0..band.rows {
+            let seen: [&[u32]; SAMPLES] = core::array::from_fn(|sample| band.row(sample, row));
+            let v = (band.first_row + row) as f64;
+            for column in 0..width {
+                let samples = core::array::from_fn(|sample| seen[sample][column]);
+                let (light, depth_m) = self.pixel(column as f64, v, samples);
+                let levels = light.map(|value| develop(value * self.gain));
+                picture.rgb.push(self.sensor.read((band.first_row + row) * width + column, levels));
+                picture.depth_m.push(depth_m);
+                let instance = if samples[0] == SKY { 0 } else { self.scene.things[self.setups[samples[0] as usize].thing as usize].instance };
+                picture.instances.push(instance);
+            }
+        }
+        picture
+    }
+
+    /// Colour and centre depth of one pixel.
+    fn pixel(&self, u: f64, v: f64, samples: [u32; SAMPLES]) -> (Tone, f32) {
+        let (centre, depth_m) = self.sample(u, v, samples[0]);
+        if samples.iter().all(|&seen| seen == samples[0]) {
+            return (centre, depth_m);
+        }
+        let groups = samples.map(|seen| self.group(seen));
+        let mut tones = [centre; SAMPLES];
+        let mut sum = centre;
+        for k in 1..SAMPLES {
+            tones[k] = match groups[..k].iter().position(|&group| group == groups[k]) {
+                Some(known) => tones[known],
+                None => self.sample(u + OFFSETS_PX[k].0, v + OFFSETS_PX[k].1, samples[k]).0,
+            };
+            sum = [0, 1, 2].map(|channel| sum[channel] + tones[k][channel]);
+        }
+        (sum.map(|value| value * (1.0 / SAMPLES as f32)), depth_m)
+    }
+
+    /// Light and depth along one ray.
+    fn sample(&self, u: f64, v: f64, seen: u32) -> (Tone, f32) {
+        let pinhole = &self.renderer.pinhole;
+        let ray = Vector3::new((u - pinhole.center_px.0) / pinhole.focal_px, (v - pinhole.center_px.1) / pinhole.focal_px, 1.0);
+        let turn = &self.scene.anchor_camera.turn;
+        let direction = (turn * ray).map(|value| value as f32);
+        let painter = self.renderer.painter;
+        if seen == SKY {
+            return (self.renderer.light.sky(direction * (1.0 / direction.dot(&direction).sqrt()), &painter.textures.broad), 0.0);
+        }
+        let setup = &self.setups[seen as usize];
+        let thing = &self.scene.things[setup.thing as usize];
+        let mesh = thing.mesh(self.renderer.bodies);
+        let triangle = &mesh.triangles[setup.triangle as usize];
+        let surface = &mesh.surfaces[triangle.surface as usize];
+        let corners = triangle.corners.map(|corner| &mesh.vertices[corner as usize]);
+        let inverse = setup.inverse_depth();
+        let depth = 1.0 / (inverse[0] * u + inverse[1] * v + inverse[2]);
+        // Barycentric coordinates of the second and third corner, and how they change per column and row.
+        let share = |k: usize| {
+            let plane = &setup.weights[k];
+            let value = (plane[0] * u + plane[1] * v + plane[2]) * depth;
+            (value as f32, ((plane[0] - value * inverse[0]) * depth) as f32, ((plane[1] - value * inverse[1]) * depth) as f32)
+        };
+        let ((b, b_u, b_v), (c, c_u, c_v)) = (share(1), share(2));
+        let mut spot = Spot { surface_m: [0.0; 3], footprint_m: [0.0; 3], own_normal: [0.0; 3] };
+        for k in 0..3 {
+            let [p, q, r] = corners.map(|corner| corner.surface_m[k]);
+            spot.surface_m[k] = p + b * (q - p) + c * (r - p);
+            let (du, dv) = (b_u * (q - p) + c_u * (r - p), b_v * (q - p) + c_v * (r - p));
+            spot.footprint_m[k] = (du * du + dv * dv).sqrt();
+            let [p, q, r] = corners.map(|corner| corner.normal[k]);
+            spot.own_normal[k] = p + b * (q - p) + c * (r - p);
+        }
+        let place = turn * (ray * depth + Point::new(self.offset_m, 0.0, 0.0)) + self.scene.anchor_camera.shift;
+        let place = place.map(|value| value as f32);
+        let own = Vector3::from(spot.own_normal);
+        let normal = thing.to_anchor.turn.map(|value| value as f32) * own;
+        let mut normal = normal * (1.0 / normal.dot(&normal).sqrt());
+        let to_eye = direction * (-1.0 / direction.dot(&direction).sqrt());
+        let thin = surface.two_sided;
+        if thin && surface.kind != Kind::Leaves && normal.dot(&to_eye) < 0.0 {
+            normal = -normal;
+        }
+        let painted = painter.paint(surface, &spot, thing.coat);
+        let open = self.openness(surface.kind, place);
+        let sunlit = if thin || normal.dot(&self.renderer.light.to_sun) > 0.0 { self.scene.shadow.light(place, normal) } else { 0.0 };
+        let light = self.renderer.light.shade(&painted, normal, to_eye, sunlit, open, surface.kind == Kind::Leaves);
+        (self.renderer.light.through_air(light, depth as f32), depth as f32)
+    }
+
+    /// Share of the sky a place sees: little under cars, less at the foot of what stands.
+    fn openness(&self, kind: Kind, place: Vector3<f32>) -> f32 {
+        let height = -place.y;
+        let ground = if height < 0.5 { self.scene.ground.open(place) } else { 1.0 };
+        match kind {
+            Kind::Road | Kind::Pavement | Kind::Kerb | Kind::Yard => ground,
+            Kind::Car | Kind::Wheel => (0.35 + 0.8 * height).min(1.0),
+            _ => 0.62 + 0.38 * (height * 0.4).clamp(0.0, 1.0),
+        }
+    }
+}

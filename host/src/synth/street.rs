@@ -1,0 +1,230 @@
+//! The street itself: what stays from frame to frame, and how a frame is made.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+
+use dynvox_core::geometry::{StereoRig, Transform, renormalised};
+use nalgebra::Vector3;
+
+use super::camera;
+use super::car;
+use super::config::{CarKind, StreetConfig};
+use super::draws::Dice;
+use super::frame::{ObjectTruth, SynthFrame};
+use super::layout;
+use super::light::Light;
+use super::mesh::{Mesh, Point};
+use super::paint::Painter;
+use super::path::{Course, PIECE_M, Stretch};
+use super::piece::{Piece, piece};
+use super::render::Renderer;
+use super::scene::Scene;
+use super::sensor::{Sensor, luma};
+use super::surface::Tone;
+use super::traffic;
+
+/// How far behind and ahead of the camera the street exists, m.
+const REACH_M: (f64, f64) = (70.0, 180.0);
+/// Pieces kept: more than one frame needs.
+const KEPT_PIECES: usize = 16;
+/// Slower than this a car stands, m/s.
+const STANDS_M_S: f64 = 1e-9;
+
+/// Why a street or its files cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum SynthError {
+    /// A figure of the configuration is out of range.
+    #[error("{0}")]
+    Config(String),
+    /// The target folder holds something already.
+    #[error("{0} exists and is not empty; name another folder or remove it")]
+    NotEmpty(std::path::PathBuf),
+    /// A file could not be written.
+    #[error("cannot write {path}: {source}")]
+    Write {
+        /// Which file.
+        path: std::path::PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// A synthetic street.
+pub struct Street {
+    config: StreetConfig,
+    course: Course,
+    painter: Painter,
+    light: Light,
+    bodies: [Mesh; 5],
+    pieces: Mutex<VecDeque<(i64, Arc<Piece>)>>,
+    t_camera0_street: Transform,
+}
+
+/// A car near the camera at one frame.
+struct Present {
+    id: u32,
+    kind: CarKind,
+    paint: Tone,
+    t_street_car: Transform,
+    speed_m_s: f64,
+}
+
+/// The street around the camera at one frame.
+pub(super) struct Surroundings {
+    /// Things and shadows.
+    pub scene: Scene,
+    /// Camera in the street.
+    pub t_street_camera: Transform,
+    cars: Vec<Present>,
+}
+
+impl Street {
+    /// A street for a configuration; nothing of it is built yet but its noise pictures and car bodies.
+    ///
+    /// # Errors
+    /// A figure out of range, with its name.
+    pub fn new(config: StreetConfig) -> Result<Self, SynthError> {
+        if let Some(problem) = config.problem() {
+            return Err(SynthError::Config(problem));
+        }
+        let course = Course::new(&config);
+        let mut dice = Dice::new(config.seed, 0x50_1A2, 0);
+        // The sun stands behind the camera's left shoulder: houses on the right are lit, those on the left throw shadows on the road.
+        let (height, side) = (dice.between(0.70, 0.85), dice.between(-1.25, -0.65));
+        let flat = libm::cos(height);
+        let to_sun = Vector3::new(flat * libm::sin(side), -libm::sin(height), -flat * libm::cos(side));
+        let t_street_camera = camera::t_street_camera(&config, &course.stretch(0, 0), 0.0);
+        Ok(Self {
+            course,
+            painter: Painter::new(),
+            light: Light { to_sun: to_sun.map(|value| value as f32) },
+            bodies: CarKind::ALL.map(car::body),
+            pieces: Mutex::new(VecDeque::new()),
+            t_camera0_street: t_street_camera.inverse(),
+            config,
+        })
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &StreetConfig {
+        &self.config
+    }
+
+    /// The stereo rig.
+    pub fn rig(&self) -> StereoRig {
+        camera::rig(&self.config)
+    }
+
+    /// Time of frame `index` since frame 0, s.
+    pub fn time_s(&self, index: u32) -> f64 {
+        f64::from(index) / self.config.rate_hz
+    }
+
+    /// Camera pose at frame `index`; exactly the identity at frame 0.
+    pub fn t_world_camera(&self, index: u32) -> Transform {
+        let at = libm::floor(camera::along_m(&self.config, self.time_s(index)) / PIECE_M) as i64;
+        self.to_world(&camera::t_street_camera(&self.config, &self.course.stretch(at, at), self.time_s(index)), index)
+    }
+
+    fn to_world(&self, t_street_camera: &Transform, index: u32) -> Transform {
+        if index == 0 { Transform::identity() } else { renormalised(&(self.t_camera0_street * t_street_camera)) }
+    }
+
+    /// Frame `index` with all its truth.
+    pub fn frame(&self, index: u32) -> SynthFrame {
+        let around = self.surroundings(index);
+        let renderer =
+            Renderer { painter: &self.painter, light: &self.light, bodies: &self.bodies, pinhole: camera::pinhole(&self.config) };
+        let view = |camera: u32, offset_m: f64, gain: f64| {
+            let sensor = Sensor::new(self.config.seed, index, camera, self.config.noise_sigma);
+            renderer.picture(&around.scene, offset_m, gain as f32, &sensor)
+        };
+        let (left, right) = rayon::join(|| view(0, 0.0, 1.0), || view(1, self.config.baseline_m, 1.0 + self.config.gain_difference));
+        let objects = around.cars.iter().map(|car| self.truth(car)).collect();
+        SynthFrame {
+            index,
+            time_s: self.time_s(index),
+            width: self.config.width as usize,
+            height: self.config.height as usize,
+            left_grey: left.rgb.iter().map(|&pixel| luma(pixel)).collect(),
+            right_grey: right.rgb.iter().map(|&pixel| luma(pixel)).collect(),
+            left_rgb: left.rgb,
+            right_rgb: right.rgb,
+            depth_m: left.depth_m,
+            instances: left.instances,
+            t_world_camera: self.to_world(&around.t_street_camera, index),
+            objects,
+        }
+    }
+
+    fn truth(&self, car: &Present) -> ObjectTruth {
+        let (low, high) = self.bodies[car.kind as usize].bounds_m();
+        ObjectTruth {
+            id: car.id,
+            class: car.kind.class(),
+            t_world_object: renormalised(&(self.t_camera0_street * car.t_street_car)),
+            dimensions_m: [2.0 * high.x, -low.y, 2.0 * high.z],
+            moving: car.speed_m_s > STANDS_M_S,
+            speed_m_s: car.speed_m_s,
+        }
+    }
+
+    /// Builds the scene of a frame.
+    pub(super) fn surroundings(&self, index: u32) -> Surroundings {
+        let time_s = self.time_s(index);
+        let along = camera::along_m(&self.config, time_s);
+        let reach = (along - REACH_M.0, along + REACH_M.1);
+        let (first, last) = (libm::floor(reach.0 / PIECE_M) as i64, libm::floor(reach.1 / PIECE_M) as i64);
+        let stretch = self.course.stretch(first, last);
+        let t_street_camera = camera::t_street_camera(&self.config, &stretch, time_s);
+        let pieces: Vec<Arc<Piece>> = (first..=last).map(|number| self.piece(number)).collect();
+        let cars = self.present(&pieces, &stretch, time_s, reach);
+        let anchor = stretch.point(libm::floor(along / PIECE_M) * PIECE_M);
+        let placed: Vec<_> = cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
+        let to_sun = Point::from(self.light.to_sun.map(f64::from));
+        let scene = Scene::new(&self.bodies, &pieces, &placed, &t_street_camera, (anchor, to_sun));
+        Surroundings { scene, t_street_camera, cars }
+    }
+
+    fn present(&self, pieces: &[Arc<Piece>], stretch: &Stretch<'_>, time_s: f64, reach: (f64, f64)) -> Vec<Present> {
+        let mut cars: Vec<Present> = Vec::new();
+        for driver in traffic::drivers(&self.config, stretch, time_s, reach) {
+            let traffic::Driver { id, kind, paint, t_street_car, speed_m_s } = driver;
+            cars.push(Present { id, kind, paint, t_street_car, speed_m_s });
+        }
+        for car in pieces.iter().flat_map(|piece| &piece.parked) {
+            cars.push(Present { id: car.id, kind: car.kind, paint: car.paint, t_street_car: car.t_street_car, speed_m_s: 0.0 });
+        }
+        cars.sort_by_key(|car| car.id);
+        // 8 parking places a piece and traffic 30 m apart leave this bound far away; scripts could reach it.
+        cars.truncate(usize::from(u8::MAX));
+        debug_assert!(cars.iter().all(|car| car.id < layout::PARKED_IDS || car.speed_m_s == 0.0));
+        cars
+    }
+
+    /// A piece, from the few that are kept or made anew: either way the same.
+    fn piece(&self, number: i64) -> Arc<Piece> {
+        let find = |kept: &VecDeque<(i64, Arc<Piece>)>| kept.iter().find(|(known, _)| *known == number).map(|(_, piece)| Arc::clone(piece));
+        let lock = || self.pieces.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(known) = find(&lock()) {
+            return known;
+        }
+        let made = Arc::new(piece(&self.config, &self.course, number));
+        let mut kept = lock();
+        if kept.len() >= KEPT_PIECES {
+            kept.pop_front();
+        }
+        kept.push_back((number, Arc::clone(&made)));
+        made
+    }
+
+    /// Car bodies, for the LiDAR.
+    pub(super) fn bodies(&self) -> &[Mesh; 5] {
+        &self.bodies
+    }
+
+    /// Painter, for the LiDAR.
+    pub(super) fn painter(&self) -> &Painter {
+        &self.painter
+    }
+}
