@@ -31,7 +31,10 @@ pub fn t_street_camera(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64
     let (pitch, roll, yaw, bounce, drift) = (wave(PITCH), wave(ROLL), wave(YAW), wave(BOUNCE_M), wave(DRIFT_M));
     let on_road = stretch.t_street_local(along_m(config, time_s), drift, yaw);
     let height = Vector3::new(0.0, bounce - config.camera_height_m, 0.0);
-    on_road * exp(Vector3::zeros(), height) * exp(Vector3::new(pitch, 0.0, 0.0), Vector3::zeros()) * exp(Vector3::new(0.0, 0.0, roll), Vector3::zeros())
+    on_road
+        * exp(Vector3::zeros(), height)
+        * exp(Vector3::new(pitch, 0.0, 0.0), Vector3::zeros())
+        * exp(Vector3::new(0.0, 0.0, roll), Vector3::zeros())
 }
 
 /// The rig of a configured street: KITTI's proportions.

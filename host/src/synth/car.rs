@@ -1,10 +1,8 @@
 //! Car bodies: a hull lofted over cross-sections, wheels and mirrors. In a car's frame x runs right, y down from the road, z forward;
 //! the origin is the middle of its footprint.
 
-use nalgebra::Vector3;
-
 use super::config::CarKind;
-use super::mesh::{Mesh, Point, Vertex};
+use super::mesh::{Mesh, Point, Triangle, Vertex};
 use super::surface::{Kind, Surface, tone};
 
 /// Cross-section: place along the car, height of the roof or bonnet, of the belt line, half widths there, height of the sill; m.
@@ -107,7 +105,9 @@ fn sections(kind: CarKind) -> &'static [Section] {
 
 /// The painter's figures of a body.
 pub fn shape(kind: CarKind) -> Shape {
-    let s = |side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m| (side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m);
+    let s = |side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m| {
+        (side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m)
+    };
     let (half_m, axles_m, wheel_m, lamps_m, glass) = match kind {
         CarKind::Hatchback => (
             [1.98, 0.87],
@@ -187,9 +187,9 @@ pub fn body(kind: CarKind) -> Mesh {
     let height = f64::from(figures.side_height_m[0]);
     let along = f64::from(figures.side_glass_m[0]) - 0.12;
     for side in [-1.0, 1.0] {
-        let (a, b) = (side * (half_width - 0.06), side * (half_width + 0.13));
-        let low = Point::new(a.min(b), -height - 0.12, along - 0.06);
-        mesh.cuboid(black, low, Point::new(a.max(b), -height + 0.02, along + 0.06), &[]);
+        let (a, b) = (side * (half_width - 0.06), side * (half_width + 0.11));
+        let low = Point::new(a.min(b), -height - 0.08, along - 0.035);
+        mesh.cuboid(black, low, Point::new(a.max(b), -height + 0.03, along + 0.045), &[]);
     }
     mesh.finish()
 }
@@ -223,11 +223,8 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
             let place = at(row, column);
             let along = at((row + 1).min(rows - 1), column) - at(row.saturating_sub(1), column);
             let around = at(row, (column + 1).min(columns - 1)) - at(row, column.saturating_sub(1));
-            let mut normal = along.cross(&around).normalize();
-            let outward = Vector3::new(place.x, place.y + 0.6, 0.15 * place.z);
-            if normal.dot(&outward) < 0.0 {
-                normal = -normal;
-            }
+            // Rings run from the right sill over the roof, rows from front to rear.
+            let normal = around.cross(&along).normalize();
             mesh.vertices.push(vertex(place, normal));
         }
     }
@@ -235,8 +232,8 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
     for row in 0..rows - 1 {
         for column in 0..columns - 1 {
             let (a, b, c, d) = (index(row, column), index(row, column + 1), index(row + 1, column), index(row + 1, column + 1));
-            mesh.facing([a, b, c], surface);
-            mesh.facing([b, d, c], surface);
+            mesh.triangles.push(Triangle { corners: [a, b, c], surface });
+            mesh.triangles.push(Triangle { corners: [b, d, c], surface });
         }
     }
     for (row, direction) in [(0, 1.0), (rows - 1, -1.0)] {

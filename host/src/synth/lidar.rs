@@ -100,8 +100,7 @@ impl Street {
             [0, 1, 2].map(|k| shares[0] * a[k] + shares[1] * b[k] + shares[2] * c[k])
         };
         let spread = (0.003 * range_m) as f32;
-        let spot =
-            Spot { surface_m: mix(|vertex| vertex.surface_m), footprint_m: [spread; 3], own_normal: mix(|vertex| vertex.normal) };
+        let spot = Spot { surface_m: mix(|vertex| vertex.surface_m), footprint_m: [spread; 3], own_normal: mix(|vertex| vertex.normal) };
         let painted = self.painter().paint(&mesh.surfaces[triangle.surface as usize], &spot, thing.coat);
         let [red, green, blue] = painted.tone;
         let noise_m = self.config().lidar_noise_m;

@@ -8,11 +8,11 @@ use super::texture::Ripmap;
 
 type Direction = Vector3<f32>;
 
-const SUN: Tone = [2.75, 2.50, 2.15];
-const SKY: Tone = [0.50, 0.60, 0.76];
-const BOUNCE: Tone = [0.30, 0.27, 0.23];
+const SUN: Tone = [3.05, 2.76, 2.34];
+const SKY: Tone = [0.40, 0.49, 0.64];
+const BOUNCE: Tone = [0.22, 0.20, 0.17];
 const HAZE: Tone = [0.74, 0.80, 0.86];
-const HAZE_M: f32 = 420.0;
+const HAZE_M: f32 = 800.0;
 
 /// Sky, clouds and ground mirrored or seen.
 pub struct Light {

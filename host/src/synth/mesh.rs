@@ -151,8 +151,8 @@ impl Mesh {
 
     /// Smallest upright box around the mesh.
     pub fn bounds_m(&self) -> (Point, Point) {
-        self.vertices.iter().fold((Point::repeat(1e9), Point::repeat(-1e9)), |(low, high), vertex| {
-            (low.inf(&vertex.place_m), high.sup(&vertex.place_m))
-        })
+        self.vertices
+            .iter()
+            .fold((Point::repeat(1e9), Point::repeat(-1e9)), |(low, high), vertex| (low.inf(&vertex.place_m), high.sup(&vertex.place_m)))
     }
 }

@@ -41,8 +41,10 @@ mod tests;
 mod texture;
 mod traffic;
 mod window_paint;
+mod writer;
 
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
 pub use frame::{ObjectTruth, SynthFrame};
 pub use path::PIECE_M;
 pub use street::{Street, SynthError};
+pub use writer::write_kitti;

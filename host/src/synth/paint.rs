@@ -253,7 +253,8 @@ impl Painter {
         let lip = stripes(v, tall, 0.05, fv);
         let roll = stripes(u, wide, 0.07, fu);
         let own = (unit(cell(surface.seed, column, row)) - 0.5) * survives(wide, fu.max(fv)) * 0.45;
-        let shade = 1.0 + own + 0.10 * self.fine(surface.seed, spot, 1.0) + 0.14 * self.broad(surface.seed, spot, 1.0) - 0.5 * lip - 0.2 * roll;
+        let shade =
+            1.0 + own + 0.10 * self.fine(surface.seed, spot, 1.0) + 0.14 * self.broad(surface.seed, spot, 1.0) - 0.5 * lip - 0.2 * roll;
         Painted::dull(times(surface.tone, shade))
     }
 

@@ -129,7 +129,8 @@ impl Shading<'_> {
     fn band(&self, band: &Band) -> Picture {
         let width = self.renderer.pinhole.width;
         let count = band.rows * width;
-        let mut picture = Picture { rgb: Vec::with_capacity(count), depth_m: Vec::with_capacity(count), instances: Vec::with_capacity(count) };
+        let mut picture =
+            Picture { rgb: Vec::with_capacity(count), depth_m: Vec::with_capacity(count), instances: Vec::with_capacity(count) };
         for row in 0..band.rows {
             let seen: [&[u32]; SAMPLES] = core::array::from_fn(|sample| band.row(sample, row));
             let v = (band.first_row + row) as f64;
@@ -139,7 +140,8 @@ impl Shading<'_> {
                 let levels = light.map(|value| develop(value * self.gain));
                 picture.rgb.push(self.sensor.read((band.first_row + row) * width + column, levels));
                 picture.depth_m.push(depth_m);
-                let instance = if samples[0] == SKY { 0 } else { self.scene.things[self.setups[samples[0] as usize].thing as usize].instance };
+                let instance =
+                    if samples[0] == SKY { 0 } else { self.scene.things[self.setups[samples[0] as usize].thing as usize].instance };
                 picture.instances.push(instance);
             }
         }

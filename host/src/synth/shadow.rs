@@ -32,11 +32,7 @@ impl ShadowMap {
     }
 
     fn texel(&self, place: Point) -> (f64, f64, f64) {
-        (
-            place.dot(&self.axes[0]) / TEXEL_M + self.offset[0],
-            place.dot(&self.axes[1]) / TEXEL_M + self.offset[1],
-            place.dot(&self.axes[2]),
-        )
+        (place.dot(&self.axes[0]) / TEXEL_M + self.offset[0], place.dot(&self.axes[1]) / TEXEL_M + self.offset[1], place.dot(&self.axes[2]))
     }
 
     /// Whether a ball may touch the map.

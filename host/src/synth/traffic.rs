@@ -92,7 +92,7 @@ pub fn drivers(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64, (from_
             continue;
         }
         let turn = if sign < 0.0 { core::f64::consts::PI } else { 0.0 };
-        let yaw = turn + libm::atan(slope * sign) ;
+        let yaw = turn + libm::atan(slope * sign);
         let paint = choose_car(&mut Dice::new(config.seed, number as i64, 0x5C21)).1;
         let t_street_car = stretch.t_street_local(at, lateral_m, yaw);
         drivers.push(Driver { id: number as u32 + 1, kind: car.kind, paint, t_street_car, speed_m_s });

@@ -19,7 +19,8 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
     let ([u, v, _], [fu, fv, _], [width, height]) = (spot.surface_m, spot.footprint_m, surface.size_m);
     let h = surface.seed;
     let mut tone = glass(painter, surface, spot);
-    let folds = 1.0 + 0.12 * painter.fine(h, &Spot { footprint_m: [fu, 0.2 * fv, 0.0], surface_m: [u * 1.5, v * 0.2, 0.0], own_normal: [0.0; 3] }, 1.0);
+    let folds = 1.0
+        + 0.12 * painter.fine(h, &Spot { footprint_m: [fu, 0.2 * fv, 0.0], surface_m: [u * 1.5, v * 0.2, 0.0], own_normal: [0.0; 3] }, 1.0);
     let cloth = [[0.62, 0.60, 0.55], [0.55, 0.50, 0.40], [0.60, 0.60, 0.62], [0.40, 0.30, 0.26]][(h >> 3) as usize & 3];
     match h % 6 {
         0 | 1 => {
@@ -110,9 +111,8 @@ pub fn door(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
     let mut tone = wood;
     for (from, to) in [(0.30, 0.58), (0.64, 0.95)] {
         for (a, b) in [(0.14, 0.46), (0.54, 0.86)] {
-            let panel = |grow: f32| {
-                within(a * width - grow, b * width + grow, u, fu) * within(from * height - grow, to * height + grow, v, fv)
-            };
+            let panel =
+                |grow: f32| within(a * width - grow, b * width + grow, u, fu) * within(from * height - grow, to * height + grow, v, fv);
             let groove = panel(0.015) - panel(-0.015);
             tone = blend(tone, times(wood, 0.45), groove.max(0.0));
         }

@@ -1,0 +1,162 @@
+//! The street as a KITTI odometry folder with all its truth beside it.
+//!
+//! Everything goes into a sibling folder first, which takes the asked-for name when it is complete: what stands under that name is whole.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use dynvox_core::geometry::Transform;
+use image::ExtendedColorType::{L8, L16, Rgb8};
+use rayon::prelude::*;
+
+use super::frame::SynthFrame;
+use super::street::{Street, SynthError};
+
+/// Writes the configured number of frames to `folder` in KITTI's odometry layout, as sequence 00:
+///
+/// - `sequences/00/image_{0,1}` grey and `image_{2,3}` colour pairs, `times.txt`, `calib.txt` (`P0`..`P3`, `Tr` from LiDAR to camera),
+///   `velodyne/NNNNNN.bin`;
+/// - `sequences/00/depth` (1/256 m) and `disp` (1/256 px) as 16-bit PNG, 0 where there is none or it does not fit;
+/// - `sequences/00/instances/NNNNNN.png` (k = the frame's instance k) and `.txt` (`id class score x1 y1 x2 y2`);
+/// - `sequences/00/objects.csv`: every car near the camera at every frame, `instance` being its value in the masks;
+/// - `poses/00.txt`.
+///
+/// `progress` is told (frames written, frames in all). Colour and grey cameras share one place, so `P2` equals `P0` and `P3` equals `P1`.
+///
+/// # Errors
+/// `folder` exists and is not empty, or a file cannot be written; nothing half-written stays behind.
+pub fn write_kitti(street: &Street, folder: &Path, mut progress: impl FnMut(u32, u32)) -> Result<(), SynthError> {
+    if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
+        return Err(SynthError::NotEmpty(folder.to_path_buf()));
+    }
+    let name = folder.file_name().map_or_else(|| "synth".into(), |name| name.to_string_lossy().into_owned());
+    let draft = Draft(folder.with_file_name(format!(".{name}.partial-{}", std::process::id())));
+    write_all(street, &draft.0, &mut progress)?;
+    // An empty folder of that name may be in the way.
+    if folder.is_dir() {
+        fs::remove_dir(folder).map_err(at(folder))?;
+    }
+    fs::rename(&draft.0, folder).map_err(at(folder))
+}
+
+/// A folder that goes when it is dropped, unless it was renamed.
+struct Draft(PathBuf);
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        // Gone already when all went well.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn at(path: &Path) -> impl FnOnce(std::io::Error) -> SynthError {
+    let path = path.to_path_buf();
+    move |source| SynthError::Write { path, source }
+}
+
+fn write_all(street: &Street, folder: &Path, progress: &mut impl FnMut(u32, u32)) -> Result<(), SynthError> {
+    let sequence = folder.join("sequences/00");
+    for name in ["image_0", "image_1", "image_2", "image_3", "depth", "disp", "velodyne", "instances"] {
+        let path = sequence.join(name);
+        fs::create_dir_all(&path).map_err(at(&path))?;
+    }
+    fs::create_dir_all(folder.join("poses")).map_err(at(folder))?;
+    let count = street.config().frames;
+    let (mut times, mut poses) = (String::new(), String::new());
+    let mut objects = String::from("frame,id,instance,class");
+    for k in 0..12 {
+        let _ = write!(objects, ",t_world_object_{k}");
+    }
+    objects.push_str(",width_m,height_m,length_m,moving,speed_m_s\n");
+    for index in 0..count {
+        let (frame, scan) = rayon::join(|| street.frame(index), || street.lidar(index));
+        write_frame(street, &sequence, &frame, &scan)?;
+        // Writing to a String cannot fail.
+        let _ = writeln!(times, "{:.6e}", frame.time_s);
+        let _ = writeln!(poses, "{}", row(&frame.t_world_camera, " "));
+        for (number, object) in frame.objects.iter().enumerate() {
+            let [width, height, length] = object.dimensions_m;
+            let pose = row(&object.t_world_object, ",");
+            let (id, instance, class) = (object.id, number + 1, object.class);
+            let moving = u8::from(object.moving);
+            let _ = writeln!(
+                objects,
+                "{index},{id},{instance},{class},{pose},{width:.4},{height:.4},{length:.4},{moving},{:.4}",
+                object.speed_m_s
+            );
+        }
+        progress(index + 1, count);
+    }
+    write(&sequence.join("times.txt"), times.as_bytes())?;
+    write(&sequence.join("objects.csv"), objects.as_bytes())?;
+    write(&sequence.join("calib.txt"), calibration(street).as_bytes())?;
+    write(&folder.join("poses/00.txt"), poses.as_bytes())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), SynthError> {
+    fs::write(path, bytes).map_err(at(path))
+}
+
+/// The upper three rows of a motion, row by row.
+fn row(motion: &Transform, separator: &str) -> String {
+    let matrix = motion.to_homogeneous();
+    let values = (0..3).flat_map(|row| (0..4).map(move |column| (row, column)));
+    let texts: Vec<String> = values.map(|(row, column)| format!("{:.12e}", matrix[(row, column)])).collect();
+    texts.join(separator)
+}
+
+fn calibration(street: &Street) -> String {
+    let rig = street.rig();
+    let mut text = String::new();
+    for (name, shift) in [("P0", 0.0), ("P1", 1.0), ("P2", 0.0), ("P3", 1.0)] {
+        let (f, u, v) = (rig.focal_px, rig.center_u_px, rig.center_v_px);
+        let offset = -shift * rig.focal_baseline_px_m();
+        let values = [f, 0.0, u, offset, 0.0, f, v, 0.0, 0.0, 0.0, 1.0, 0.0].map(|value| format!("{value:.12e}"));
+        let _ = writeln!(text, "{name}: {}", values.join(" "));
+    }
+    let _ = writeln!(text, "Tr: {}", row(&street.t_camera_lidar(), " "));
+    text
+}
+
+fn write_frame(street: &Street, sequence: &Path, frame: &SynthFrame, scan: &[[f32; 4]]) -> Result<(), SynthError> {
+    let focal_baseline = street.rig().focal_baseline_px_m() as f32;
+    let fixed = |value: f32| if value > 0.0 && value * 256.0 < 65_535.0 { (value * 256.0 + 0.5) as u16 } else { 0 };
+    let sixteen = |of: &dyn Fn(f32) -> f32| -> Vec<u8> { frame.depth_m.iter().flat_map(|&z| fixed(of(z)).to_ne_bytes()).collect() };
+    let pictures = [
+        ("image_0", frame.left_grey.clone(), L8),
+        ("image_1", frame.right_grey.clone(), L8),
+        ("image_2", frame.left_rgb.concat(), Rgb8),
+        ("image_3", frame.right_rgb.concat(), Rgb8),
+        ("depth", sixteen(&|z| z), L16),
+        ("disp", sixteen(&|z| if z > 0.0 { focal_baseline / z } else { 0.0 }), L16),
+        ("instances", frame.instances.clone(), L8),
+    ];
+    let index = frame.index;
+    pictures.par_iter().try_for_each(|(name, bytes, colour)| {
+        let path = sequence.join(name).join(format!("{index:06}.png"));
+        image::save_buffer(&path, bytes, frame.width as u32, frame.height as u32, *colour)
+            .map_err(|error| SynthError::Write { path, source: std::io::Error::other(error) })
+    })?;
+    write(&sequence.join(format!("instances/{index:06}.txt")), instance_list(frame).as_bytes())?;
+    let points: Vec<u8> = scan.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+    write(&sequence.join(format!("velodyne/{index:06}.bin")), &points)
+}
+
+/// `id class score x1 y1 x2 y2` of every instance with a pixel.
+fn instance_list(frame: &SynthFrame) -> String {
+    let mut boxes = vec![(usize::MAX, usize::MAX, 0, 0); frame.objects.len()];
+    for (pixel, &instance) in frame.instances.iter().enumerate() {
+        if let Some(b) = usize::from(instance).checked_sub(1).and_then(|number| boxes.get_mut(number)) {
+            let (u, v) = (pixel % frame.width, pixel / frame.width);
+            *b = (b.0.min(u), b.1.min(v), b.2.max(u + 1), b.3.max(v + 1));
+        }
+    }
+    let mut text = String::from("# id class score x1 y1 x2 y2\n");
+    for (number, (object, b)) in frame.objects.iter().zip(&boxes).enumerate() {
+        if b.0 != usize::MAX {
+            let _ = writeln!(text, "{} {} 1.00 {}.0 {}.0 {}.0 {}.0", number + 1, object.class, b.0, b.1, b.2, b.3);
+        }
+    }
+    text
+}
