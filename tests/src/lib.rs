@@ -1,1 +1,68 @@
-//! Shared ground of the integration tests: a slab for a mapper, and small clips of the synthetic street.
+//! Shared ground of the integration tests: a slab for a mapper, and clips of the synthetic street.
+
+use dynvox::synth::{Street, StreetConfig, SynthFrame};
+use dynvox_core::{Capacity, Config, Mapper, StereoFrame, image::View, memory::SLAB_ALIGN};
+
+/// A slab on the heap, aligned as a mapper wants it.
+pub struct HeapSlab {
+    bytes: Vec<u8>,
+    start: usize,
+    len: usize,
+}
+
+impl HeapSlab {
+    /// A zeroed slab of the capacity's size.
+    pub fn of(capacity: &Capacity) -> Self {
+        let len = capacity.bytes();
+        let bytes = vec![0; len + SLAB_ALIGN];
+        let start = bytes.as_ptr().align_offset(SLAB_ALIGN);
+        Self { bytes, start, len }
+    }
+
+    /// Its bytes.
+    pub fn bytes(&mut self) -> &mut [u8] {
+        &mut self.bytes[self.start..self.start + self.len]
+    }
+}
+
+/// The synthetic street at a size, in memory.
+pub struct Clip {
+    street: Street,
+    frames: Vec<SynthFrame>,
+}
+
+impl Clip {
+    /// The first `frames` frames at `width` x `height`, with default traffic.
+    pub fn street(width: u32, height: u32, frames: u32) -> Self {
+        let street = Street::new(StreetConfig { width, height, frames, ..StreetConfig::default() }).expect("the default street is sound");
+        let frames = (0..frames).map(|i| street.frame(i)).collect();
+        Self { street, frames }
+    }
+
+    /// Its default configuration.
+    pub fn config(&self) -> Config {
+        Config::for_rig(self.street.rig())
+    }
+
+    /// Its frames as the core takes them.
+    pub fn stereo(&self) -> impl Iterator<Item = StereoFrame<'_>> {
+        let (width, height) = (self.street.config().width as usize, self.street.config().height as usize);
+        self.frames.iter().map(move |frame| StereoFrame {
+            left: View::new(&frame.left_grey, width, height).expect("a whole image"),
+            right: View::new(&frame.right_grey, width, height).expect("a whole image"),
+            colour: None,
+            class: None,
+        })
+    }
+
+    /// Flips the lowest bit of a left pixel.
+    pub fn flip_a_bit(&mut self, frame: usize, pixel: usize) {
+        self.frames[frame].left_grey[pixel] ^= 1;
+    }
+
+    /// Runs `drive` with a mapper of that capacity.
+    pub fn with_mapper<R>(&self, capacity: &Capacity, drive: impl FnOnce(&mut Mapper<'_>) -> R) -> R {
+        let mut slab = HeapSlab::of(capacity);
+        drive(&mut Mapper::new(capacity, &self.config(), slab.bytes()).expect("the slab fits the capacity"))
+    }
+}

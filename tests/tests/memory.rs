@@ -1,0 +1,41 @@
+//! Memory is what the formula says, in every profile.
+
+use dynvox_core::{Capacity, Mapper, NewError, Serial, memory::SlabError};
+use dynvox_tests::{Clip, HeapSlab};
+
+#[test]
+fn the_footprint_is_what_was_cut_to_the_byte() {
+    let clip = Clip::street(320, 96, 1);
+    for (name, capacity) in Capacity::PROFILES {
+        clip.with_mapper(&capacity, |mapper| {
+            assert_eq!(mapper.footprint().bytes(), capacity.bytes(), "{name}");
+        });
+    }
+}
+
+#[test]
+fn a_slab_too_small_is_refused_with_the_bytes_it_lacks() {
+    let clip = Clip::street(320, 96, 1);
+    let mut slab = HeapSlab::of(&Capacity::TINY);
+    let len = slab.bytes().len();
+    let short = Mapper::new(&Capacity::TINY, &clip.config(), &mut slab.bytes()[..len - 77]).err();
+    assert_eq!(short, Some(NewError::Slab(SlabError::TooSmall { missing: 77 })));
+    assert!(Mapper::new(&Capacity::TINY, &clip.config(), slab.bytes()).is_ok(), "and with them it is taken");
+}
+
+#[test]
+fn use_grows_with_the_map_and_never_beyond_what_was_cut() {
+    let clip = Clip::street(320, 96, 6);
+    clip.with_mapper(&Capacity::TINY, |mapper| {
+        let mut last = 0;
+        for frame in clip.stereo() {
+            let report = mapper.step(&frame, &Serial).expect("a good frame");
+            let footprint = mapper.footprint();
+            let sdf = footprint.region("volume.sdf").expect("the map has distances");
+            assert_eq!(sdf.used, report.blocks.used as usize * 1_024);
+            assert!(sdf.used >= last && sdf.peak <= sdf.bytes);
+            last = sdf.used;
+        }
+        assert!(last > 0);
+    });
+}
