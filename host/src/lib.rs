@@ -1,5 +1,8 @@
 //! The host of dynvox: feeds the core, watches its ceilings, shows what it made.
 
+pub mod cli;
 pub mod dataset;
 pub mod evaluation;
+pub mod export;
+pub mod harness;
 pub mod synth;

@@ -1,2 +1,5 @@
-//! The host of dynvox.
-fn main() {}
+//! The binary `dynvox`.
+
+fn main() -> std::process::ExitCode {
+    dynvox::cli::main()
+}

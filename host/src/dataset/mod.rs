@@ -11,6 +11,7 @@ mod kitti;
 mod open;
 mod scaled;
 mod sequence;
+mod street;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -20,6 +21,7 @@ pub use image::{Image, luma, read_png};
 pub use open::{Found, Kind, open, sequences_at, survey};
 pub use scaled::Scaled;
 pub use sequence::Sequence;
+pub use street::StreetFrames;
 pub use table::{pose_of_row, read_poses};
 
 use dynvox_core::geometry::{StereoRig, Transform};
@@ -33,6 +35,8 @@ pub struct StereoImages {
     pub right: Image<u8>,
     /// Left image in colour, where the data set has it: the same camera as `left`.
     pub colour: Option<Image<[u8; 3]>>,
+    /// What the renderer of a synthetic frame knows exactly.
+    pub exact: Option<ExactFrame>,
 }
 
 /// What a renderer knows of a frame exactly.
@@ -40,7 +44,7 @@ pub struct StereoImages {
 pub struct ExactFrame {
     /// Depth of the left pixels, m; 0 or infinite where there is none.
     pub depth_m: Image<f32>,
-    /// Whether the pixel belongs to something that can move, parked or not.
+    /// Whether the pixel belongs to something that moves in this frame.
     pub moving: Image<bool>,
 }
 
@@ -83,11 +87,6 @@ pub trait Dataset: Send + Sync {
 
     /// True `t_world_camera` of every frame's left camera, where known.
     fn truth(&self) -> Option<&[Transform]> {
-        None
-    }
-
-    /// Exact depth and masks of a frame, where known.
-    fn exact(&self, _index: usize) -> Option<ExactFrame> {
         None
     }
 

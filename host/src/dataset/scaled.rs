@@ -130,16 +130,14 @@ impl Dataset for Scaled {
             left: self.grey(&frame.left).ok_or_else(failed)?,
             right: self.grey(&frame.right).ok_or_else(failed)?,
             colour: colour.transpose()?,
+            exact: frame
+                .exact
+                .and_then(|exact| Some(ExactFrame { depth_m: self.nearest(&exact.depth_m)?, moving: self.nearest(&exact.moving)? })),
         })
     }
 
     fn truth(&self) -> Option<&[Transform]> {
         self.inner.truth()
-    }
-
-    fn exact(&self, index: usize) -> Option<ExactFrame> {
-        let exact = self.inner.exact(index)?;
-        Some(ExactFrame { depth_m: self.nearest(&exact.depth_m)?, moving: self.nearest(&exact.moving)? })
     }
 
     fn notes(&self) -> &[String] {

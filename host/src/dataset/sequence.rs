@@ -98,7 +98,7 @@ impl Dataset for Sequence {
         for (path, image) in [(left_path, &left.grey), (right_path, &right)] {
             check_size(path, image, self.size)?;
         }
-        Ok(StereoImages { left: left.grey, right, colour: left.colour })
+        Ok(StereoImages { left: left.grey, right, colour: left.colour, exact: None })
     }
 
     fn truth(&self) -> Option<&[Transform]> {

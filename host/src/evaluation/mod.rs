@@ -1,3 +1,4 @@
 //! How good a run was, where the truth is known.
 
+pub mod exact;
 pub mod trajectory;

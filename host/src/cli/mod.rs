@@ -1,0 +1,89 @@
+//! The command line. Errors become sentences here and nowhere else.
+
+mod budget;
+mod inspect;
+mod run;
+mod settings;
+mod synth;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+const EXAMPLES: &str = "\
+Examples:
+  dynvox                                        map the synthetic street: no data set needed
+  dynvox inspect ~/kitti                        what is there, and the command that maps it
+  dynvox run ~/kitti --sequence 06              map a KITTI odometry sequence
+  dynvox run ~/tracking --sequence 0003 --frames 100 --threads 4
+  dynvox run ~/my-rig                           a folder with left/, right/, calib.txt
+  dynvox run ~/kitti --sequence 06 --profile small --scale 0.5
+  dynvox run --set volume.voxel_size_m=0.1 --set street.seed=7 --out out/coarse
+  dynvox run --config out/coarse/config.toml    the same again
+  dynvox budget --profile small                 where the bytes of a profile go
+  dynvox synth --out street --set street.frames=50
+
+A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open the last in a browser.";
+
+/// Maps streets densely from a stereo camera, within a byte budget fixed in advance, with the same bits on every machine.
+#[derive(Debug, Parser)]
+#[command(name = "dynvox", version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Map a data set, or the synthetic street without one (this is also what `dynvox` alone does)
+    Run(Box<run::RunArgs>),
+    /// Say what a folder holds, what is missing, and the command that maps it
+    Inspect(inspect::InspectArgs),
+    /// Show where the bytes go: all profiles, or one region by region
+    Budget(budget::BudgetArgs),
+    /// Write the synthetic street in KITTI's layout, with all its truth
+    Synth(synth::SynthArgs),
+}
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    let filter = tracing_subscriber::EnvFilter::try_from_env("DYNVOX_LOG").unwrap_or_else(|_| "warn".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    let done = match Cli::parse().command {
+        None => run::run(&run::RunArgs::of_nothing()),
+        Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Inspect(args)) => inspect::run(&args),
+        Some(Command::Budget(args)) => budget::run(&args),
+        Some(Command::Synth(args)) => synth::run(&args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The profile of that name.
+fn profile(name: &str) -> anyhow::Result<dynvox_core::Capacity> {
+    let known = dynvox_core::Capacity::PROFILES;
+    known.iter().find(|(known, _)| *known == name).map(|(_, capacity)| *capacity).ok_or_else(|| {
+        let names = known.map(|(name, _)| name).join(", ");
+        anyhow::anyhow!("there is no profile {name}. Choose one of {names}; `dynvox budget` shows them")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_well_formed_and_every_example_parses() {
+        Cli::command().debug_assert();
+        for line in EXAMPLES.lines().filter(|line| line.trim_start().starts_with("dynvox")) {
+            let command = line.trim().split("   ").next().unwrap();
+            assert!(Cli::try_parse_from(command.split_whitespace()).is_ok(), "{command}");
+        }
+    }
+}

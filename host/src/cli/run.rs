@@ -1,0 +1,177 @@
+//! `dynvox run`.
+
+use super::settings::Settings;
+use crate::dataset::{self, Dataset, Images, Kind, Scaled};
+use crate::export::{self, FolderError, RunFolder, Summary};
+use crate::harness::{self, Plan, RunRecord};
+use anyhow::bail;
+use std::path::{Path, PathBuf};
+
+/// Where run folders go unless `--out` says otherwise.
+const DEFAULT_PARENT: &str = "out";
+
+#[derive(Debug, clap::Args)]
+pub struct RunArgs {
+    /// Data set to map; the synthetic street without one
+    path: Option<PathBuf>,
+    /// Sequence within the data set: 06, 0003
+    #[arg(long, value_name = "NAME")]
+    sequence: Option<String>,
+    /// Layout of the data set; guessed from the path unless given
+    #[arg(long, value_enum)]
+    dataset: Option<Kind>,
+    /// Camera pair of KITTI odometry
+    #[arg(long, value_enum, default_value_t)]
+    images: Images,
+    /// Byte budget: tiny, small, onboard or desktop
+    #[arg(long, default_value = "onboard", value_name = "NAME")]
+    profile: String,
+    /// Threads; the result does not depend on them [default: as many as the machine has, at most 4]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// First frame
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    start: usize,
+    /// Frames to map at most
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+    /// Take every N-th frame
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    stride: usize,
+    /// Shrink the images, above 0 and up to 1
+    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    scale: f64,
+    /// Settings from a file; config.toml of an earlier run is one
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// One setting, over those of the file; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder for the results [default: out/<data set>-NNN]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Replace the run folder that is there
+    #[arg(long)]
+    overwrite: bool,
+    /// Write the summary to standard output as JSON, and nothing else
+    #[arg(long)]
+    json: bool,
+    /// Show no progress
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl RunArgs {
+    /// What `dynvox` alone means.
+    pub fn of_nothing() -> Self {
+        #[derive(clap::Parser)]
+        struct Alone {
+            #[command(flatten)]
+            args: RunArgs,
+        }
+        <Alone as clap::Parser>::parse_from(["dynvox"]).args
+    }
+
+    fn silent(&self) -> bool {
+        self.quiet || self.json
+    }
+
+    fn open(&self, settings: &Settings) -> anyhow::Result<Box<dyn Dataset>> {
+        let dataset: Box<dyn Dataset> = match &self.path {
+            Some(path) => dataset::open(path, self.dataset, self.sequence.as_deref(), self.images)?,
+            None if self.dataset.is_some() || self.sequence.is_some() => {
+                bail!("--dataset and --sequence need a data set. Give its path: `dynvox run PATH`")
+            }
+            None => super::synth::street(settings)?,
+        };
+        Ok(if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) })
+    }
+}
+
+pub fn run(args: &RunArgs) -> anyhow::Result<()> {
+    let settings = Settings::resolve(args.config.as_deref(), &args.set)?;
+    let capacity = super::profile(&args.profile)?;
+    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
+    if threads == 0 || args.stride == 0 || args.frames == Some(0) {
+        bail!("--threads, --stride and --frames begin at 1. Give a larger number");
+    }
+    let dataset = args.open(&settings)?;
+    let plan = Plan {
+        indices: harness::frame_indices(dataset.len(), args.start, args.stride, args.frames)?,
+        profile: args.profile.clone(),
+        capacity,
+        config: settings.config(dataset.rig()),
+        config_toml: settings.to_toml(args.path.is_none())?,
+        threads,
+        quiet: args.silent(),
+        dataset,
+    };
+    let target = args.out.clone().unwrap_or_else(|| RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name()));
+    let folder = RunFolder::begin(&target, args.overwrite)?;
+    if !args.silent() {
+        introduce(&plan);
+    }
+    let record = harness::run(&plan, &folder)?;
+    let summary = Summary::of(&record);
+    write(&folder, &record, &summary)?;
+    let place = folder.commit()?;
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&summary)?);
+    } else if !args.quiet {
+        conclude(&record, &place);
+    }
+    Ok(())
+}
+
+fn write(folder: &RunFolder, run: &RunRecord, summary: &Summary) -> Result<(), FolderError> {
+    let poses = run.poses();
+    let times: Vec<f64> = run.rows.iter().map(|row| row.time_s).collect();
+    folder.write("config.toml", |out| std::io::Write::write_all(out, run.config_toml.as_bytes()))?;
+    folder.write("trajectory_kitti.txt", |out| export::write_kitti(out, &poses))?;
+    folder.write("trajectory_tum.txt", |out| export::write_tum(out, &times, &poses))?;
+    folder.write("frames.csv", |out| export::write_frames(out, &run.rows))?;
+    folder.write("report.html", |out| export::report::write(out, run))?;
+    folder.write("summary.json", |out| Ok(serde_json::to_writer_pretty(out, summary)?))
+}
+
+fn introduce(plan: &Plan) {
+    let (width, height) = plan.dataset.size();
+    eprintln!(
+        "{}: {} frames of {width} x {height} px, profile {}, {} thread{}",
+        plan.dataset.name(),
+        plan.indices.len(),
+        plan.profile,
+        plan.threads,
+        if plan.threads == 1 { "" } else { "s" }
+    );
+    for note in plan.dataset.notes() {
+        eprintln!("note: {note}");
+    }
+}
+
+fn conclude(run: &RunRecord, place: &Path) {
+    let line = |name: &str, value: String| println!("{name:<22}{value}");
+    line("frames", format!("{} at {:.1} fps", run.rows.len(), run.fps()));
+    if let Some(errors) = &run.errors {
+        if let (Some(percent), Some(deg_per_m)) = (errors.t_err_percent, errors.r_err_deg_per_m) {
+            line("trajectory error", format!("{percent:.3} %, {deg_per_m:.4} deg/m over pieces"));
+        }
+        line("", format!("{:.2} cm, {:.4} deg per frame; ATE {:.3} m", 100.0 * errors.rpe_t_m, errors.rpe_r_deg, errors.ate_m));
+    }
+    if let Some(exact) = &run.exact {
+        line(
+            "map against truth",
+            format!("median {:.1} cm, {:.1} % complete within 20 m", 100.0 * exact.median_error_m, 100.0 * exact.completeness),
+        );
+    }
+    line("map", format!("{} triangles, {} of {} blocks used at most", run.mesh.triangles, run.blocks_peak(), run.capacity.blocks));
+    let refused = run.blocks_refused();
+    if refused > 0 {
+        line("", format!("{refused} blocks found no room: the map has holes. Choose a larger --profile or a larger volume.voxel_size_m"));
+    }
+    if run.held_frames() > 0 {
+        line("held motion", format!("{} frames had too few matches", run.held_frames()));
+    }
+    line("digest", format!("{:016x}", run.digest()));
+    line("results", place.display().to_string());
+}

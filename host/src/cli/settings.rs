@@ -1,0 +1,194 @@
+//! Settings: defaults, then the file of `--config`, then each `--set key=value`. Unknown keys are errors that name the key.
+
+use crate::synth::StreetConfig;
+use anyhow::{Context, bail};
+use dynvox_core::Config;
+use dynvox_core::egomotion::EgomotionConfig;
+use dynvox_core::geometry::StereoRig;
+use dynvox_core::scene_flow::SceneFlowConfig;
+use dynvox_core::stereo::StereoConfig;
+use dynvox_core::volume::{MeshConfig, RaycastConfig, VolumeConfig};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use toml::{Table, Value};
+
+/// Everything that can be configured, in the sections of the file. The rig is not among it: it comes with the data set.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    stereo: StereoConfig,
+    scene_flow: SceneFlowConfig,
+    egomotion: EgomotionConfig,
+    volume: VolumeConfig,
+    raycast: RaycastConfig,
+    mesh: MeshConfig,
+    /// The synthetic street; absent from the file of a run on other data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    street: Option<StreetConfig>,
+}
+
+impl Settings {
+    /// Resolves defaults, file and settings of the command line, in that order.
+    pub fn resolve(file: Option<&Path>, sets: &[String]) -> anyhow::Result<Self> {
+        let defaults = Self { street: Some(StreetConfig::default()), ..Self::default() };
+        let mut layers = Layers { table: Table::try_from(&defaults)?, settings: defaults };
+        if let Some(path) = file {
+            let shown = path.display();
+            let text = std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read. Check the path of --config"))?;
+            let table: Table = text.parse().map_err(|error: toml::de::Error| {
+                anyhow::anyhow!("{shown} is not TOML: {}. Correct it, or begin with the config.toml of a run", one_line(&error))
+            })?;
+            for (key, value) in leaves("", &table) {
+                layers.set(&key, value).with_context(|| format!("{shown} cannot be used"))?;
+            }
+        }
+        for set in sets {
+            let Some((key, text)) = set.split_once('=') else {
+                bail!("--set {set} has no value. Write --set key=value, as in --set volume.voxel_size_m=0.1");
+            };
+            layers.set(key.trim(), value_of(text.trim())).with_context(|| format!("--set {set} cannot be used"))?;
+        }
+        Ok(layers.settings)
+    }
+
+    /// The mapper's configuration for a rig.
+    pub fn config(&self, rig: StereoRig) -> Config {
+        let Self { stereo, scene_flow, egomotion, volume, raycast, mesh, street: _ } = self;
+        Config {
+            rig,
+            stereo: *stereo,
+            scene_flow: *scene_flow,
+            egomotion: *egomotion,
+            volume: *volume,
+            raycast: *raycast,
+            mesh: *mesh,
+        }
+    }
+
+    /// The street's configuration.
+    pub fn street(&self) -> StreetConfig {
+        self.street.clone().unwrap_or_default()
+    }
+
+    /// All settings as a file that `--config` takes.
+    pub fn to_toml(&self, with_street: bool) -> anyhow::Result<String> {
+        let street = if with_street { self.street.clone() } else { None };
+        Ok(toml::to_string(&Self { street, ..self.clone() })?)
+    }
+}
+
+/// Settings under construction: the same as a table and as values.
+struct Layers {
+    table: Table,
+    settings: Settings,
+}
+
+impl Layers {
+    /// Sets one key and checks at once that it is known and its value of the right kind, so that the error can name it.
+    fn set(&mut self, key: &str, value: Value) -> anyhow::Result<()> {
+        let known = self.table.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        match key.split_once('.') {
+            None => bail!("`{key}` is not a key. Keys are section.name with one of the sections {known}"),
+            Some((section, _)) if !self.table.contains_key(section) => {
+                bail!("`{key}` is not a key: there is no section {section}. Sections are {known}")
+            }
+            Some(_) => insert(&mut self.table, key, value),
+        }
+        self.settings =
+            self.table.clone().try_into().map_err(|error| {
+                anyhow::anyhow!("`{key}`: {}. The config.toml of a run lists all keys with their values", one_line(&error))
+            })?;
+        Ok(())
+    }
+}
+
+/// Every value below a table that is not a table itself, with its full key.
+fn leaves(prefix: &str, table: &Table) -> Vec<(String, Value)> {
+    let mut found = Vec::new();
+    for (key, value) in table {
+        let key = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+        match value {
+            Value::Table(inner) => found.extend(leaves(&key, inner)),
+            value => found.push((key, value.clone())),
+        }
+    }
+    found
+}
+
+fn insert(table: &mut Table, key: &str, value: Value) {
+    match key.split_once('.') {
+        None => drop(table.insert(key.to_owned(), value)),
+        Some((first, rest)) => {
+            let inner = table.entry(first).or_insert_with(|| Value::Table(Table::new()));
+            if !inner.is_table() {
+                *inner = Value::Table(Table::new());
+            }
+            if let Value::Table(inner) = inner {
+                insert(inner, rest, value);
+            }
+        }
+    }
+}
+
+/// The value as TOML; what is not TOML is a word.
+fn value_of(text: &str) -> Value {
+    let parsed = format!("value = {text}").parse::<Table>().ok().and_then(|mut table| table.remove("value"));
+    parsed.unwrap_or_else(|| Value::String(text.to_owned()))
+}
+
+fn one_line(error: &toml::de::Error) -> String {
+    error.message().trim().replace('\n', " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn any_rig() -> StereoRig {
+        StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 }
+    }
+
+    fn sets(sets: &[&str]) -> anyhow::Result<Settings> {
+        Settings::resolve(None, &sets.iter().map(|set| (*set).to_owned()).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn the_command_line_overrides_the_file_which_overrides_the_defaults() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let file = folder.path().join("c.toml");
+        std::fs::write(&file, "[volume]\nvoxel_size_m = 1\nfar_m = 12.5\n").unwrap();
+        let settings = Settings::resolve(Some(&file), &["volume.voxel_size_m=0.1".into()]).unwrap();
+        let volume = settings.config(any_rig()).volume;
+        assert_eq!((volume.voxel_size_m, volume.far_m, volume.near_m), (0.1, 12.5, 0.5));
+    }
+
+    #[test]
+    fn the_resolved_file_gives_the_same_settings_again() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let file = folder.path().join("c.toml");
+        let text = sets(&["volume.voxel_size_m=0.1", "volume.observation_weight=depth"]).unwrap().to_toml(true).unwrap();
+        assert!(text.contains("voxel_size_m = 0.1\n") && text.contains("observation_weight = \"depth\""), "{text}");
+        std::fs::write(&file, &text).unwrap();
+        assert_eq!(Settings::resolve(Some(&file), &[]).unwrap().to_toml(true).unwrap(), text);
+    }
+
+    #[test]
+    fn unknown_keys_and_wrong_kinds_are_named() {
+        let refusal = |set: &str| format!("{:#}", sets(&[set]).unwrap_err());
+        let message = refusal("volume.voxel_sise_m=0.1");
+        assert!(message.contains("`volume.voxel_sise_m`") && message.contains("voxel_size_m"), "{message}");
+        assert!(refusal("volumes.far_m=1").contains("no section volumes"));
+        assert!(refusal("rig.focal_px=1").contains("no section rig"));
+        assert!(refusal("far_m=1").contains("`far_m` is not a key"));
+        assert!(refusal("volume.far_m").contains("has no value"));
+        assert!(refusal("volume.far_m=wide").contains("`volume.far_m`"));
+        assert!(refusal("street.wdith=100").contains("`street.wdith`"));
+        let folder = tempfile::TempDir::new().unwrap();
+        let file = folder.path().join("c.toml");
+        std::fs::write(&file, "[volume]\nnonsense = 1\n").unwrap();
+        let message = format!("{:#}", Settings::resolve(Some(&file), &[]).unwrap_err());
+        assert!(message.contains("c.toml") && message.contains("`volume.nonsense`"), "{message}");
+        std::fs::write(&file, "[volume\n").unwrap();
+        assert!(format!("{:#}", Settings::resolve(Some(&file), &[]).unwrap_err()).contains("is not TOML"));
+    }
+}

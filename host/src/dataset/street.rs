@@ -1,0 +1,65 @@
+//! The synthetic street as a data set.
+
+use super::{Dataset, DatasetError, ExactFrame, Image, StereoImages};
+use crate::synth::{Street, StreetConfig};
+use dynvox_core::geometry::{StereoRig, Transform};
+
+/// Frames of a street.
+pub struct StreetFrames {
+    street: Street,
+    frames: usize,
+    truth: Vec<Transform>,
+}
+
+impl StreetFrames {
+    /// The street of a configuration, `frames` of it.
+    pub fn new(config: StreetConfig) -> Result<Self, DatasetError> {
+        let frames = config.frames;
+        let street = Street::new(config).map_err(|error| DatasetError::Street { reason: error.to_string() })?;
+        Ok(Self {
+            truth: (0..frames).map(|index| street.t_world_camera(index)).collect(),
+            frames: frames as usize,
+            street,
+        })
+    }
+}
+
+impl Dataset for StreetFrames {
+    fn name(&self) -> &str {
+        "street"
+    }
+
+    fn len(&self) -> usize {
+        self.frames
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.street.config().width as usize, self.street.config().height as usize)
+    }
+
+    fn rig(&self) -> StereoRig {
+        self.street.rig()
+    }
+
+    fn time_s(&self, index: usize) -> f64 {
+        self.street.time_s(index as u32)
+    }
+
+    fn frame(&self, index: usize) -> Result<StereoImages, DatasetError> {
+        let frame = self.street.frame(index as u32);
+        let (width, height) = (frame.width, frame.height);
+        let failed = || DatasetError::Street { reason: format!("frame {index} has no pixels") };
+        let moving = (0..frame.depth_m.len()).map(|pixel| frame.is_moving(pixel)).collect();
+        let exact = Image::new(width, height, frame.depth_m).zip(Image::new(width, height, moving));
+        Ok(StereoImages {
+            left: Image::new(width, height, frame.left_grey).ok_or_else(failed)?,
+            right: Image::new(width, height, frame.right_grey).ok_or_else(failed)?,
+            colour: Image::new(width, height, frame.left_rgb),
+            exact: exact.map(|(depth_m, moving)| ExactFrame { depth_m, moving }),
+        })
+    }
+
+    fn truth(&self) -> Option<&[Transform]> {
+        Some(&self.truth)
+    }
+}

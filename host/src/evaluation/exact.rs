@@ -1,0 +1,93 @@
+//! The map against a renderer's exact depth: how far off what it shows is, and how much it shows.
+
+use crate::dataset::ExactFrame;
+use dynvox_core::image::View;
+use serde::Serialize;
+
+/// Farthest pixels compared, m: as far as depth is fused.
+const FAR_M: f32 = 20.0;
+/// Width of a bin of the error histogram, m.
+const BIN_M: f32 = 0.000_5;
+/// Bins; an error beyond the last falls into it.
+const BINS: usize = 10_000;
+
+/// What the comparison gave.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ExactFigures {
+    /// Median of |depth of the map - exact depth|, m, to half a millimetre.
+    pub median_error_m: f64,
+    /// Share of the exact pixels where the map shows a surface.
+    pub completeness: f64,
+    /// Exact pixels compared: static ones within 20 m.
+    pub points: u64,
+}
+
+/// Collects errors over frames in a histogram: memory does not grow.
+#[derive(Debug)]
+pub struct ExactErrors {
+    bins: Vec<u64>,
+    points: u64,
+}
+
+impl Default for ExactErrors {
+    fn default() -> Self {
+        Self { bins: vec![0; BINS], points: 0 }
+    }
+}
+
+impl ExactErrors {
+    /// Compares one view of the map with the exact depth of the same pixels.
+    pub fn add(&mut self, map_depth_m: &View<'_, f32>, exact: &ExactFrame) {
+        let exact_pixels = exact.depth_m.pixels().iter().zip(exact.moving.pixels());
+        for (&shown_m, (&exact_m, &moving)) in map_depth_m.rows().flatten().zip(exact_pixels) {
+            if moving || !(exact_m > 0.0 && exact_m <= FAR_M) {
+                continue;
+            }
+            self.points += 1;
+            if shown_m > 0.0 {
+                let bin = ((shown_m - exact_m).abs() / BIN_M) as usize;
+                if let Some(count) = self.bins.get_mut(bin.min(BINS - 1)) {
+                    *count += 1;
+                }
+            }
+        }
+    }
+
+    /// The figures; `None` when nothing was compared.
+    pub fn figures(&self) -> Option<ExactFigures> {
+        let shown: u64 = self.bins.iter().sum();
+        let mut below = 0;
+        let median = self.bins.iter().position(|count| {
+            below += count;
+            2 * below >= shown
+        })?;
+        (shown > 0).then(|| ExactFigures {
+            median_error_m: f64::from(BIN_M) * (median as f64 + 0.5),
+            completeness: shown as f64 / self.points as f64,
+            points: self.points,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Image;
+
+    #[test]
+    fn counts_static_near_pixels_alone() {
+        let image = |pixels: Vec<f32>| Image::new(6, 1, pixels).unwrap();
+        let exact = ExactFrame {
+            depth_m: image(vec![10.0, 10.0, 10.0, 10.0, 25.0, 0.0]),
+            moving: Image::new(6, 1, vec![false, false, false, true, false, false]).unwrap(),
+        };
+        let mut errors = ExactErrors::default();
+        assert_eq!(errors.figures(), None);
+        let map = image(vec![10.1, 10.1, 0.0, 3.0, 3.0, 3.0]);
+        errors.add(&map.view().unwrap(), &exact);
+        let figures = errors.figures().unwrap();
+        assert_eq!(figures.points, 3);
+        assert!((figures.completeness - 2.0 / 3.0).abs() < 1e-12);
+        assert!((figures.median_error_m - 0.1).abs() < 0.001, "{figures:?}");
+    }
+}

@@ -1,0 +1,141 @@
+//! `summary.json`: the figures of a run under fixed keys. A key is present as soon as the run knows its value.
+
+use crate::evaluation::exact::ExactFigures;
+use crate::harness::RunRecord;
+use dynvox_core::Report;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The summary.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    dataset: String,
+    profile: String,
+    threads: usize,
+    frames: usize,
+    seconds: f64,
+    fps: f64,
+    digest: String,
+    slab_bytes: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rss_peak_bytes: Option<u64>,
+    stages: BTreeMap<&'static str, StageSummary>,
+    egomotion: EgomotionSummary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    exact: Option<ExactSummary>,
+    map: MapSummary,
+    prune: PruneSummary,
+    evict: EvictSummary,
+    health: HealthSummary,
+}
+
+#[derive(Debug, Serialize)]
+struct StageSummary {
+    median_ms: f64,
+    p99_ms: f64,
+    cpu_median_ms: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct EgomotionSummary {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    t_err_percent: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    r_err_deg_per_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rpe_t_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rpe_r_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ate_m: Option<f64>,
+    held_frames: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct ExactSummary {
+    #[serde(rename = "static")]
+    still: ExactFigures,
+}
+
+#[derive(Debug, Serialize)]
+struct MapSummary {
+    blocks: usize,
+    blocks_peak: u32,
+    bytes: u64,
+    triangles: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct PruneSummary {
+    visited: u64,
+    voxels_reset: u64,
+    blocks_freed: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct EvictSummary {
+    out: u64,
+    back: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct HealthSummary {
+    blocks_refused: u64,
+    blocks_lost: u64,
+    matches_dropped: u64,
+    worst_severity: &'static str,
+}
+
+impl Summary {
+    /// Collects the figures of a run.
+    pub fn of(run: &RunRecord) -> Self {
+        let sum = |of: fn(&Report) -> u32| run.rows.iter().map(|row| u64::from(of(&row.report))).sum::<u64>();
+        let errors = run.errors.as_ref();
+        let stages = run.stage_statistics();
+        Self {
+            dataset: run.name.clone(),
+            profile: run.profile.clone(),
+            threads: run.threads,
+            frames: run.rows.len(),
+            seconds: run.seconds,
+            fps: run.fps(),
+            digest: format!("{:016x}", run.digest()),
+            slab_bytes: run.slab_bytes,
+            rss_peak_bytes: run.rss_peak_bytes,
+            stages: stages
+                .iter()
+                .map(|(name, of)| (*name, StageSummary { median_ms: of.median_ms, p99_ms: of.p99_ms, cpu_median_ms: of.cpu_median_ms }))
+                .collect(),
+            egomotion: EgomotionSummary {
+                t_err_percent: errors.and_then(|errors| errors.t_err_percent),
+                r_err_deg_per_m: errors.and_then(|errors| errors.r_err_deg_per_m),
+                rpe_t_m: errors.map(|errors| errors.rpe_t_m),
+                rpe_r_deg: errors.map(|errors| errors.rpe_r_deg),
+                ate_m: errors.map(|errors| errors.ate_m),
+                held_frames: run.held_frames(),
+            },
+            exact: run.exact.map(|still| ExactSummary { still }),
+            map: MapSummary {
+                blocks: run.blocks,
+                blocks_peak: run.blocks_peak(),
+                bytes: run.map_bytes(),
+                triangles: run.mesh.triangles,
+            },
+            prune: PruneSummary {
+                visited: sum(|report| report.prune.visited) + u64::from(run.finish.visited),
+                voxels_reset: sum(|report| report.prune.voxels_reset) + u64::from(run.finish.voxels_reset),
+                blocks_freed: sum(|report| report.prune.blocks_freed) + u64::from(run.finish.blocks_freed),
+            },
+            evict: EvictSummary {
+                out: sum(|report| report.allocation.eviction.kept + report.allocation.eviction.lost),
+                back: sum(|report| report.allocation.eviction.returned),
+            },
+            health: HealthSummary {
+                blocks_refused: run.blocks_refused(),
+                blocks_lost: sum(|report| report.allocation.eviction.lost),
+                matches_dropped: sum(Report::dropped_features),
+                worst_severity: run.worst().name(),
+            },
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! Runs the core on a data set: owns the slab, feeds the frames, takes the times, watches memory, collects what the report shows.
+
+mod pictures;
+mod progress;
+mod reader;
+mod record;
+mod resident;
+mod run;
+mod slab;
+mod threads;
+
+pub use progress::Progress;
+pub use reader::{AHEAD, read_ahead};
+pub use record::{FrameRow, Keyframe, RunRecord, StageStatistics};
+pub use resident::resident_bytes;
+pub use run::{Plan, RunError, frame_indices, run};
+pub use slab::HostSlab;
+pub use threads::{StageTime, Threads};

@@ -1,0 +1,64 @@
+//! Progress: a bar on a terminal, a line now and then elsewhere, nothing when asked.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::Instant;
+
+/// Lines written without a terminal, besides the last.
+const PLAIN_LINES: usize = 10;
+
+/// How progress is shown.
+pub enum Progress {
+    /// Not at all.
+    Quiet,
+    /// A bar.
+    Bar(ProgressBar),
+    /// A line every so many frames.
+    Lines {
+        /// Frames in all.
+        frames: usize,
+        /// When the run began.
+        begin: Instant,
+    },
+}
+
+impl Progress {
+    /// Progress over `frames` frames, on standard error.
+    pub fn new(frames: usize, quiet: bool) -> Self {
+        if quiet {
+            return Self::Quiet;
+        }
+        if !std::io::stderr().is_terminal() {
+            return Self::Lines { frames, begin: Instant::now() };
+        }
+        let bar = ProgressBar::new(frames as u64);
+        let style = ProgressStyle::with_template("{bar:32.cyan/blue} {pos}/{len} frames  {msg}  {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self::Bar(bar)
+    }
+
+    /// Frame `done` (from 1) is mapped; the block pool is `fill` full, in 0 to 1.
+    pub fn frame(&self, done: usize, fps: f64, fill: f64, held: bool) {
+        let words = format!("{fps:5.1} fps  pool {:3.0} %{}", 100.0 * fill, if held { "  motion held" } else { "" });
+        match self {
+            Self::Quiet => {}
+            Self::Bar(bar) => {
+                bar.set_position(done as u64);
+                bar.set_message(words);
+            }
+            Self::Lines { frames, begin } => {
+                let every = frames.div_ceil(PLAIN_LINES).max(1);
+                if done == 1 || done.is_multiple_of(every) || done == *frames {
+                    eprintln!("frame {done}/{frames}  {words}  {:.1} s", begin.elapsed().as_secs_f64());
+                }
+            }
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Self::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Decodes frames ahead of the mapper on a thread of its own, at most [`AHEAD`] of them.
+
+use crate::dataset::{Dataset, DatasetError, StereoImages};
+use std::sync::mpsc::{Receiver, sync_channel};
+
+/// Frames decoded and not yet taken.
+pub const AHEAD: usize = 2;
+
+/// Runs `consume` with frames `indices` of the data set, decoded ahead in order. It ends when `consume` returns.
+pub fn read_ahead<R>(
+    dataset: &dyn Dataset,
+    indices: &[usize],
+    consume: impl FnOnce(&Receiver<(usize, Result<StereoImages, DatasetError>)>) -> R,
+) -> R {
+    std::thread::scope(|scope| {
+        // The channel holds one less: one more waits in the sender's hand.
+        let (sender, receiver) = sync_channel(AHEAD - 1);
+        scope.spawn(move || {
+            for &index in indices {
+                let frame = dataset.frame(index);
+                let last = frame.is_err();
+                // A receiver that is gone has ended the run.
+                if sender.send((index, frame)).is_err() || last {
+                    break;
+                }
+            }
+        });
+        let result = consume(&receiver);
+        drop(receiver);
+        result
+    })
+}

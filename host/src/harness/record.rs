@@ -1,0 +1,216 @@
+//! What is remembered of a run: a row per frame, a few pictures, the figures at the end.
+
+use super::StageTime;
+use crate::evaluation::{exact::ExactFigures, trajectory::TrajectoryErrors};
+use crate::export::Mesh;
+use dynvox_core::egomotion::MotionStatus;
+use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::memory::Region;
+use dynvox_core::volume::PruneReport;
+use dynvox_core::{Capacity, Report, Severity, Stage};
+
+/// One frame.
+#[derive(Clone, Debug)]
+pub struct FrameRow {
+    /// Number of the frame in the data set.
+    pub frame: usize,
+    /// Its time, s.
+    pub time_s: f64,
+    /// What the core reports.
+    pub report: Report,
+    /// Wall time of the whole step, ms.
+    pub step_ms: f64,
+    /// Resident memory of the process, where the machine tells.
+    pub rss_bytes: Option<u64>,
+    /// Time by stage, in the order of `Stage::ALL`.
+    pub stages: [StageTime; Stage::ALL.len()],
+}
+
+impl FrameRow {
+    /// How the camera's motion was found, in one word.
+    pub fn motion(&self) -> &'static str {
+        match self.report.egomotion.map(|motion| motion.status) {
+            None => "first",
+            Some(MotionStatus::Estimated) => "estimated",
+            Some(MotionStatus::TooFewMatches) => "too_few_matches",
+            Some(MotionStatus::TooFewInliers) => "too_few_inliers",
+            Some(MotionStatus::NotConverged) => "not_converged",
+            Some(MotionStatus::BadRig) => "bad_rig",
+        }
+    }
+
+    /// Whether the motion was held at constant velocity for want of an estimate.
+    pub fn held(&self) -> bool {
+        self.report.egomotion.is_some_and(|motion| motion.status != MotionStatus::Estimated)
+    }
+
+    /// Matches the estimate was made of, inliers among them, and their root mean square error in px.
+    pub fn matches(&self) -> (u32, u32, f64) {
+        self.report.egomotion.map_or((0, 0, 0.0), |motion| (motion.matches, motion.inliers, motion.residual_rms_px))
+    }
+
+    /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the list of visible ones.
+    pub fn blocks_refused(&self) -> u32 {
+        let allocation = &self.report.allocation;
+        allocation.refused + allocation.beyond + allocation.unlisted
+    }
+}
+
+/// Pictures of one frame, as PNG files.
+#[derive(Clone, Debug)]
+pub struct Keyframe {
+    /// Number of the frame in the data set.
+    pub frame: usize,
+    /// Left image.
+    pub input_png: Vec<u8>,
+    /// Disparity in colours.
+    pub disparity_png: Vec<u8>,
+    /// The map from the camera's place.
+    pub raycast_png: Vec<u8>,
+}
+
+/// Median and 99th percentile of a stage, over the frames it ran in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageStatistics {
+    /// Median wall time, ms.
+    pub median_ms: f64,
+    /// 99th percentile of the wall time, ms.
+    pub p99_ms: f64,
+    /// Median CPU time over all threads, ms.
+    pub cpu_median_ms: f64,
+    /// Frames it ran in.
+    pub frames: usize,
+}
+
+/// A finished run.
+#[derive(Clone, Debug)]
+pub struct RunRecord {
+    /// Name of the data set.
+    pub name: String,
+    /// What the data set's loader assumed.
+    pub notes: Vec<String>,
+    /// Name of the profile.
+    pub profile: String,
+    /// Its bounds.
+    pub capacity: Capacity,
+    /// Threads at work.
+    pub threads: usize,
+    /// Image size, px.
+    pub size: (usize, usize),
+    /// The rig.
+    pub rig: StereoRig,
+    /// The resolved configuration as a file.
+    pub config_toml: String,
+    /// The frames.
+    pub rows: Vec<FrameRow>,
+    /// True poses of the same frames, the first at the origin.
+    pub truth: Option<Vec<Transform>>,
+    /// Errors against them.
+    pub errors: Option<TrajectoryErrors>,
+    /// The map against exact depth.
+    pub exact: Option<ExactFigures>,
+    /// Pictures.
+    pub keyframes: Vec<Keyframe>,
+    /// The slab, region by region, at the end.
+    pub regions: Vec<Region>,
+    /// Bytes of the slab.
+    pub slab_bytes: usize,
+    /// Most bytes resident, where the machine tells.
+    pub rss_peak_bytes: Option<u64>,
+    /// Blocks of the map in the end.
+    pub blocks: usize,
+    /// What draining the window pruned in the end.
+    pub finish: PruneReport,
+    /// The mesh written.
+    pub mesh: Mesh,
+    /// Wall time of the run, s.
+    pub seconds: f64,
+    /// Of it, mapping and waiting for images: without the pictures, evaluation and files that only the report needs, s.
+    pub mapping_seconds: f64,
+}
+
+impl RunRecord {
+    /// Frames a second, over mapping and waiting for images.
+    pub fn fps(&self) -> f64 {
+        if self.mapping_seconds > 0.0 { self.rows.len() as f64 / self.mapping_seconds } else { 0.0 }
+    }
+
+    /// Frames whose motion was held.
+    pub fn held_frames(&self) -> usize {
+        self.rows.iter().filter(|row| row.held()).count()
+    }
+
+    /// Estimated poses.
+    pub fn poses(&self) -> Vec<Transform> {
+        self.rows.iter().map(|row| row.report.t_world_camera).collect()
+    }
+
+    /// Blocks that found no room, over all frames.
+    pub fn blocks_refused(&self) -> u64 {
+        self.rows.iter().map(|row| u64::from(row.blocks_refused())).sum()
+    }
+
+    /// The worst thing that happened.
+    pub fn worst(&self) -> Severity {
+        self.rows.iter().map(|row| row.report.severity()).max().unwrap_or_default()
+    }
+
+    /// Digest after the last frame.
+    pub fn digest(&self) -> u64 {
+        self.rows.last().map_or(0, |row| row.report.digest)
+    }
+
+    /// Most blocks in use at once.
+    pub fn blocks_peak(&self) -> u32 {
+        self.rows.last().map_or(0, |row| row.report.blocks.peak)
+    }
+
+    /// Bytes of the slab in use by the map's regions (`volume.*`).
+    pub fn map_bytes(&self) -> u64 {
+        self.regions.iter().filter(|region| region.name.starts_with("volume.")).map(|region| region.used as u64).sum()
+    }
+
+    /// Statistics of `step` and every stage that ran, in pipeline order.
+    pub fn stage_statistics(&self) -> Vec<(&'static str, StageStatistics)> {
+        // The step does not raycast: that is done beside it, on some frames.
+        let within = |row: &FrameRow| {
+            row.stages.iter().zip(Stage::ALL).filter(|(_, stage)| *stage != Stage::Raycast).map(|(time, _)| time.cpu_ms).sum()
+        };
+        let step: Vec<StageTime> = self.rows.iter().map(|row| StageTime { wall_ms: row.step_ms, cpu_ms: within(row) }).collect();
+        let stages = Stage::ALL.iter().enumerate().map(|(at, stage)| {
+            let ran = self.rows.iter().filter_map(|row| row.stages.get(at).copied()).filter(|time| time.wall_ms > 0.0);
+            (stage.name(), ran.collect::<Vec<_>>())
+        });
+        std::iter::once(("step", step)).chain(stages).filter_map(|(name, times)| Some((name, statistics(&times)?))).collect()
+    }
+}
+
+fn statistics(times: &[StageTime]) -> Option<StageStatistics> {
+    let sorted = |of: fn(&StageTime) -> f64| {
+        let mut values: Vec<f64> = times.iter().map(of).collect();
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let (wall, cpu) = (sorted(|time| time.wall_ms), sorted(|time| time.cpu_ms));
+    // Nearest rank: the smallest value that at least this share does not exceed.
+    let quantile = |values: &[f64], share: f64| values.get(((share * values.len() as f64).ceil() as usize).saturating_sub(1)).copied();
+    Some(StageStatistics {
+        median_ms: quantile(&wall, 0.5)?,
+        p99_ms: quantile(&wall, 0.99)?,
+        cpu_median_ms: quantile(&cpu, 0.5)?,
+        frames: times.len(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_values_that_occurred() {
+        let times: Vec<StageTime> = (1..=200).rev().map(|ms| StageTime { wall_ms: f64::from(ms), cpu_ms: 2.0 * f64::from(ms) }).collect();
+        let of = statistics(&times).unwrap();
+        assert_eq!((of.median_ms, of.p99_ms, of.cpu_median_ms, of.frames), (100.0, 198.0, 200.0, 200));
+        assert_eq!(statistics(&[]), None);
+    }
+}

@@ -1,0 +1,347 @@
+//! One run: frames in, map, trajectory and figures out.
+
+use super::{FrameRow, HostSlab, Keyframe, Progress, RunRecord, Threads, pictures, read_ahead, resident_bytes};
+use crate::dataset::{Dataset, DatasetError, ExactFrame, StereoImages};
+use crate::evaluation::exact::ExactErrors;
+use crate::export::{FolderError, Mesh, PlyWriter, RunFolder};
+use dynvox_core::geometry::Transform;
+use dynvox_core::image::StereoFrame;
+use dynvox_core::memory::SlabError;
+use dynvox_core::volume::Triangle;
+use dynvox_core::{Capacity, Config, Mapper, NewError, Stage, StepError};
+use std::time::{Duration, Instant};
+
+/// Frames shown in the report.
+const KEYFRAMES: usize = 5;
+/// Frames whose exact depth is compared with the map, at most.
+const EXACT_FRAMES: usize = 24;
+/// Disparity shown in red, as a share of the image width.
+const NEAR_SHARE: f32 = 0.08;
+
+/// What to run.
+pub struct Plan {
+    /// The frames.
+    pub dataset: Box<dyn Dataset>,
+    /// Numbers of the frames to take.
+    pub indices: Vec<usize>,
+    /// Name of the profile.
+    pub profile: String,
+    /// Its bounds.
+    pub capacity: Capacity,
+    /// The mapper's configuration.
+    pub config: Config,
+    /// The same as a file.
+    pub config_toml: String,
+    /// Threads at work.
+    pub threads: usize,
+    /// Whether to show no progress.
+    pub quiet: bool,
+}
+
+/// Why a run ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The data set, or a frame of it.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The run folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// No frame is left of the data set.
+    #[error("--start {start} leaves none of the {len} frames. Give a smaller --start")]
+    NoFrames {
+        /// First frame asked for.
+        start: usize,
+        /// Frames there are.
+        len: usize,
+    },
+    /// The images are larger than the profile's.
+    #[error("images of {width} x {height} px do not fit profile {profile}, which takes {fits_width} x {fits_height}. {action}")]
+    ImageSize {
+        /// Image width, px.
+        width: usize,
+        /// Image height, px.
+        height: usize,
+        /// Name of the profile.
+        profile: String,
+        /// Widest image, px.
+        fits_width: usize,
+        /// Highest image, px.
+        fits_height: usize,
+        /// What to do.
+        action: String,
+    },
+    /// The configuration.
+    #[error("the configuration cannot be used: {problems}. Correct it with --set key=value or in the --config file")]
+    Config {
+        /// All problems.
+        problems: String,
+    },
+    /// The machine has no room for the slab.
+    #[error("this machine has no {bytes} bytes for the slab of profile {profile}. Choose a smaller --profile; `dynvox budget` lists them")]
+    NoMemory {
+        /// Bytes of the slab.
+        bytes: usize,
+        /// Name of the profile.
+        profile: String,
+    },
+    /// The core refuses the slab.
+    #[error("the core refuses the slab of profile {profile}: {reason}. This is a bug of dynvox: please report it")]
+    Slab {
+        /// Name of the profile.
+        profile: String,
+        /// What the core says.
+        reason: String,
+    },
+    /// The core refuses a frame.
+    #[error("frame {frame} was refused: {reason}. End before it with --frames, or skip it with --start")]
+    Step {
+        /// Number of the frame.
+        frame: usize,
+        /// What the core says.
+        reason: String,
+    },
+    /// The threads cannot be started.
+    #[error("{count} threads cannot be started: {source}. Give fewer --threads")]
+    Threads {
+        /// Threads asked for.
+        count: usize,
+        /// What the machine says.
+        source: rayon::ThreadPoolBuildError,
+    },
+}
+
+/// The frames a run takes: from `start`, every `stride`-th, at most `frames`.
+pub fn frame_indices(len: usize, start: usize, stride: usize, frames: Option<usize>) -> Result<Vec<usize>, RunError> {
+    let indices: Vec<usize> = (start..len).step_by(stride.max(1)).take(frames.unwrap_or(usize::MAX)).collect();
+    if indices.is_empty() { Err(RunError::NoFrames { start, len }) } else { Ok(indices) }
+}
+
+/// Maps the planned frames and writes the mesh into the folder.
+pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
+    let begin = Instant::now();
+    check(plan)?;
+    let slab_bytes = plan.capacity.bytes();
+    let mut slab = HostSlab::map(slab_bytes).ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
+    let mapper = Mapper::new(&plan.capacity, &plan.config, slab.bytes_mut()).map_err(|error| refused(plan, error))?;
+    let threads = Threads::new(plan.threads).map_err(|source| RunError::Threads { count: plan.threads, source })?;
+    let mut course = Course {
+        plan,
+        mapper,
+        threads,
+        rows: Vec::new(),
+        keyframes: Vec::new(),
+        exact: ExactErrors::default(),
+        aside: Duration::ZERO,
+    };
+    course.frames()?;
+    let mapping_seconds = (begin.elapsed() - course.aside).as_secs_f64();
+    let finish = course.mapper.finish();
+    let mesh = course.mesh(folder)?;
+    let truth = plan.dataset.truth().map(|truth| from_first(truth, &plan.indices));
+    let poses: Vec<Transform> = course.rows.iter().map(|row| row.report.t_world_camera).collect();
+    Ok(RunRecord {
+        name: plan.dataset.name().to_owned(),
+        notes: plan.dataset.notes().to_vec(),
+        profile: plan.profile.clone(),
+        capacity: plan.capacity,
+        threads: plan.threads,
+        size: plan.dataset.size(),
+        rig: plan.dataset.rig(),
+        config_toml: plan.config_toml.clone(),
+        errors: truth.as_ref().and_then(|truth| crate::evaluation::trajectory::errors(truth, &poses)),
+        truth,
+        exact: course.exact.figures(),
+        regions: course.mapper.footprint().regions().to_vec(),
+        slab_bytes,
+        rss_peak_bytes: resident_bytes().map(|(_, peak)| peak),
+        blocks: course.mapper.background().pool().len(),
+        finish,
+        mesh,
+        seconds: begin.elapsed().as_secs_f64(),
+        mapping_seconds,
+        rows: course.rows,
+        keyframes: course.keyframes,
+    })
+}
+
+/// Refuses what cannot run before any memory is taken.
+fn check(plan: &Plan) -> Result<(), RunError> {
+    let (width, height) = plan.dataset.size();
+    let fits = |capacity: &Capacity| width <= capacity.image_width && height <= capacity.image_height;
+    if !fits(&plan.capacity) {
+        let scale = (plan.capacity.image_width as f64 / width as f64).min(plan.capacity.image_height as f64 / height as f64);
+        let scale = (scale * 100.0).floor() / 100.0;
+        let larger = Capacity::PROFILES.iter().find(|(_, capacity)| fits(capacity));
+        return Err(RunError::ImageSize {
+            width,
+            height,
+            profile: plan.profile.clone(),
+            fits_width: plan.capacity.image_width,
+            fits_height: plan.capacity.image_height,
+            action: match larger {
+                Some((name, _)) => format!("Choose --profile {name}, or shrink the images with --scale {scale}"),
+                None => format!("Shrink the images with --scale {scale}"),
+            },
+        });
+    }
+    let problems = plan.config.validate();
+    if problems.is_empty() {
+        return Ok(());
+    }
+    let problems: Vec<String> = problems.iter().map(|problem| format!("{} {}", problem.key, problem.rule)).collect();
+    Err(RunError::Config { problems: problems.join("; ") })
+}
+
+fn refused(plan: &Plan, error: NewError) -> RunError {
+    let reason = match error {
+        NewError::Slab(SlabError::TooSmall { missing }) => format!("it lacks {missing} bytes"),
+        NewError::Slab(other) => format!("{other:?}"),
+        NewError::Config(problem) => return RunError::Config { problems: format!("{} {}", problem.key, problem.rule) },
+    };
+    RunError::Slab { profile: plan.profile.clone(), reason }
+}
+
+fn step_reason(error: StepError) -> String {
+    match error {
+        StepError::SizesDiffer => "its images differ in size".to_owned(),
+        StepError::SizeChanged => "its images have another size than those before".to_owned(),
+        StepError::TooLarge { width, height } => format!("its images are larger than {width} x {height} px"),
+        StepError::TooSmall { width, height } => format!("its images are smaller than {width} x {height} px"),
+    }
+}
+
+/// Poses of the chosen frames, seen from the first of them.
+fn from_first(poses: &[Transform], indices: &[usize]) -> Vec<Transform> {
+    let chosen: Vec<Transform> = indices.iter().filter_map(|&index| poses.get(index).copied()).collect();
+    let Some(first) = chosen.first().map(Transform::inverse) else { return Vec::new() };
+    chosen.iter().map(|pose| first * pose).collect()
+}
+
+/// `count` of `frames` positions, evenly, the last among them.
+fn spread(frames: usize, count: usize) -> impl Fn(usize) -> bool {
+    let count = count.min(frames).max(1);
+    move |at| ((at + 1) * count) / frames > (at * count) / frames
+}
+
+/// A run under way.
+struct Course<'p, 's> {
+    plan: &'p Plan,
+    mapper: Mapper<'s>,
+    threads: Threads,
+    rows: Vec<FrameRow>,
+    keyframes: Vec<Keyframe>,
+    exact: ExactErrors,
+    /// Time that only the report needed.
+    aside: Duration,
+}
+
+impl Course<'_, '_> {
+    fn frames(&mut self) -> Result<(), RunError> {
+        let frames = self.plan.indices.len();
+        let progress = Progress::new(frames, self.plan.quiet);
+        let (is_keyframe, is_compared) = (spread(frames, KEYFRAMES), spread(frames, EXACT_FRAMES));
+        let begin = Instant::now();
+        read_ahead(self.plan.dataset.as_ref(), &self.plan.indices, |decoded| {
+            for (at, (index, images)) in decoded.iter().enumerate() {
+                let images = images?;
+                let row = self.step(index, &images)?;
+                let seconds = (begin.elapsed() - self.aside).as_secs_f64();
+                let blocks = row.report.blocks;
+                progress.frame(at + 1, (at + 1) as f64 / seconds, f64::from(blocks.used) / f64::from(blocks.capacity), row.held());
+                let aside = Instant::now();
+                let t_world_camera = row.report.t_world_camera;
+                self.rows.push(row);
+                let exact = images.exact.as_ref().filter(|_| is_compared(at));
+                if is_keyframe(at) || exact.is_some() {
+                    self.look(&images, &t_world_camera, exact, is_keyframe(at).then_some(index));
+                }
+                self.aside += aside.elapsed();
+            }
+            Ok(())
+        })
+        .inspect(|()| progress.finish())
+        .inspect_err(|_: &RunError| progress.finish())
+    }
+
+    fn step(&mut self, index: usize, images: &StereoImages) -> Result<FrameRow, RunError> {
+        let refused = |reason: String| RunError::Step { frame: index, reason };
+        let empty = || refused("the images are empty".to_owned());
+        let frame = StereoFrame {
+            left: images.left.view().ok_or_else(empty)?,
+            right: images.right.view().ok_or_else(empty)?,
+            colour: images.colour.as_ref().and_then(|colour| colour.view()),
+            class: None,
+        };
+        self.threads.take_times();
+        let begin = Instant::now();
+        let (mapper, threads) = (&mut self.mapper, &self.threads);
+        let report = threads.run(|| mapper.step(&frame, threads)).map_err(|error| refused(step_reason(error)))?;
+        Ok(FrameRow {
+            frame: index,
+            time_s: self.plan.dataset.time_s(index),
+            report,
+            step_ms: begin.elapsed().as_secs_f64() * 1e3,
+            rss_bytes: resident_bytes().map(|(now, _)| now),
+            stages: self.threads.take_times(),
+        })
+    }
+
+    /// Raycasts the map from the camera's place: to compare it with exact depth, and to show it as the picture of frame `keyframe`.
+    fn look(&mut self, images: &StereoImages, t_world_camera: &Transform, exact: Option<&ExactFrame>, keyframe: Option<usize>) {
+        let near_px = NEAR_SHARE * images.left.width() as f32;
+        let disparity_png = keyframe.map(|_| pictures::disparity(&self.mapper.disparity_q8(), near_px));
+        let (mapper, threads) = (&mut self.mapper, &self.threads);
+        let Ok(seen) = threads.run(|| mapper.raycast(t_world_camera, threads)) else { return };
+        let (Some(depth_m), Some(normal), Some(colour)) = (seen.depth_m(), seen.normal(), seen.colour()) else { return };
+        if let Some(exact) = exact {
+            self.exact.add(&depth_m, exact);
+        }
+        if let (Some(frame), Some(disparity_png), Some(grey)) = (keyframe, disparity_png, images.left.view()) {
+            let input = images.colour.as_ref().and_then(|colour| colour.view());
+            let to_camera = t_world_camera.rotation.inverse().to_rotation_matrix().cast::<f32>();
+            let turned = |normal: [f32; 3]| (to_camera * nalgebra::Vector3::from(normal)).into();
+            self.keyframes.push(Keyframe {
+                frame,
+                input_png: pictures::input(&grey, input.as_ref()),
+                disparity_png,
+                raycast_png: pictures::map(&depth_m, &normal, &colour, turned),
+            });
+        }
+        // The raycast's time belongs to the frame it looked from.
+        let times = self.threads.take_times();
+        if let Some(row) = self.rows.last_mut() {
+            row.stages[Stage::Raycast as usize] = times[Stage::Raycast as usize];
+        }
+    }
+
+    fn mesh(&self, folder: &RunFolder) -> Result<Mesh, RunError> {
+        let path = folder.file("map.ply");
+        let written = PlyWriter::begin(&path).and_then(|mut ply| {
+            self.mapper.triangles(&mut |Triangle { vertices }| ply.triangle(vertices.map(|vertex| (vertex.position_m, vertex.colour))));
+            ply.finish()
+        });
+        Ok(written.map_err(|source| FolderError::Write { path, source })?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_taken_from_start_by_stride_up_to_a_number() {
+        assert_eq!(frame_indices(10, 2, 3, None).unwrap(), [2, 5, 8]);
+        assert_eq!(frame_indices(10, 0, 1, Some(2)).unwrap(), [0, 1]);
+        assert!(frame_indices(10, 10, 1, None).unwrap_err().to_string().contains("leaves none of the 10 frames"));
+    }
+
+    #[test]
+    fn chosen_frames_are_spread_evenly_and_end_with_the_last() {
+        for (frames, count) in [(100, 5), (7, 5), (3, 5), (1, 24)] {
+            let chosen: Vec<usize> = (0..frames).filter(|&at| spread(frames, count)(at)).collect();
+            assert_eq!(chosen.len(), count.min(frames));
+            assert_eq!(chosen.last(), Some(&(frames - 1)));
+        }
+    }
+}
