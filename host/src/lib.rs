@@ -5,4 +5,5 @@ pub mod dataset;
 pub mod evaluation;
 pub mod export;
 pub mod harness;
+pub mod store;
 pub mod synth;

@@ -10,7 +10,7 @@ pub const BLOCK_SIDE: usize = 8;
 pub const BLOCK_VOXELS: usize = BLOCK_SIDE * BLOCK_SIDE * BLOCK_SIDE;
 
 /// A block's place: it holds the lattice points `8 * coord ..= 8 * coord + 7` on each axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BlockCoord {
     /// Along x.
     pub x: i16,

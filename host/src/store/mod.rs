@@ -1,0 +1,8 @@
+//! Blocks on disk: where the map goes when it leaves memory, and where it comes back from.
+
+mod file;
+mod record;
+#[cfg(test)]
+mod tests;
+
+pub use file::{BlockFile, Opened, StoreError};

@@ -1,0 +1,170 @@
+//! The store through wear and tear.
+
+use super::{record::HEADER, *};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, LeavingBlock, ReturningBlock};
+use std::{
+    fs,
+    io::{self, Cursor, Read, Seek, SeekFrom, Write},
+};
+
+struct Content {
+    sdf: [i16; BLOCK_VOXELS],
+    weight: [u8; BLOCK_VOXELS],
+    colour: [[u8; BLOCK_VOXELS]; 3],
+}
+
+/// A block that differs with its seed in every part, and does not compress to nothing.
+fn content(seed: u32) -> Content {
+    let value = |i: usize, salt: u32| (seed + salt).wrapping_mul(2_654_435_761).wrapping_add((i as u32).wrapping_mul(40_503)) >> 9;
+    Content {
+        sdf: std::array::from_fn(|i| value(i, 1) as i16),
+        weight: std::array::from_fn(|i| value(i, 2) as u8),
+        colour: std::array::from_fn(|plane| std::array::from_fn(|i| value(i, plane as u32 + 3) as u8)),
+    }
+}
+
+fn coord(i: u32) -> BlockCoord {
+    BlockCoord::new(i as i32 - 3, -(i as i32), 7).expect("within the map")
+}
+
+fn keep(store: &mut impl BlockStore, place: u32, seed: u32) -> bool {
+    let content = content(seed);
+    store.keep(LeavingBlock {
+        coord: coord(place),
+        sdf: &content.sdf,
+        weight: &content.weight,
+        colour: Some(&content.colour),
+    })
+}
+
+/// Whether the block at `place` comes back as that of `seed`.
+fn is_back(store: &mut impl BlockStore, place: u32, seed: u32) -> bool {
+    let mut back = Content {
+        sdf: [0; BLOCK_VOXELS],
+        weight: [0; BLOCK_VOXELS],
+        colour: [[0; BLOCK_VOXELS]; 3],
+    };
+    let came = store.bring_back(ReturningBlock {
+        coord: coord(place),
+        sdf: &mut back.sdf,
+        weight: &mut back.weight,
+        colour: Some(&mut back.colour),
+    });
+    let wanted = content(seed);
+    came && back.sdf == wanted.sdf && back.weight == wanted.weight && back.colour == wanted.colour
+}
+
+#[test]
+fn keeps_blocks_over_a_restart_and_the_newest_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.blocks");
+    let (mut store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
+    assert_eq!(opened, Opened::default());
+    (0..50).for_each(|i| assert!(keep(&mut store, i, i)));
+    assert!(keep(&mut store, 7, 1_007));
+    drop(store);
+    let (mut store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
+    assert_eq!(opened, Opened { blocks: 50, cut_bytes: 0 });
+    (0..50).for_each(|i| assert!(is_back(&mut store, i, if i == 7 { 1_007 } else { i })));
+    assert!(!is_back(&mut store, 99, 99), "what was never kept does not come back");
+    assert!(store.coords().is_sorted() && store.coords().len() == 50);
+}
+
+#[test]
+fn opens_after_being_torn_at_every_byte_of_its_last_record() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.blocks");
+    let (mut store, _) = BlockFile::open(&path, 0.05, 0.75).unwrap();
+    (0..3).for_each(|i| assert!(keep(&mut store, i, i)));
+    let whole_len = store.bytes();
+    assert!(keep(&mut store, 3, 3));
+    drop(store);
+    let whole = fs::read(&path).unwrap();
+    for torn in whole_len as usize..whole.len() {
+        fs::write(&path, &whole[..torn]).unwrap();
+        let (mut store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
+        assert_eq!(opened, Opened { blocks: 3, cut_bytes: torn as u64 - whole_len });
+        assert!(is_back(&mut store, 2, 2) && keep(&mut store, 3, 3) && is_back(&mut store, 3, 3));
+        drop(store);
+        assert_eq!(fs::read(&path).unwrap(), whole, "and goes on as if nothing had been");
+    }
+    for torn in 0..16 {
+        fs::write(&path, &whole[..torn]).unwrap();
+        assert_eq!(BlockFile::open(&path, 0.05, 0.75).unwrap().1, Opened { blocks: 0, cut_bytes: torn as u64 });
+    }
+}
+
+#[test]
+fn a_flipped_bit_ends_the_store_before_its_record() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.blocks");
+    let (mut store, _) = BlockFile::open(&path, 0.05, 0.75).unwrap();
+    assert!(keep(&mut store, 0, 0));
+    let first = store.bytes() as usize;
+    assert!(keep(&mut store, 1, 1));
+    drop(store);
+    let whole = fs::read(&path).unwrap();
+    for at in (first..whole.len()).step_by(97).chain(first..first + HEADER) {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 4;
+        fs::write(&path, &damaged).unwrap();
+        let (store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
+        assert_eq!((opened.blocks, store.holds(coord(1))), (1, false), "byte {at}");
+    }
+}
+
+#[test]
+fn refuses_other_files_and_other_voxels_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.blocks");
+    fs::write(&path, b"ply\nformat binary").unwrap();
+    assert!(BlockFile::open(&path, 0.05, 0.75).unwrap_err().to_string().contains("is not a block store"));
+    fs::write(&path, b"ply").unwrap();
+    assert!(BlockFile::open(&path, 0.05, 0.75).is_err());
+    fs::remove_file(&path).unwrap();
+    drop(BlockFile::open(&path, 0.05, 0.75).unwrap());
+    let other = BlockFile::open(&path, 0.1, 0.75).unwrap_err().to_string();
+    assert!(other.contains("0.05 m voxels") && other.contains("0.1 m"), "{other}");
+}
+
+/// A disk with so much room and no more.
+struct SmallDisk {
+    bytes: Cursor<Vec<u8>>,
+    room: usize,
+}
+
+impl Read for SmallDisk {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        self.bytes.read(to)
+    }
+}
+
+impl Seek for SmallDisk {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.bytes.seek(to)
+    }
+}
+
+impl Write for SmallDisk {
+    fn write(&mut self, from: &[u8]) -> io::Result<usize> {
+        let room = self.room.saturating_sub(self.bytes.position() as usize).min(from.len());
+        if room == 0 { Err(io::ErrorKind::StorageFull.into()) } else { self.bytes.write(&from[..room]) }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_full_disk_ends_the_keeping_and_what_was_kept_stays() {
+    let mut store = BlockFile::over(SmallDisk { bytes: Cursor::new(vec![0; 16]), room: 20_000 });
+    let kept: Vec<u32> = (0..50).take_while(|&i| keep(&mut store, i, i)).collect();
+    assert!(!kept.is_empty() && kept.len() < 50);
+    assert_eq!(store.failure().map(io::Error::kind), Some(io::ErrorKind::StorageFull));
+    assert!(!keep(&mut store, 60, 60), "it does not try again");
+    for i in kept {
+        assert!(is_back(&mut store, i, i));
+    }
+    assert_eq!(store.unreadable(), 0);
+}
