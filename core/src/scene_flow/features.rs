@@ -151,31 +151,55 @@ impl<'s> Features<'s> {
 
     /// The feature of `class` within the window whose descriptor is nearest; the first of equals in the set's order.
     pub(super) fn nearest(&self, class: usize, window: Window, descriptor: &[u8; DESCRIPTOR]) -> Option<usize> {
-        if window.u_max < 0 || window.v_max < 0 || window.u_min > window.u_max || self.bands == 0 {
+        if window.u_max < 0 || window.v_max < 0 || window.u_min > window.u_max || window.v_min > window.v_max || self.bands == 0 {
             return None;
         }
         let [u_min, u_max, v_min, v_max] = [window.u_min, window.u_max, window.v_min, window.v_max].map(|x| x.max(0) as usize);
-        let last_band = (v_max / CELL_V).min(self.bands - 1);
-        let last_cell = (u_max / CELL_U).min(self.cells - 1);
-        let (mut best, mut best_sad) = (None, u32::MAX);
-        for band in v_min / CELL_V..=last_band {
+        let (first_band, last_band) = (v_min / CELL_V, (v_max / CELL_V).min(self.bands - 1));
+        let (first_cell, last_cell) = (u_min / CELL_U, (u_max / CELL_U).min(self.cells - 1));
+        if first_cell > last_cell {
+            return None;
+        }
+        // Positions are below 2^16, so that a position left of or above the window wraps to one far beyond it.
+        let low = [u_min, v_min].map(|x| x as u16);
+        let span = [u_max - u_min, v_max - v_min].map(|x| x.min(usize::from(u16::MAX)) as u16);
+        let (mut best, mut best_difference) = (None, u32::MAX);
+        for band in first_band..=last_band {
             let row = (class * self.bands + band) * self.cells;
-            let (Some(&from), Some(&to)) = (self.start.get(row + u_min / CELL_U), self.start.get(row + last_cell + 1)) else { continue };
+            let (Some(&from), Some(&to)) = (self.start.get(row + first_cell), self.start.get(row + last_cell + 1)) else { continue };
             let run = from as usize..to as usize;
             let (Some(at), Some(descriptors)) = (self.at.get(run.clone()), self.descriptor.get(run)) else { continue };
-            for ((index, at), other) in (from..).zip(at).zip(descriptors) {
-                let [u, v] = at.map(i32::from);
-                if u < window.u_min || u > window.u_max || v < window.v_min || v > window.v_max {
-                    continue;
-                }
-                let sad = difference(descriptor, other);
-                if sad < best_sad {
-                    (best, best_sad) = (Some(index as usize), sad);
-                }
+            if let Some((index, difference)) = closest(at, descriptors, low, span, descriptor, best_difference) {
+                (best, best_difference) = (Some(from as usize + index), difference);
             }
         }
         best
     }
+}
+
+/// The first of a run's features that is inside the window and differs least, if it differs by less than `bound`.
+///
+/// Whether a feature is inside is a coin toss that no branch predictor wins: all are compared, and those outside lose. The descriptor
+/// sought is read anew each time because a compiler that may keep it in registers keeps it there widened, and then misses the one
+/// instruction for sums of absolute differences.
+#[inline(never)]
+fn closest(
+    at: &[[u16; 2]],
+    descriptors: &[[u8; DESCRIPTOR]],
+    low: [u16; 2],
+    span: [u16; 2],
+    sought: &[u8; DESCRIPTOR],
+    bound: u32,
+) -> Option<(usize, u32)> {
+    let (mut best, mut best_difference) = (usize::MAX, bound);
+    for (index, (at, other)) in at.iter().zip(descriptors).enumerate() {
+        let inside = (at[0].wrapping_sub(low[0]) <= span[0]) & (at[1].wrapping_sub(low[1]) <= span[1]);
+        let difference = difference(core::hint::black_box(sought), other) | if inside { 0 } else { u32::MAX };
+        if difference < best_difference {
+            (best, best_difference) = (index, difference);
+        }
+    }
+    (best != usize::MAX).then_some((best, best_difference))
 }
 
 /// A search window, px, ends included.
@@ -197,6 +221,7 @@ fn describe(gradient: &[u16], width: usize, u: usize, v: usize, out: &mut [u8; D
 }
 
 /// Sum of absolute differences.
+#[inline(always)]
 fn difference(a: &[u8; DESCRIPTOR], b: &[u8; DESCRIPTOR]) -> u32 {
     a.iter().zip(b).map(|(&a, &b)| u32::from(a.abs_diff(b))).sum()
 }
