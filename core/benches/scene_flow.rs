@@ -2,8 +2,8 @@
 //! moves alike.
 //!
 //! `cargo bench -p dynvox-core --bench scene_flow`
-#![expect(missing_docs, reason = "criterion's macros write functions without")]
-#![expect(clippy::unwrap_used, reason = "a bench may fail")]
+#![allow(missing_docs, reason = "criterion's macros write functions without")]
+#![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "a bench may fail")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{

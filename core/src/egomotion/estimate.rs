@@ -56,15 +56,7 @@ pub struct MotionEstimate {
 
 impl MotionEstimate {
     fn failed(status: MotionStatus, matches: usize, inliers: usize, samples: u32) -> Self {
-        Self {
-            status,
-            t_current_previous: None,
-            matches: matches as u32,
-            inliers: inliers as u32,
-            residual_rms_px: 0.0,
-            samples,
-            steps: 0,
-        }
+        Self { status, t_current_previous: None, matches: matches as u32, inliers: inliers as u32, residual_rms_px: 0.0, samples, steps: 0 }
     }
 }
 
@@ -231,7 +223,8 @@ fn enough(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
 /// Weight by distance from the middle column ([`EgomotionConfig::side_knee`]).
 fn side_weight(config: &EgomotionConfig, rig: &StereoRig, point: &Point) -> f64 {
     let knee_px = config.side_knee * libm::fabs(rig.center_u_px);
-    if !(knee_px > 0.0) {
+    if knee_px <= 0.0 {
+        // A principal point in the first column has no middle to be far from.
         return 1.0;
     }
     let share = point.left[0] / knee_px;

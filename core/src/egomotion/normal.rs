@@ -36,9 +36,7 @@ impl Posed {
     fn carry(&self, point: &Point) -> Option<[f64; 3]> {
         let (r, t, [x, y, z]) = (&self.rotation, &self.translation, point.xyz);
         let depth = r.m31 * x + r.m32 * y + r.m33 * z + t.z;
-        (depth > DEPTH_MIN_M).then(|| {
-            [r.m11 * x + r.m12 * y + r.m13 * z + t.x, r.m21 * x + r.m22 * y + r.m23 * z + t.y, depth]
-        })
+        (depth > DEPTH_MIN_M).then(|| [r.m11 * x + r.m12 * y + r.m13 * z + t.x, r.m21 * x + r.m22 * y + r.m23 * z + t.y, depth])
     }
 }
 
@@ -54,6 +52,7 @@ impl Normal {
 
     /// Adds a point; one behind the camera adds nothing.
     #[inline]
+    #[expect(clippy::indexing_slicing, reason = "both indices run below N, the length of every row")]
     pub(super) fn add(&mut self, point: &Point, posed: &Posed, rig: &StereoRig, weight: impl Fn(f64) -> f64) {
         let Some(p) = posed.carry(point) else { return };
         let [x, y, z] = p;
@@ -81,6 +80,7 @@ impl Normal {
     }
 
     /// The step (rotation vector, translation) to the minimum, by LDL'; `None` where the points do not determine one.
+    #[expect(clippy::indexing_slicing, reason = "all indices run below N, the length of every row")]
     pub(super) fn solve(&self) -> Option<[f64; N]> {
         let mut lower = self.matrix;
         let mut pivot = [0.0; N];

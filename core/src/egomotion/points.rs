@@ -12,6 +12,8 @@ use crate::{
 const DISPARITY_MIN_PX: f64 = 0.1;
 /// Points scored between two looks at whether the hypothesis can still win.
 const STRIDE: usize = 256;
+/// Coordinates of a point and its observations.
+const COLUMNS: usize = 7;
 /// Nearest depth at which a point can be seen, m.
 pub(super) const DEPTH_MIN_M: f64 = 0.05;
 
@@ -40,18 +42,20 @@ pub(super) struct Point {
 
 impl<'s> Points<'s> {
     pub(super) const fn bytes(matches: usize) -> usize {
-        7 * region_bytes::<f32>(matches) + region_bytes::<u32>(matches)
+        region_bytes::<f32>(COLUMNS * matches) + region_bytes::<u32>(matches)
     }
 
     pub(super) fn carve(matches: usize, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        let mut columns = carver.cut("egomotion.point", COLUMNS * matches)?;
+        let mut column = || columns.split_off_mut(..matches).unwrap_or_default();
         Ok(Self {
-            x: carver.cut("egomotion.x", matches)?,
-            y: carver.cut("egomotion.y", matches)?,
-            z: carver.cut("egomotion.z", matches)?,
-            left_u: carver.cut("egomotion.left_u", matches)?,
-            left_v: carver.cut("egomotion.left_v", matches)?,
-            right_u: carver.cut("egomotion.right_u", matches)?,
-            right_v: carver.cut("egomotion.right_v", matches)?,
+            x: column(),
+            y: column(),
+            z: column(),
+            left_u: column(),
+            left_v: column(),
+            right_u: column(),
+            right_v: column(),
             source: carver.cut("egomotion.source", matches)?,
             len: 0,
         })

@@ -65,7 +65,6 @@ fn finds_its_way_through_a_textured_room() {
     for (frame, (estimate, truth)) in walk(&motions).iter().enumerate() {
         assert_eq!(estimate.status, MotionStatus::Estimated, "{frame}");
         let (distance, angle) = between(&estimate.t_current_previous.unwrap(), truth);
-        std::println!("frame {frame}: {:.2} cm, {angle:.3} degrees, {estimate:?}", distance * 100.0);
         assert!(distance < 0.02 && angle < 0.3, "frame {frame}: {distance} m, {angle} degrees");
         assert!(estimate.residual_rms_px < 0.5 && estimate.inliers * 10 > estimate.matches * 7);
     }
@@ -213,42 +212,4 @@ fn cuts_exactly_the_bytes_it_names() {
     let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
     Estimator::carve(&CAPACITY, &mut carver).unwrap();
     assert_eq!(carver.footprint().bytes(), BYTES);
-}
-
-#[test]
-#[ignore]
-fn bias() {
-    for refine in [true, false] {
-    let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
-    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap()).unwrap();
-    let mut estimator = estimator(&mut slab);
-    let step = exp(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.5));
-    let mut pose = Transform::identity();
-    let mut camera = Egomotion::default();
-    let mut sum = [0.0; 6];
-    for frame in 0..14 {
-        let [left, right] = see(&pose);
-        let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
-        let report = matcher.push(&SceneFlowConfig { refine, ..SceneFlowConfig::default() }, view(&left), view(&right), &Serial);
-        if frame > 0 {
-            let e = camera.step(&EgomotionConfig::default(), &RIG, matcher.bucketed(), &mut estimator);
-            let t = e.t_current_previous.unwrap().translation.vector;
-            std::println!("{frame} {:.4} {:.4} {:.4} rms {:.3} n {} unrefined {} unsup {}", t.x, t.y, t.z, e.residual_rms_px, e.inliers, report.unrefined, report.dense.unsupported);
-            // Errors of matches against the truth, px.
-            let mut errors = std::vec::Vec::new();
-            for m in matcher.bucketed() {
-                // true depth from intersecting the ray with the room is not at hand here: use the disparity's consistency.
-                let d0 = f64::from(m.previous_disparity_px());
-                let d1 = f64::from(m.current_disparity_px());
-                let z0 = RIG.focal_baseline_px_m() / d0;
-                errors.push(d1 - RIG.focal_baseline_px_m() / (z0 - 0.5));
-                let _ = &mut sum;
-            }
-            errors.sort_by(f64::total_cmp);
-            std::println!("   median disparity change error {:.4}", errors[errors.len() / 2]);
-        }
-        pose *= step;
-    }
-    std::println!("z {:.4}", camera.t_world_camera().translation.vector.z / 6.5);
-    }
 }

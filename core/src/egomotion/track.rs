@@ -8,7 +8,7 @@ use crate::{
 };
 
 /// Seed of the camera's own draws.
-const SEED: u64 = 0x0063_616D_6572_61;
+const SEED: u64 = 0x6361_6D65_7261;
 
 /// Where the camera is and how it last moved.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! What is kept of one camera: two frames, the previous and the current one, swapped by index.
 
 use super::{
-    features::Features,
+    features::{DESCRIPTOR, Features, table},
     filter::{COLUMN_SUMS, Responses, filter},
     suppression::{Candidate, Field, suppress},
 };
@@ -38,16 +38,21 @@ pub(super) struct Camera<'s> {
     gradient: &'s mut [u16],
     blob: &'s mut [i16],
     corner: &'s mut [i16],
-    rows: &'s mut [i16],
+    sums: &'s mut [i16],
     candidates: &'s mut [Candidate],
 }
 
 /// Names of one camera's regions.
 pub(super) struct Names {
-    pub pixels: [&'static str; 2],
-    pub dense: [[&'static str; 3]; 2],
-    pub sparse: [[&'static str; 3]; 2],
-    pub scratch: [&'static str; 5],
+    pub pixels: &'static str,
+    pub position: &'static str,
+    pub descriptor: &'static str,
+    pub cell: &'static str,
+    pub gradient: &'static str,
+    pub blob: &'static str,
+    pub corner: &'static str,
+    pub sums: &'static str,
+    pub candidate: &'static str,
 }
 
 /// Features of the sparse pass: its peaks are at most a sixth as dense.
@@ -55,12 +60,19 @@ const fn sparse(capacity: &Capacity) -> usize {
     capacity.features / 4
 }
 
+/// Cuts the first `count` items off `rest`, which has as many by construction.
+fn part<'s, T>(rest: &mut &'s mut [T], count: usize) -> &'s mut [T] {
+    rest.split_off_mut(..count).unwrap_or_default()
+}
+
 impl<'s> Camera<'s> {
     pub(super) const fn bytes(capacity: &Capacity) -> usize {
         let pixels = capacity.pixels();
-        let frame =
-            region_bytes::<u8>(pixels) + Features::bytes(capacity, capacity.features) + Features::bytes(capacity, sparse(capacity));
-        2 * frame
+        let features = 2 * (capacity.features + sparse(capacity));
+        region_bytes::<u8>(2 * pixels)
+            + region_bytes::<[u16; 2]>(features)
+            + region_bytes::<[u8; DESCRIPTOR]>(features)
+            + region_bytes::<u32>(4 * table(capacity))
             + region_bytes::<u16>(pixels)
             + 2 * region_bytes::<i16>(pixels)
             + region_bytes::<i16>(COLUMN_SUMS * capacity.image_width)
@@ -69,23 +81,25 @@ impl<'s> Camera<'s> {
 
     pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Result<Self, SlabError> {
         let pixels = capacity.pixels();
-        let [first, second] = [0, 1];
-        let mut frame = |which: usize| -> Result<Frame<'s>, SlabError> {
-            let pick = |names: &[[&'static str; 3]; 2]| if which == first { names[0] } else { names[1] };
-            Ok(Frame {
-                pixels: carver.cut(if which == first { names.pixels[0] } else { names.pixels[1] }, pixels)?,
-                dense: Features::carve(capacity, carver, capacity.features, pick(&names.dense))?,
-                sparse: Features::carve(capacity, carver, sparse(capacity), pick(&names.sparse))?,
-            })
+        let sets = [capacity.features, sparse(capacity)];
+        let features = 2 * (sets[0] + sets[1]);
+        let mut image = carver.cut(names.pixels, 2 * pixels)?;
+        let mut position = carver.cut(names.position, features)?;
+        let mut descriptor = carver.cut(names.descriptor, features)?;
+        let mut cell = carver.cut(names.cell, 4 * table(capacity))?;
+        let mut frame = || {
+            let [dense, sparse] =
+                sets.map(|count| Features::new(part(&mut position, count), part(&mut descriptor, count), part(&mut cell, table(capacity))));
+            Frame { pixels: part(&mut image, pixels), dense, sparse }
         };
         Ok(Self {
-            frames: [frame(first)?, frame(second)?],
+            frames: [frame(), frame()],
             current: false,
-            gradient: carver.cut(names.scratch[0], pixels)?,
-            blob: carver.cut(names.scratch[1], pixels)?,
-            corner: carver.cut(names.scratch[2], pixels)?,
-            rows: carver.cut(names.scratch[3], COLUMN_SUMS * capacity.image_width)?,
-            candidates: carver.cut(names.scratch[4], capacity.features)?,
+            gradient: carver.cut(names.gradient, pixels)?,
+            blob: carver.cut(names.blob, pixels)?,
+            corner: carver.cut(names.corner, pixels)?,
+            sums: carver.cut(names.sums, COLUMN_SUMS * capacity.image_width)?,
+            candidates: carver.cut(names.candidate, capacity.features)?,
         })
     }
 
@@ -112,10 +126,10 @@ impl<'s> Camera<'s> {
         for (kept, row) in frame.pixels.chunks_exact_mut(width).zip(image.rows()) {
             kept.copy_from_slice(row);
         }
-        filter(image, Responses { gradient, blob, corner }, self.rows);
+        filter(image, Responses { gradient, blob, corner }, self.sums);
         let mut found = 0;
         let mut slots = self.candidates.iter_mut();
-        suppress(Field { response: blob, width }, Field { response: corner, width }, response_min, self.rows, |candidate| {
+        suppress(Field { response: blob, width }, Field { response: corner, width }, response_min, self.sums, |candidate| {
             found += 1;
             if let Some(slot) = slots.next() {
                 *slot = candidate;

@@ -6,7 +6,7 @@
 //! Memory: 36 bytes per feature, and 4 bytes per class and cell (16 / 256 bytes per pixel).
 
 use super::suppression::{CLASSES, Candidate};
-use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::memory::Capacity;
 
 /// Columns of a cell.
 pub(super) const CELL_U: usize = 32;
@@ -47,29 +47,14 @@ pub(super) struct Features<'s> {
 }
 
 /// Entries of the table of cell starts.
-const fn table(capacity: &Capacity) -> usize {
+pub(super) const fn table(capacity: &Capacity) -> usize {
     CLASSES * capacity.image_width.div_ceil(CELL_U) * capacity.image_height.div_ceil(CELL_V) + 1
 }
 
 impl<'s> Features<'s> {
-    pub(super) const fn bytes(capacity: &Capacity, features: usize) -> usize {
-        region_bytes::<[u16; 2]>(features) + region_bytes::<[u8; DESCRIPTOR]>(features) + region_bytes::<u32>(table(capacity))
-    }
-
-    pub(super) fn carve(
-        capacity: &Capacity,
-        carver: &mut Carver<'s>,
-        features: usize,
-        names: [&'static str; 3],
-    ) -> Result<Self, SlabError> {
-        Ok(Self {
-            at: carver.cut(names[0], features)?,
-            descriptor: carver.cut(names[1], features)?,
-            start: carver.cut(names[2], table(capacity))?,
-            len: 0,
-            bands: 0,
-            cells: 0,
-        })
+    /// An empty set; room for as many features as `at` and `descriptor` have entries, `start` has [`table`] of them.
+    pub(super) fn new(at: &'s mut [[u16; 2]], descriptor: &'s mut [[u8; DESCRIPTOR]], start: &'s mut [u32]) -> Self {
+        Self { at, descriptor, start, len: 0, bands: 0, cells: 0 }
     }
 
     /// Features in the set.
@@ -106,9 +91,7 @@ impl<'s> Features<'s> {
             self.clear();
             return candidates.count();
         };
-        let key = |c: Candidate| {
-            (usize::from(c.class) * self.bands + usize::from(c.v) / CELL_V) * self.cells + usize::from(c.u) / CELL_U
-        };
+        let key = |c: Candidate| (usize::from(c.class) * self.bands + usize::from(c.v) / CELL_V) * self.cells + usize::from(c.u) / CELL_U;
         // Count, turn counts into starts one place to the right, then place: each cell's cursor ends as the next one's start.
         start.fill(0);
         for candidate in kept.clone() {

@@ -44,41 +44,27 @@ pub struct FlowMatcher<'s> {
 }
 
 const LEFT: Names = Names {
-    pixels: ["scene_flow.left0.pixels", "scene_flow.left1.pixels"],
-    dense: [
-        ["scene_flow.left0.dense_at", "scene_flow.left0.dense_descriptor", "scene_flow.left0.dense_cell"],
-        ["scene_flow.left1.dense_at", "scene_flow.left1.dense_descriptor", "scene_flow.left1.dense_cell"],
-    ],
-    sparse: [
-        ["scene_flow.left0.sparse_at", "scene_flow.left0.sparse_descriptor", "scene_flow.left0.sparse_cell"],
-        ["scene_flow.left1.sparse_at", "scene_flow.left1.sparse_descriptor", "scene_flow.left1.sparse_cell"],
-    ],
-    scratch: [
-        "scene_flow.left.gradient",
-        "scene_flow.left.blob",
-        "scene_flow.left.corner",
-        "scene_flow.left.rows",
-        "scene_flow.left.candidate",
-    ],
+    pixels: "scene_flow.left.pixels",
+    position: "scene_flow.left.position",
+    descriptor: "scene_flow.left.descriptor",
+    cell: "scene_flow.left.cell",
+    gradient: "scene_flow.left.gradient",
+    blob: "scene_flow.left.blob",
+    corner: "scene_flow.left.corner",
+    sums: "scene_flow.left.sums",
+    candidate: "scene_flow.left.candidate",
 };
 
 const RIGHT: Names = Names {
-    pixels: ["scene_flow.right0.pixels", "scene_flow.right1.pixels"],
-    dense: [
-        ["scene_flow.right0.dense_at", "scene_flow.right0.dense_descriptor", "scene_flow.right0.dense_cell"],
-        ["scene_flow.right1.dense_at", "scene_flow.right1.dense_descriptor", "scene_flow.right1.dense_cell"],
-    ],
-    sparse: [
-        ["scene_flow.right0.sparse_at", "scene_flow.right0.sparse_descriptor", "scene_flow.right0.sparse_cell"],
-        ["scene_flow.right1.sparse_at", "scene_flow.right1.sparse_descriptor", "scene_flow.right1.sparse_cell"],
-    ],
-    scratch: [
-        "scene_flow.right.gradient",
-        "scene_flow.right.blob",
-        "scene_flow.right.corner",
-        "scene_flow.right.rows",
-        "scene_flow.right.candidate",
-    ],
+    pixels: "scene_flow.right.pixels",
+    position: "scene_flow.right.position",
+    descriptor: "scene_flow.right.descriptor",
+    cell: "scene_flow.right.cell",
+    gradient: "scene_flow.right.gradient",
+    blob: "scene_flow.right.blob",
+    corner: "scene_flow.right.corner",
+    sums: "scene_flow.right.sums",
+    candidate: "scene_flow.right.candidate",
 };
 
 /// Sparse matches kept.

@@ -1,5 +1,33 @@
 //! Sparse scene flow: features of a stereo camera matched over two frames and two cameras (Geiger, Ziegler, Stiller: *StereoScan: Dense
-//! 3d Reconstruction in Real-time*, IV 2011).
+//! 3d Reconstruction in Real-time*, IV 2011, section III-A).
+//!
+//! Data flows through the files in this order: `filter` (blob, corner, Sobel) -> `suppression` (peaks, four classes) -> `features`
+//! (descriptors, sorted for search) -> `circle` (left-previous, right-previous, right-current, left-current and back), once with the
+//! sparse features over the whole search radius, once with all of them where `prior` says the sparse ones went -> `support` (outliers)
+//! -> `refine` (below the pixel) -> `bucket` (a selection for egomotion). `camera` keeps two frames of each camera, swapped by index.
+//!
+//! **Memory.** 16 bytes per pixel of the image size (per camera two images, a gradient and two filter responses: 8), 191 bytes per
+//! feature (per camera 2 x 1.25 descriptors and positions of 36, a candidate of 6; partners of 12... see `FlowMatcher::bytes`), 69 bytes
+//! per match, half a byte per pixel of search tables.
+//!
+//! **Time.** Linear in pixels and in features times the features in their windows.
+//!
+//! **What can go wrong.** Features and matches beyond the capacity are dropped, in scan order, and counted. A first frame, or one of
+//! another size than the last, has no matches and says so. Images without texture have none either; the motion estimate then says so.
+//!
+//! ```
+//! use dynvox_core::{Capacity, Serial, image::View, memory::Carver, scene_flow::{FlowMatcher, FlowStatus, SceneFlowConfig}};
+//!
+//! let capacity = Capacity { image_width: 64, image_height: 48, features: 100, matches: 50, ..Capacity::TINY };
+//! let mut slab = vec![0; FlowMatcher::bytes(&capacity) + 64];
+//! let lead = slab.as_ptr().align_offset(64);
+//! let mut carver = Carver::new(&mut slab[lead..], FlowMatcher::bytes(&capacity)).unwrap();
+//! let mut matcher = FlowMatcher::carve(&capacity, &mut carver).unwrap();
+//! let grey = [128; 64 * 48];
+//! let image = View::new(&grey, 64, 48).unwrap();
+//! let report = matcher.push(&SceneFlowConfig::default(), image, image, &Serial);
+//! assert_eq!(report.status, FlowStatus::First);
+//! ```
 
 mod bucket;
 mod camera;

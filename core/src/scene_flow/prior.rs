@@ -87,9 +87,8 @@ impl<'s> Prior<'s> {
 
     /// What a bin learned itself, or else the nearest bins in the four directions.
     fn near(&self, column: usize, row: usize) -> Reach {
-        let taught = |column: usize, row: usize| {
-            self.learned.get(row * self.columns + column).copied().filter(|bin| bin.to_previous_right != EMPTY)
-        };
+        let taught =
+            |column: usize, row: usize| self.learned.get(row * self.columns + column).copied().filter(|bin| bin.to_previous_right != EMPTY);
         if let Some(own) = taught(column, row) {
             return own;
         }

@@ -148,10 +148,7 @@ impl Template {
         let down = f64::from(sum_products(&self.down, error)) - self.mean[2] * total - self.share[1] * pattern;
         // Gradients are doubled and errors in 1/32 grey levels.
         let scale = 2.0 / 32.0;
-        [
-            scale * (self.inverse[0] * along + self.inverse[1] * down),
-            scale * (self.inverse[1] * along + self.inverse[2] * down),
-        ]
+        [scale * (self.inverse[0] * along + self.inverse[1] * down), scale * (self.inverse[1] * along + self.inverse[2] * down)]
     }
 }
 

@@ -27,7 +27,7 @@ fn image(t_world_camera: &Transform, x_m: f64) -> Vec<u8> {
                 let x = (u as f64 + du - RIG.center_u_px) / RIG.focal_px;
                 let y = (v as f64 + dv - RIG.center_v_px) / RIG.focal_px;
                 let ray = t_world_camera.rotation * Vector3::new(x, y, 1.0);
-                let reach = (0..3).map(|i| ((if ray[i] > 0.0 { HIGH[i] } else { LOW[i] }) - eye[i]) / ray[i]).fold(1e9, f64::min);
+                let reach = (0..3).map(|i| ((if ray[i] > 0.0 { HIGH[i] } else { LOW[i] }) - eye[i]) / ray[i]).fold(1e9, |a, b| if a < b { a } else { b });
                 sum += grey(eye + ray * reach);
             }
             pixels.push((sum / 4.0).round() as u8);
@@ -49,7 +49,8 @@ fn grey(point: Point3<f64>) -> f64 {
         };
         (0..8).map(corner).sum::<f64>()
     };
-    (128.0 + 90.0 * octave(0.9, 1) + 80.0 * octave(0.35, 2) + 40.0 * octave(0.17, 3)).clamp(0.0, 255.0)
+    // Casting to a pixel saturates.
+    128.0 + 90.0 * octave(0.9, 1) + 80.0 * octave(0.35, 2) + 40.0 * octave(0.17, 3)
 }
 
 /// Uniform in ±1.

@@ -3,7 +3,7 @@ use super::{
     bucket::select,
     cells::{Cells, Shape},
     circle::{Corners, Reach},
-    features::{DESCRIPTOR, Features, Window},
+    features::{DESCRIPTOR, Features, Window, table},
     refine::{Images, Pixels, refine},
     room::{HEIGHT, WIDTH, see},
     support::support,
@@ -19,7 +19,8 @@ use crate::{
 use nalgebra::Vector3;
 use std::{boxed::Box, vec, vec::Vec};
 
-pub(crate) const CAPACITY: Capacity = Capacity { image_width: WIDTH, image_height: HEIGHT, features: 4_000, matches: 3_000, ..Capacity::TINY };
+pub(crate) const CAPACITY: Capacity =
+    Capacity { image_width: WIDTH, image_height: HEIGHT, features: 4_000, matches: 3_000, ..Capacity::TINY };
 const BYTES: usize = FlowMatcher::bytes(&CAPACITY);
 
 /// Really at once, to show that it makes no difference.
@@ -138,9 +139,14 @@ fn full_lists_drop_and_count() {
     assert_eq!(report.dense.closed - report.dense.dropped, 40);
 }
 
+fn room_for<'s>(carver: &mut Carver<'s>, count: usize) -> Features<'s> {
+    let start = carver.cut("cell", table(&CAPACITY)).unwrap();
+    Features::new(carver.cut("position", count).unwrap(), carver.cut("descriptor", count).unwrap(), start)
+}
+
 /// Features with random descriptors.
 fn scatter<'s>(carver: &mut Carver<'s>, random: &mut Random, count: usize) -> (Features<'s>, Vec<Candidate>) {
-    let mut features = Features::carve(&CAPACITY, carver, count, ["at", "descriptor", "cell"]).unwrap();
+    let mut features = room_for(carver, count);
     let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|_| random.next_u32() as u16).collect();
     let place = |random: &mut Random| Candidate {
         u: 8 + random.below(WIDTH as u32 - 16) as u16,
@@ -170,9 +176,8 @@ fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
                 let [u, v] = features.at(*i).unwrap().map(i32::from);
                 features.class(*i) == class && (window.u_min..=window.u_max).contains(&u) && (window.v_min..=window.v_max).contains(&v)
             };
-            let sad = |i: &usize| -> u32 {
-                sought.iter().zip(features.descriptor(*i).unwrap()).map(|(a, b)| u32::from(a.abs_diff(*b))).sum()
-            };
+            let sad =
+                |i: &usize| -> u32 { sought.iter().zip(features.descriptor(*i).unwrap()).map(|(a, b)| u32::from(a.abs_diff(*b))).sum() };
             let expected = (0..features.len()).filter(inside).min_by_key(|i| (sad(i), *i));
             assert_eq!(features.nearest(class, window, &sought), expected);
         }
@@ -185,7 +190,7 @@ fn only_circles_that_return_to_their_beginning_close() {
     let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
     let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|i| (i as u16).wrapping_mul(40_503)).collect();
     let mut place = |u: u16, v: u16, twin: bool| {
-        let mut features = Features::carve(&CAPACITY, &mut carver, 4, ["at", "descriptor", "cell"]).unwrap();
+        let mut features = room_for(&mut carver, 4);
         let candidates = [Candidate { u, v, class: 2, sparse: 0 }, Candidate { u: u + 1, v, class: 2, sparse: 0 }];
         features.fill(candidates.into_iter().take(1 + usize::from(twin)), &gradient, WIDTH, HEIGHT);
         features
@@ -269,7 +274,8 @@ fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
     let images = [render(0.0, 0.0, 1.0, 0.0), render(-6.3, 0.0, 1.15, 9.0), render(2.45, -1.7, 1.0, 0.0), render(-3.8, -1.62, 1.15, -7.0)];
     let [previous_left, previous_right, current_left, current_right] =
         [&images[0], &images[1], &images[2], &images[3]].map(|data| Pixels { data, width: 64 });
-    let coarse = Match { previous_left: [30.0, 31.0], previous_right: [24.0, 31.0], current_left: [33.0, 30.0], current_right: [26.0, 29.0] };
+    let coarse =
+        Match { previous_left: [30.0, 31.0], previous_right: [24.0, 31.0], current_left: [33.0, 30.0], current_right: [26.0, 29.0] };
     let images = Images { previous_left, previous_right, current_left, current_right };
     let (fine, _) = refine(&coarse, images).unwrap();
     let near = |found: [f32; 2], u: f32, v: f32| (found[0] - u).abs() < 0.04 && (found[1] - v).abs() < 0.04;
