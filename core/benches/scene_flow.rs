@@ -17,7 +17,12 @@ use dynvox_core::{
 };
 use std::{hint::black_box, path::Path};
 
-const RIG: StereoRig = StereoRig { focal_px: 707.0912, center_u_px: 601.8873, center_v_px: 183.1104, baseline_m: 0.537_151 };
+const RIG: StereoRig = StereoRig {
+    focal_px: 707.0912,
+    center_u_px: 601.8873,
+    center_v_px: 183.1104,
+    baseline_m: 0.537_151,
+};
 
 struct Picture {
     pixels: Vec<u8>,

@@ -39,7 +39,12 @@ fn numbers(path: &Path) -> Option<Vec<f64>> {
 fn rig(path: &Path) -> Option<StereoRig> {
     let values = numbers(path)?;
     let (p0, p1) = (values.get(..12)?, values.get(12..24)?);
-    Some(StereoRig { focal_px: p0[0], center_u_px: p0[2], center_v_px: p0[6], baseline_m: -p1[3] / p1[0] })
+    Some(StereoRig {
+        focal_px: p0[0],
+        center_u_px: p0[2],
+        center_v_px: p0[6],
+        baseline_m: -p1[3] / p1[0],
+    })
 }
 
 fn poses(path: &Path) -> Option<Vec<Matrix4<f64>>> {

@@ -36,7 +36,7 @@ impl Default for EgomotionConfig {
             matches_min: 6,
             sample_steps: 12,
             refine_steps: 50,
-            side_knee: 0.35,
+            side_knee: 0.3,
         }
     }
 }

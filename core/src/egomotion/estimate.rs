@@ -56,7 +56,15 @@ pub struct MotionEstimate {
 
 impl MotionEstimate {
     fn failed(status: MotionStatus, matches: usize, inliers: usize, samples: u32) -> Self {
-        Self { status, t_current_previous: None, matches: matches as u32, inliers: inliers as u32, residual_rms_px: 0.0, samples, steps: 0 }
+        Self {
+            status,
+            t_current_previous: None,
+            matches: matches as u32,
+            inliers: inliers as u32,
+            residual_rms_px: 0.0,
+            samples,
+            steps: 0,
+        }
     }
 }
 

@@ -29,7 +29,10 @@ pub(super) struct Posed {
 
 impl Posed {
     pub(super) fn new(motion: &Transform) -> Self {
-        Self { rotation: motion.rotation.to_rotation_matrix().into_inner(), translation: motion.translation.vector }
+        Self {
+            rotation: motion.rotation.to_rotation_matrix().into_inner(),
+            translation: motion.translation.vector,
+        }
     }
 
     /// Where a point is in the current camera; `None` behind it.

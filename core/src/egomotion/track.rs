@@ -22,7 +22,12 @@ pub struct Egomotion {
 impl Default for Egomotion {
     /// A camera at the world's origin that has not moved.
     fn default() -> Self {
-        Self { t_world_camera: Transform::identity(), t_current_previous: Transform::identity(), held: 0, random: Random::new(SEED) }
+        Self {
+            t_world_camera: Transform::identity(),
+            t_current_previous: Transform::identity(),
+            held: 0,
+            random: Random::new(SEED),
+        }
     }
 }
 

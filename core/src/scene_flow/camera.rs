@@ -139,6 +139,10 @@ impl<'s> Camera<'s> {
         let mut dropped = found.saturating_sub(self.candidates.len());
         dropped += frame.dense.fill(candidates.clone(), gradient, width, height);
         dropped += frame.sparse.fill(candidates.filter(|candidate| candidate.sparse == 1), gradient, width, height);
-        FeatureCount { dense: frame.dense.len() as u32, sparse: frame.sparse.len() as u32, dropped: dropped as u32 }
+        FeatureCount {
+            dense: frame.dense.len() as u32,
+            sparse: frame.sparse.len() as u32,
+            dropped: dropped as u32,
+        }
     }
 }

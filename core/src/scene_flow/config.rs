@@ -6,7 +6,7 @@ use crate::config::{Problems, require};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct SceneFlowConfig {
-    /// Smallest filter response of a feature, grey levels times filter weights; 1..=2000. DynSLAM: 50, which finds a fifth more features and no better motion.
+    /// Smallest filter response of a feature, grey levels times filter weights; 1..=2000. DynSLAM: 50, which finds a third more features and no better motion.
     pub response_min: u16,
     /// Farthest a feature moves between two frames or two cameras, px in each direction; 16..=500. DynSLAM: 200.
     pub search_radius_px: u16,
@@ -29,7 +29,7 @@ pub struct SceneFlowConfig {
 impl Default for SceneFlowConfig {
     fn default() -> Self {
         Self {
-            response_min: 80,
+            response_min: 100,
             search_radius_px: 200,
             stereo_tolerance_px: 2,
             disparity_tolerance_px: 5.0,

@@ -212,7 +212,11 @@ impl<'s> FlowMatcher<'s> {
         let matches = self.refined.get(..kept).unwrap_or(&[]);
         support(matches, Shape::new(width, height, CELL_MIN_PX), config, &mut self.cells, self.motion, self.keep);
         let supported = self.keep.iter().take(kept).filter(|&&keep| keep == 1).count();
-        let count = PassCount { closed: closed as u32, dropped: (closed - kept) as u32, unsupported: (kept - supported) as u32 };
+        let count = PassCount {
+            closed: closed as u32,
+            dropped: (closed - kept) as u32,
+            unsupported: (kept - supported) as u32,
+        };
         (count, kept)
     }
 

@@ -6,9 +6,9 @@
 //! sparse features over the whole search radius, once with all of them where `prior` says the sparse ones went -> `support` (outliers)
 //! -> `refine` (below the pixel) -> `bucket` (a selection for egomotion). `camera` keeps two frames of each camera, swapped by index.
 //!
-//! **Memory.** 16 bytes per pixel of the image size (per camera two images, a gradient and two filter responses: 8), 191 bytes per
-//! feature (per camera 2 x 1.25 descriptors and positions of 36, a candidate of 6; partners of 12... see `FlowMatcher::bytes`), 69 bytes
-//! per match, half a byte per pixel of search tables.
+//! **Memory.** 16.5 bytes per pixel (per camera two images, one gradient, two filter responses and a quarter byte of search tables),
+//! 204 bytes per feature (per camera two frames of 1.25 x 36 bytes and a candidate of 6; its partners 12) and 69
+//! bytes per match.
 //!
 //! **Time.** Linear in pixels and in features times the features in their windows.
 //!

@@ -14,7 +14,12 @@ const BIN_PX: usize = 50;
 const SLACK_PX: i16 = 10;
 /// No match yet: smallest above largest.
 const EMPTY: [i16; 4] = [i16::MAX, i16::MIN, i16::MAX, i16::MIN];
-const NOTHING: Reach = Reach { to_previous_right: EMPTY, to_current_right: EMPTY, to_current_left: EMPTY, to_previous_left: EMPTY };
+const NOTHING: Reach = Reach {
+    to_previous_right: EMPTY,
+    to_current_right: EMPTY,
+    to_current_left: EMPTY,
+    to_previous_left: EMPTY,
+};
 
 /// Bins of the largest image.
 const fn bins(capacity: &Capacity) -> usize {

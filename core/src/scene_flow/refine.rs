@@ -86,7 +86,15 @@ impl Template {
             return None;
         }
         let inverse = [vv / determinant, -uv / determinant, uu / determinant];
-        Some(Self { pixel, along, down, mean, share: with.map(|with| with / pattern), inverse, texture })
+        Some(Self {
+            pixel,
+            along,
+            down,
+            mean,
+            share: with.map(|with| with / pattern),
+            inverse,
+            texture,
+        })
     }
 
     /// Where the patch is in another image, begun at (u, v).

@@ -27,7 +27,9 @@ fn image(t_world_camera: &Transform, x_m: f64) -> Vec<u8> {
                 let x = (u as f64 + du - RIG.center_u_px) / RIG.focal_px;
                 let y = (v as f64 + dv - RIG.center_v_px) / RIG.focal_px;
                 let ray = t_world_camera.rotation * Vector3::new(x, y, 1.0);
-                let reach = (0..3).map(|i| ((if ray[i] > 0.0 { HIGH[i] } else { LOW[i] }) - eye[i]) / ray[i]).fold(1e9, |a, b| if a < b { a } else { b });
+                let reach = (0..3)
+                    .map(|i| ((if ray[i] > 0.0 { HIGH[i] } else { LOW[i] }) - eye[i]) / ray[i])
+                    .fold(1e9, |a, b| if a < b { a } else { b });
                 sum += grey(eye + ray * reach);
             }
             pixels.push((sum / 4.0).round() as u8);
