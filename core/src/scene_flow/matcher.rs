@@ -13,7 +13,7 @@ use super::{
     support::{Motion, support},
 };
 use crate::{
-    executor::Executor,
+    executor::{Executor, join4},
     image::View,
     memory::{Capacity, Carver, SlabError, region_bytes},
 };
@@ -159,7 +159,7 @@ impl<'s> FlowMatcher<'s> {
         report.sparse = self.sparse_pass(config, size, executor);
         let closed;
         (report.dense, closed) = self.dense_pass(config, size, executor);
-        self.refine_supported(config, size, closed);
+        self.refine_supported(config, size, closed, executor);
         report.refined = self.refined_len as u32;
         report.unrefined = closed as u32 - report.dense.unsupported - report.refined;
         let shape = Shape::new(size[0], size[1], usize::from(config.bucket_px).max(CELL_MIN_PX));
@@ -220,8 +220,8 @@ impl<'s> FlowMatcher<'s> {
         (count, kept)
     }
 
-    /// Refines the supported among the first `closed` matches and closes the gaps the others leave.
-    fn refine_supported(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], closed: usize) {
+    /// Refines the supported among the first `closed` matches, in four fixed bands, and closes the gaps the others leave.
+    fn refine_supported<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], closed: usize, executor: &E) {
         let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
         let pixels = |data| Pixels { data, width };
         let size = width * height;
@@ -231,18 +231,39 @@ impl<'s> FlowMatcher<'s> {
             current_left: pixels(left.pixels.get(..size).unwrap_or(&[])),
             current_right: pixels(right.pixels.get(..size).unwrap_or(&[])),
         };
+        let band = |band: (&mut [Match], &mut [u8], &mut [f32])| {
+            for ((m, keep), score) in band.0.iter_mut().zip(band.1).zip(band.2).filter(|((_, keep), _)| **keep == 1) {
+                *score = 0.0;
+                match refine(m, images) {
+                    Some(better) => (*m, *score) = better,
+                    None => *keep = 0,
+                }
+            }
+        };
+        if config.refine {
+            let quarter = closed.div_ceil(4);
+            let mut matches = self.refined.get_mut(..closed).unwrap_or_default();
+            let mut keep = self.keep.get_mut(..closed).unwrap_or_default();
+            let mut score = self.score.get_mut(..closed).unwrap_or_default();
+            let [a, b, c, d] = [(); 4].map(|()| (part(&mut matches, quarter), part(&mut keep, quarter), part(&mut score, quarter)));
+            join4(executor, || band(a), || band(b), || band(c), || band(d));
+        } else {
+            self.score.fill(0.0);
+        }
         let mut len = 0;
         for index in 0..closed {
-            if self.keep.get(index) != Some(&1) {
-                continue;
-            }
-            let Some(m) = self.refined.get(index) else { continue };
-            let better = if config.refine { refine(m, images) } else { Some((*m, 0.0)) };
-            if let (Some((m, texture)), Some(slot), Some(score)) = (better, self.refined.get_mut(len), self.score.get_mut(len)) {
-                (*slot, *score) = (m, texture);
+            if self.keep.get(index) == Some(&1) {
+                self.refined.copy_within(index..=index, len);
+                self.score.copy_within(index..=index, len);
                 len += 1;
             }
         }
         self.refined_len = len;
     }
+}
+
+/// Cuts the first `count` items off `rest`, or as many as there are.
+fn part<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let count = count.min(rest.len());
+    rest.split_off_mut(..count).unwrap_or_default()
 }

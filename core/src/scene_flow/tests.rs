@@ -4,6 +4,7 @@ use super::{
     cells::{Cells, Shape},
     circle::{Corners, Reach},
     features::{DESCRIPTOR, Features, Window, table},
+    prior::Prior,
     refine::{Images, Pixels, refine},
     room::{HEIGHT, WIDTH, see},
     support::support,
@@ -304,4 +305,28 @@ fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
     assert!(refine(&Match { current_left: [40.0, 45.0], ..coarse }, images).is_none(), "a lost patch is no match");
     let flat = Pixels { data: &[50; 64 * 64], width: 64 };
     assert!(refine(&coarse, Images { previous_left: flat, ..images }).is_none(), "nothing to hold on to");
+}
+
+#[test]
+fn bins_look_where_their_matches_went_and_empty_ones_where_their_neighbours_did() {
+    let mut slab = slab();
+    let mut prior = Prior::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap()).unwrap();
+    let config = SceneFlowConfig::default();
+    let at = |u: f32, disparity: f32, flow: f32| Match {
+        previous_left: [u, 75.0],
+        previous_right: [u - disparity, 75.0],
+        current_left: [u + flow, 76.0],
+        current_right: [u + flow - disparity, 76.0],
+    };
+    let matches = [at(75.0, 20.0, -30.0), at(80.0, 24.0, -28.0), at(325.0, 6.0, 50.0)];
+    prior.learn(matches.into_iter(), WIDTH, HEIGHT, &config);
+    let near = prior.reach([60, 60]).unwrap();
+    assert_eq!(near.to_previous_right, [-34, -10, -2, 2], "ten px beyond the extremes, the stereo tolerance in v");
+    assert_eq!(near.to_current_right, [-40, -18, -9, 11]);
+    assert_eq!(prior.reach([10, 110]), Some(near), "a bin beside it learns the same");
+    let between = prior.reach([210, 60]).unwrap();
+    assert_eq!(between.to_previous_right, [-34, -1, -2, 2], "between two that know: both, and never behind the camera");
+    assert_eq!(between.to_current_right, [-40, 60, -9, 11]);
+    prior.learn(std::iter::empty(), WIDTH, HEIGHT, &config);
+    assert_eq!(prior.reach([60, 60]), Some(Reach::widest(&config)));
 }
