@@ -169,6 +169,9 @@ fn conclude(run: &RunRecord, place: &Path) {
     if refused > 0 {
         line("", format!("{refused} blocks found no room: the map has holes. Choose a larger --profile or a larger volume.voxel_size_m"));
     }
+    if run.blocks_lost() > 0 {
+        line("", format!("{} blocks unseen for longest left the full pool: a larger --profile keeps them", run.blocks_lost()));
+    }
     if run.held_frames() > 0 {
         line("held motion", format!("{} frames had too few matches", run.held_frames()));
     }

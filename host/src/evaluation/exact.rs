@@ -8,7 +8,9 @@ use serde::Serialize;
 const FAR_M: f32 = 20.0;
 /// Width of a bin of the error histogram, m.
 const BIN_M: f32 = 0.000_5;
-/// Bins; an error beyond the last falls into it.
+/// Width of a bin of the depth histogram, m.
+const DEPTH_BIN_M: f32 = 0.01;
+/// Bins of either histogram; what lies beyond the last falls into it.
 const BINS: usize = 10_000;
 
 /// What the comparison gave.
@@ -16,6 +18,8 @@ const BINS: usize = 10_000;
 pub struct ExactFigures {
     /// Median of |depth of the map - exact depth|, m, to half a millimetre.
     pub median_error_m: f64,
+    /// Median exact depth of the pixels compared, m, to a centimetre: what the error is to be held against.
+    pub median_depth_m: f64,
     /// Share of the exact pixels where the map shows a surface.
     pub completeness: f64,
     /// Exact pixels compared: static ones within 20 m.
@@ -25,13 +29,14 @@ pub struct ExactFigures {
 /// Collects errors over frames in a histogram: memory does not grow.
 #[derive(Debug)]
 pub struct ExactErrors {
-    bins: Vec<u64>,
+    errors: Vec<u64>,
+    depths: Vec<u64>,
     points: u64,
 }
 
 impl Default for ExactErrors {
     fn default() -> Self {
-        Self { bins: vec![0; BINS], points: 0 }
+        Self { errors: vec![0; BINS], depths: vec![0; BINS], points: 0 }
     }
 }
 
@@ -45,28 +50,38 @@ impl ExactErrors {
             }
             self.points += 1;
             if shown_m > 0.0 {
-                let bin = ((shown_m - exact_m).abs() / BIN_M) as usize;
-                if let Some(count) = self.bins.get_mut(bin.min(BINS - 1)) {
-                    *count += 1;
-                }
+                count(&mut self.errors, (shown_m - exact_m).abs() / BIN_M);
+                count(&mut self.depths, exact_m / DEPTH_BIN_M);
             }
         }
     }
 
     /// The figures; `None` when nothing was compared.
     pub fn figures(&self) -> Option<ExactFigures> {
-        let shown: u64 = self.bins.iter().sum();
-        let mut below = 0;
-        let median = self.bins.iter().position(|count| {
-            below += count;
-            2 * below >= shown
-        })?;
-        (shown > 0).then(|| ExactFigures {
-            median_error_m: f64::from(BIN_M) * (median as f64 + 0.5),
-            completeness: shown as f64 / self.points as f64,
+        Some(ExactFigures {
+            median_error_m: f64::from(BIN_M) * median_bin(&self.errors)?,
+            median_depth_m: f64::from(DEPTH_BIN_M) * median_bin(&self.depths)?,
+            completeness: self.errors.iter().sum::<u64>() as f64 / self.points as f64,
             points: self.points,
         })
     }
+}
+
+fn count(bins: &mut [u64], bin: f32) {
+    if let Some(count) = bins.get_mut((bin as usize).min(BINS - 1)) {
+        *count += 1;
+    }
+}
+
+/// Middle of the bin the median lies in; `None` when nothing was counted.
+fn median_bin(bins: &[u64]) -> Option<f64> {
+    let all: u64 = bins.iter().sum();
+    let mut below = 0;
+    let at = bins.iter().position(|count| {
+        below += count;
+        2 * below >= all
+    })?;
+    (all > 0).then_some(at as f64 + 0.5)
 }
 
 #[cfg(test)]
@@ -88,6 +103,6 @@ mod tests {
         let figures = errors.figures().unwrap();
         assert_eq!(figures.points, 3);
         assert!((figures.completeness - 2.0 / 3.0).abs() < 1e-12);
-        assert!((figures.median_error_m - 0.1).abs() < 0.001, "{figures:?}");
+        assert!((figures.median_error_m - 0.1).abs() < 0.001 && (figures.median_depth_m - 10.0).abs() < 0.02, "{figures:?}");
     }
 }

@@ -132,7 +132,7 @@ impl Summary {
             },
             health: HealthSummary {
                 blocks_refused: run.blocks_refused(),
-                blocks_lost: sum(|report| report.allocation.eviction.lost),
+                blocks_lost: run.blocks_lost(),
                 matches_dropped: sum(Report::dropped_features),
                 worst_severity: run.worst().name(),
             },

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 fn poses() -> Vec<dynvox_core::geometry::Transform> {
     (0..5)
-        .map(|i| exp(Vector3::new(0.01, 0.3, -0.02) * f64::from(i), Vector3::new(1.0 / 3.0, -1e-9, 1234.567_891_234_5) * f64::from(i)))
+        .map(|i| exp(Vector3::new(0.01, 0.3, -0.02) * f64::from(i), Vector3::new(1.0 / 3.0, -1e-9, 1_234.567_891_234_5) * f64::from(i)))
         .collect()
 }
 

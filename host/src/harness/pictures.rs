@@ -53,8 +53,8 @@ pub fn map(
         }
         let facing: f32 = to_camera(normal.map(f32::from)).iter().zip(TO_LIGHT).map(|(n, light)| n * light).sum::<f32>() / 127.0;
         let lit = facing.clamp(0.0, 1.0);
-        let (base, ambient) = if colour == [0; 3] { ([205, 205, 200], 0.35) } else { (colour, 0.8) };
-        base.map(|channel| (f32::from(channel) * (ambient + (1.0 - ambient) * lit)) as u8)
+        let (base, ambient) = if colour == [0; 3] { ([205, 205, 200], 0.35) } else { (colour, 0.9) };
+        base.map(|channel| (1.05 * f32::from(channel) * (ambient + (1.0 - ambient) * lit)) as u8)
     })
 }
 

@@ -111,6 +111,8 @@ pub struct RunRecord {
     pub exact: Option<ExactFigures>,
     /// Pictures.
     pub keyframes: Vec<Keyframe>,
+    /// The finished map from behind and above the last camera, as a PNG file; empty where there is none.
+    pub overview_png: Vec<u8>,
     /// The slab, region by region, at the end.
     pub regions: Vec<Region>,
     /// Bytes of the slab.
@@ -148,6 +150,11 @@ impl RunRecord {
     /// Blocks that found no room, over all frames.
     pub fn blocks_refused(&self) -> u64 {
         self.rows.iter().map(|row| u64::from(row.blocks_refused())).sum()
+    }
+
+    /// Blocks that left the full pool for good, over all frames.
+    pub fn blocks_lost(&self) -> u64 {
+        self.rows.iter().map(|row| u64::from(row.report.allocation.eviction.lost)).sum()
     }
 
     /// The worst thing that happened.

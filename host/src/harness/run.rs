@@ -4,7 +4,7 @@ use super::{FrameRow, HostSlab, Keyframe, Progress, RunRecord, Threads, pictures
 use crate::dataset::{Dataset, DatasetError, ExactFrame, StereoImages};
 use crate::evaluation::exact::ExactErrors;
 use crate::export::{FolderError, Mesh, PlyWriter, RunFolder};
-use dynvox_core::geometry::Transform;
+use dynvox_core::geometry::{Transform, exp};
 use dynvox_core::image::StereoFrame;
 use dynvox_core::memory::SlabError;
 use dynvox_core::volume::Triangle;
@@ -17,6 +17,11 @@ const KEYFRAMES: usize = 5;
 const EXACT_FRAMES: usize = 24;
 /// Disparity shown in red, as a share of the image width.
 const NEAR_SHARE: f32 = 0.08;
+
+/// Where the overview's camera stands, as seen from the last camera, m: behind and above.
+const OVERVIEW_PLACE_M: [f64; 3] = [0.0, -7.0, -15.0];
+/// How far it looks down, rad.
+const OVERVIEW_PITCH_RAD: f64 = 0.33;
 
 /// What to run.
 pub struct Plan {
@@ -137,6 +142,7 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
     course.frames()?;
     let mapping_seconds = (begin.elapsed() - course.aside).as_secs_f64();
     let finish = course.mapper.finish();
+    let overview_png = course.overview();
     let mesh = course.mesh(folder)?;
     let truth = plan.dataset.truth().map(|truth| from_first(truth, &plan.indices));
     let poses: Vec<Transform> = course.rows.iter().map(|row| row.report.t_world_camera).collect();
@@ -162,6 +168,7 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
         mapping_seconds,
         rows: course.rows,
         keyframes: course.keyframes,
+        overview_png,
     })
 }
 
@@ -222,6 +229,12 @@ fn from_first(poses: &[Transform], indices: &[usize]) -> Vec<Transform> {
 fn spread(frames: usize, count: usize) -> impl Fn(usize) -> bool {
     let count = count.min(frames).max(1);
     move |at| ((at + 1) * count) / frames > (at * count) / frames
+}
+
+/// Turns directions of the world into those of a camera.
+fn into_camera(t_world_camera: &Transform) -> impl Fn([f32; 3]) -> [f32; 3] {
+    let turn = t_world_camera.rotation.inverse().to_rotation_matrix().cast::<f32>();
+    move |direction| (turn * nalgebra::Vector3::from(direction)).into()
 }
 
 /// A run under way.
@@ -299,13 +312,11 @@ impl Course<'_, '_> {
         }
         if let (Some(frame), Some(disparity_png), Some(grey)) = (keyframe, disparity_png, images.left.view()) {
             let input = images.colour.as_ref().and_then(|colour| colour.view());
-            let to_camera = t_world_camera.rotation.inverse().to_rotation_matrix().cast::<f32>();
-            let turned = |normal: [f32; 3]| (to_camera * nalgebra::Vector3::from(normal)).into();
             self.keyframes.push(Keyframe {
                 frame,
                 input_png: pictures::input(&grey, input.as_ref()),
                 disparity_png,
-                raycast_png: pictures::map(&depth_m, &normal, &colour, turned),
+                raycast_png: pictures::map(&depth_m, &normal, &colour, into_camera(t_world_camera)),
             });
         }
         // The raycast's time belongs to the frame it looked from.
@@ -313,6 +324,17 @@ impl Course<'_, '_> {
         if let Some(row) = self.rows.last_mut() {
             row.stages[Stage::Raycast as usize] = times[Stage::Raycast as usize];
         }
+    }
+
+    /// The map from behind and above the last camera.
+    fn overview(&mut self) -> Vec<u8> {
+        let Some(row) = self.rows.last() else { return Vec::new() };
+        let down = nalgebra::Vector3::new(-OVERVIEW_PITCH_RAD, 0.0, 0.0);
+        let t_world_camera = row.report.t_world_camera * exp(down, OVERVIEW_PLACE_M.into());
+        let (mapper, threads) = (&mut self.mapper, &self.threads);
+        let Ok(seen) = threads.run(|| mapper.raycast(&t_world_camera, threads)) else { return Vec::new() };
+        let (Some(depth_m), Some(normal), Some(colour)) = (seen.depth_m(), seen.normal(), seen.colour()) else { return Vec::new() };
+        pictures::map(&depth_m, &normal, &colour, into_camera(&t_world_camera))
     }
 
     fn mesh(&self, folder: &RunFolder) -> Result<Mesh, RunError> {

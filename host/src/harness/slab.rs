@@ -31,7 +31,7 @@ mod tests {
     fn is_aligned_zeroed_and_long_enough_and_refuses_what_no_machine_has() {
         let mut slab = HostSlab::map(1_000).unwrap();
         let bytes = slab.bytes_mut();
-        assert!(bytes.len() >= 1_000 && bytes.as_ptr() as usize % SLAB_ALIGN == 0 && bytes.iter().all(|&byte| byte == 0));
+        assert!(bytes.len() >= 1_000 && (bytes.as_ptr() as usize).is_multiple_of(SLAB_ALIGN) && bytes.iter().all(|&byte| byte == 0));
         assert!(HostSlab::map(usize::MAX / 2).is_none());
     }
 }

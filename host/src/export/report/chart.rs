@@ -8,7 +8,11 @@ pub const COLOURS: [&str; 6] = ["#4269d0", "#efb118", "#ff725c", "#3aa99f", "#9b
 /// Points a line is drawn with at most: longer ones are thinned to the largest value of each piece.
 const POINTS: usize = 560;
 const WIDTH: f64 = 640.0;
+/// Width of a drawing that takes the whole page.
+const WHOLE: f64 = 1180.0;
 const HEIGHT: f64 = 230.0;
+/// Highest drawing of a path.
+const HIGHEST: f64 = 620.0;
 const LEFT: f64 = 54.0;
 const BOTTOM: f64 = 26.0;
 const TOP: f64 = 8.0;
@@ -60,9 +64,21 @@ pub fn stacked(frames: &[usize], series: &[Series<'_>], unit: &str) -> String {
     svg + "</svg>" + &legend(series)
 }
 
-/// Paths seen from above at one scale: x to the right, z (forward) up. Each path is a name, a colour, whether it is dashed, and points.
-pub fn from_above(paths: &[(&str, &str, bool, Vec<(f64, f64)>)]) -> String {
-    let all = || paths.iter().flat_map(|path| &path.3);
+/// A path seen from above.
+pub struct Path<'a> {
+    /// Name in the legend.
+    pub name: &'a str,
+    /// Colour.
+    pub colour: &'a str,
+    /// Whether its line is broken.
+    pub dashed: bool,
+    /// Places, m: x (right) and z (forward).
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Paths at one scale. A path that leads forward lies on its side.
+pub fn from_above(paths: &[Path<'_>]) -> String {
+    let all = || paths.iter().flat_map(|path| &path.points);
     let range =
         |of: fn(&(f64, f64)) -> f64| all().map(of).fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
     let ((x0, x1), (z0, z1)) = (range(|point| point.0), range(|point| point.1));
@@ -73,15 +89,15 @@ pub fn from_above(paths: &[(&str, &str, bool, Vec<(f64, f64)>)]) -> String {
     let side = x1 - x0 < z1 - z0;
     let (along, across) = if side { (z1 - z0, x1 - x0) } else { (x1 - x0, z1 - z0) };
     let margin = 0.06 * along.max(1.0);
-    let scale = (WIDTH - 2.0 * 14.0) / (along + 2.0 * margin);
-    let height = ((across + 2.0 * margin) * scale).clamp(120.0, 520.0) + 34.0;
+    let scale = ((WHOLE - 28.0) / (along + 2.0 * margin)).min(HIGHEST / (across + 2.0 * margin));
+    let height = ((across + 2.0 * margin) * scale).max(90.0) + 34.0;
     let middle = ((x0 + x1) / 2.0, (z0 + z1) / 2.0);
     let place = |&(x, z): &(f64, f64)| {
         let (right, up) = if side { (z - middle.1, x - middle.0) } else { (x - middle.0, middle.1 - z) };
-        (WIDTH / 2.0 + right * scale, (height - 34.0) / 2.0 + up * scale)
+        (WHOLE / 2.0 + right * scale, (height - 34.0) / 2.0 + up * scale)
     };
-    let mut svg = format!(r#"<svg viewBox="0 0 {WIDTH} {height:.0}" role="img" aria-label="trajectory from above">"#);
-    let step = nice_step((along + 2.0 * margin) / 6.0);
+    let mut svg = format!(r#"<svg viewBox="0 0 {WHOLE} {height:.0}" role="img" aria-label="trajectory from above">"#);
+    let step = nice_step((along + 2.0 * margin) / 10.0);
     let bar = step * scale;
     let base = height - 18.0;
     let _ = write!(
@@ -91,17 +107,17 @@ pub fn from_above(paths: &[(&str, &str, bool, Vec<(f64, f64)>)]) -> String {
         base + 4.0,
         if side { ", forward to the right" } else { ", forward up" }
     );
-    for (_, colour, dashed, points) in paths {
+    for Path { colour, dashed, points, .. } in paths {
         let every = points.len().div_ceil(4 * POINTS).max(1);
         let path = polyline(points.iter().step_by(every).chain(points.last()).map(place));
         let dash = if *dashed { r#" stroke-dasharray="6 5""# } else { "" };
         let _ = write!(svg, r#"<path d="{path}" fill="none" stroke="{colour}" stroke-width="2.2" stroke-linejoin="round"{dash}/>"#);
     }
-    if let Some((x, y)) = paths.first().and_then(|path| path.3.first()).map(place) {
-        let _ = write!(svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="4.5" fill="{}"/>"#, paths[0].1);
+    if let Some((x, y)) = all().next().map(place) {
+        let _ = write!(svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="4.5" fill="{}"/>"#, paths.first().map_or("", |path| path.colour));
     }
     svg += "</svg>";
-    let names: Vec<Series<'_>> = paths.iter().map(|path| Series { name: path.0, colour: path.1, values: Vec::new() }).collect();
+    let names: Vec<Series<'_>> = paths.iter().map(|path| Series { name: path.name, colour: path.colour, values: Vec::new() }).collect();
     svg + &legend(&names)
 }
 
@@ -213,7 +229,8 @@ mod tests {
             assert!(lines(&frames, &series(values.clone()), "ms", 0.0).ends_with("</div>"));
             assert!(!stacked(&frames, &series(values), "ms").contains("NaN"));
         }
-        assert!(!from_above(&[("a", "red", false, vec![(0.0, 0.0)])]).contains("NaN"));
+        let path = Path { name: "a", colour: "red", dashed: false, points: vec![(0.0, 0.0)] };
+        assert!(!from_above(&[path]).contains("NaN"));
         assert!(from_above(&[]).is_empty());
     }
 }

@@ -2,9 +2,9 @@
 
 mod chart;
 
-use crate::harness::{FrameRow, RunRecord};
+use crate::harness::{FrameRow, RunRecord, StageTime};
 use base64::{Engine, engine::general_purpose::STANDARD};
-use chart::{COLOURS, Series};
+use chart::{COLOURS, Path, Series};
 use dynvox_core::Stage;
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -29,13 +29,15 @@ pub fn write(out: &mut impl Write, run: &RunRecord) -> io::Result<()> {
 fn head(run: &RunRecord) -> String {
     let (width, height) = run.size;
     let mut html = format!(
-        "<h1>{}</h1><p class=\"soft\">{} frames of {width} × {height} px, profile <code>{}</code>, {} thread{}, dynvox {}</p>",
+        "<h1>{}</h1><p class=\"soft\">{} frames of {width} × {height} px, profile <code>{}</code>, {} thread{}, dynvox {}. \
+         Digest of the last frame: <code>{:016x}</code></p>",
         escaped(&run.name),
         run.rows.len(),
         escaped(&run.profile),
         run.threads,
         if run.threads == 1 { "" } else { "s" },
-        env!("CARGO_PKG_VERSION")
+        env!("CARGO_PKG_VERSION"),
+        run.digest()
     );
     if !run.notes.is_empty() {
         let notes: String = run.notes.iter().map(|note| format!("<li>{}</li>", escaped(note))).collect();
@@ -63,16 +65,15 @@ fn cards(run: &RunRecord) -> String {
     let (used, blocks) = (run.blocks_peak(), run.capacity.blocks);
     card(format!("{:.0} %", 100.0 * f64::from(used) / blocks as f64), "of the block pool used at most");
     card(grouped(run.mesh.triangles), "triangles in map.ply");
-    card(format!("<code>{:016x}</code>", run.digest()), "digest of the last frame");
     format!("<div class=\"cards\">{}</div>", cards.concat())
 }
 
 fn trajectory(run: &RunRecord) -> String {
     let above = |poses: &[dynvox_core::geometry::Transform]| poses.iter().map(|pose| (pose.translation.x, pose.translation.z)).collect();
     let poses = run.poses();
-    let mut paths = vec![("estimated", "var(--accent)", false, above(&poses))];
+    let mut paths = vec![Path { name: "estimated", colour: "var(--accent)", dashed: false, points: above(&poses) }];
     if let Some(truth) = &run.truth {
-        paths.push(("true", "var(--truth)", true, above(truth)));
+        paths.push(Path { name: "true", colour: "var(--truth)", dashed: true, points: above(truth) });
     }
     let length = crate::evaluation::trajectory::travelled_m(&poses).last().copied().unwrap_or_default();
     let mut html = format!(
@@ -106,17 +107,12 @@ fn trajectory(run: &RunRecord) -> String {
 }
 
 fn pictures(run: &RunRecord) -> String {
-    if run.keyframes.is_empty() {
-        return String::new();
-    }
+    let image = |png: &[u8], what: &str| format!("<img alt=\"{what}\" src=\"data:image/png;base64,{}\">", STANDARD.encode(png));
     let mut html =
         "<section><h2>What it saw, measured and mapped</h2><p class=\"soft small\">Left image; disparity from far (blue) to near (red), \
                     none where dark; the map from the camera's place after this frame.</p>"
             .to_owned();
     for keyframe in &run.keyframes {
-        let image = |png: &[u8], what: &str| {
-            format!("<img alt=\"{what}, frame {}\" src=\"data:image/png;base64,{}\">", keyframe.frame, STANDARD.encode(png))
-        };
         let _ = write!(
             html,
             "<figure><div class=\"three\">{}{}{}</div><figcaption>frame {}</figcaption></figure>",
@@ -125,6 +121,10 @@ fn pictures(run: &RunRecord) -> String {
             image(&keyframe.raycast_png, "map"),
             keyframe.frame
         );
+    }
+    if !run.overview_png.is_empty() {
+        let overview = image(&run.overview_png, "map from behind and above");
+        let _ = write!(html, "<figure>{overview}<figcaption>The finished map from behind and above the last camera</figcaption></figure>");
     }
     html + "</section>"
 }
@@ -180,14 +180,21 @@ fn memory(run: &RunRecord) -> String {
 }
 
 fn time(run: &RunRecord) -> String {
-    let stage = |at: usize, stage: Stage| series(run, stage.name(), COLOURS[at % COLOURS.len()], move |row| row.stages[at].wall_ms);
-    let stages: Vec<Series<'_>> =
-        Stage::ALL.iter().enumerate().filter(|(_, stage)| **stage != Stage::Raycast).map(|(at, one)| stage(at, *one)).collect();
+    let frames = frames(run);
+    let stages = |of: fn(&StageTime) -> f64| {
+        let within = Stage::ALL.iter().enumerate().filter(|(_, stage)| **stage != Stage::Raycast);
+        let one = |(at, stage): (usize, &Stage)| series(run, stage.name(), COLOURS[at % COLOURS.len()], move |row| of(&row.stages[at]));
+        within.map(one).collect::<Vec<_>>()
+    };
+    let mut wall = vec![series(run, "whole step", "currentColor", |row| row.step_ms)];
+    wall.extend(stages(|time| time.wall_ms));
     let mut html = format!(
-        "<section><h2>Time per stage</h2><p class=\"soft small\">Wall time of each frame's stages; CPU time beside it in the table counts all \
-         threads. Raycasts are taken for this page on some frames, outside the step.</p>{}<div class=\"scroll\"><table>\
+        "<section><h2>Time per stage</h2><p class=\"soft small\">Left: wall time; stereo and scene flow run side by side where there are two \
+         threads, and other work on the machine counts. Right: CPU time of all threads, stacked. Raycasts are taken for this page on some \
+         frames, outside the step.</p><div class=\"two\"><div>{}</div><div>{}</div></div><div class=\"scroll\"><table>\
          <tr><th>stage<th class=n>median, ms<th class=n>p99, ms<th class=n>CPU median, ms<th class=n>frames</tr>",
-        chart::stacked(&frames(run), &stages, "ms")
+        chart::lines(&frames, &wall, "ms, wall", 0.0),
+        chart::stacked(&frames, &stages(|time| time.cpu_ms), "ms, CPU")
     );
     for (name, of) in run.stage_statistics() {
         let _ = write!(
@@ -217,10 +224,12 @@ fn health(run: &RunRecord) -> String {
         100.0,
     );
     let refused = run.blocks_refused();
-    let words = if refused == 0 {
-        "Every block asked for found room.".to_owned()
-    } else {
-        format!("<b>The pool was full: {} blocks found no room.</b> A larger profile maps them.", grouped(refused))
+    let words = match (refused, run.blocks_lost()) {
+        (0, 0) => "Every block asked for found room.".to_owned(),
+        (0, lost) => {
+            format!("<b>The pool was full: {} blocks unseen for longest left it for good.</b> A larger profile keeps them.", grouped(lost))
+        }
+        (refused, _) => format!("<b>The pool was full: {} blocks found no room.</b> A larger profile maps them.", grouped(refused)),
     };
     format!(
         "<section><h2>Health</h2><p class=\"soft small\">{words}</p><div class=\"two\"><div>{matches}</div><div>{density}</div></div></section>"

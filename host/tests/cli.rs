@@ -1,0 +1,189 @@
+//! The binary as a user meets it: exit codes, sentences, and nothing left behind when something is wrong.
+#![allow(missing_docs)]
+
+use image::{GrayImage, Luma};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const CALIB: &str = "focal_px 90\ncenter_u_px 79.5\ncenter_v_px 31.5\nbaseline_m 0.5\n";
+
+fn dynvox(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(folder).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A stereo folder with `frames` textured frames of a plane 4.5 m away: 10 px of disparity.
+fn rig(root: &Path, frames: u32) {
+    for (side, shift) in [("left", 0), ("right", 10)] {
+        fs::create_dir_all(root.join("rig").join(side)).unwrap();
+        for at in 0..frames {
+            let texture = |u: u32, v: u32| Luma([((u / 3).wrapping_mul(2_654_435_761) ^ (v / 3).wrapping_mul(40_503_777) >> 7) as u8]);
+            let image = GrayImage::from_fn(160, 64, |u, v| texture(u + shift, v));
+            image.save(root.join("rig").join(side).join(format!("{at:03}.png"))).unwrap();
+        }
+    }
+    fs::write(root.join("rig/calib.txt"), CALIB).unwrap();
+}
+
+/// Names in the folder, hidden ones included.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_run_leaves_its_folder_and_json_alone_on_standard_output() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 3);
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--json"]);
+    assert!(run.status.success(), "{}", said(&run));
+    assert_eq!(said(&run), "", "nothing but the summary");
+    let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(summary["frames"], 3);
+    assert_eq!(summary["digest"].as_str().unwrap().len(), 16);
+    for key in ["seconds", "fps", "slab_bytes", "stages", "egomotion", "map", "prune", "evict", "health"] {
+        assert!(!summary[key].is_null(), "{key}");
+    }
+    assert!(summary["stages"]["stereo"]["cpu_median_ms"].as_f64().unwrap() > 0.0);
+    let files = ["config.toml", "frames.csv", "map.ply", "report.html", "summary.json", "trajectory_kitti.txt", "trajectory_tum.txt"];
+    assert_eq!(names(&root.path().join("result")), files);
+    assert_eq!(names(root.path()), ["result", "rig"]);
+    let csv = fs::read_to_string(root.path().join("result/frames.csv")).unwrap();
+    let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+    assert!(columns.len() == 4 && columns.iter().all(|count| *count == columns[0]), "one header, three rows, equal widths");
+    let report = fs::read_to_string(root.path().join("result/report.html")).unwrap();
+    assert!(
+        !report.contains("http") && !report.contains("<script") && report.contains("data:image/png;base64,"),
+        "one self-contained file"
+    );
+}
+
+#[test]
+fn the_same_frames_give_the_same_digests_on_one_thread_and_on_two_and_from_the_written_configuration() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 3);
+    let digests = |name: &str| -> Vec<String> {
+        let csv = fs::read_to_string(root.path().join(name).join("frames.csv")).unwrap();
+        csv.lines().skip(1).map(|line| line.split(',').nth(2).unwrap().to_owned()).collect()
+    };
+    let base = ["run", "rig", "--profile", "tiny", "--quiet", "--out"];
+    let with = |name: &str, more: &[&str]| assert!(dynvox(root.path(), &[&base[..], &[name], more].concat()).status.success());
+    with("one", &["--threads", "1", "--set", "volume.voxel_size_m=0.08"]);
+    with("two", &["--threads", "2", "--config", "one/config.toml"]);
+    with("other", &["--threads", "2"]);
+    assert_eq!(digests("one"), digests("two"));
+    assert_ne!(digests("one"), digests("other"), "the setting matters, so the file was read");
+}
+
+#[test]
+fn bad_input_fails_with_a_sentence_and_leaves_no_folder() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 3);
+    let fails = |args: &[&str], sentence: &str| {
+        let run = dynvox(root.path(), &[&["run"], args, &["--out", "result"]].concat());
+        assert_eq!(run.status.code(), Some(1), "{args:?}");
+        assert!(said(&run).contains("error: ") && said(&run).contains(sentence), "{args:?}: {}", said(&run));
+        assert_eq!(names(root.path()), ["rig"], "{args:?} left something behind");
+    };
+    let tiny = ["rig", "--profile", "tiny"];
+    fails(&["nowhere"], "there is no data set at nowhere");
+    fails(&["rig", "--profile", "huge"], "there is no profile huge");
+    fails(&["rig", "--set", "volume.voxel=1"], "`volume.voxel`");
+    fails(&["rig", "--set", "volume.voxel_size_m=-1"], "volume.voxel_size_m must be");
+    fails(&["rig", "--config", "missing.toml"], "missing.toml cannot be read");
+    fails(&["rig", "--start", "3"], "leaves none of the 3 frames");
+    fails(&["rig", "--scale", "0"], "--scale 0");
+    fails(&["rig", "--threads", "0"], "begin at 1");
+    // In the middle of a run: the last image is cut short.
+    let image = root.path().join("rig/right/002.png");
+    let bytes = fs::read(&image).unwrap();
+    fs::write(&image, &bytes[..bytes.len() / 2]).unwrap();
+    fails(&tiny, "right/002.png cannot be read");
+    GrayImage::new(100, 64).save(&image).unwrap();
+    fails(&tiny, "right/002.png is 100 x 64 px");
+    fs::remove_file(&image).unwrap();
+    fails(&tiny, "left/002.png has no partner");
+    fs::write(root.path().join("rig/calib.txt"), CALIB.replace("0.5\n", "0\n")).unwrap();
+    fs::remove_file(root.path().join("rig/left/002.png")).unwrap();
+    fails(&tiny, "the baseline is 0 m");
+}
+
+#[test]
+fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
+    let root = TempDir::new().unwrap();
+    for side in ["left", "right"] {
+        fs::create_dir_all(root.path().join("rig").join(side)).unwrap();
+        GrayImage::new(640, 192).save(root.path().join("rig").join(side).join("0.png")).unwrap();
+    }
+    fs::write(root.path().join("rig/calib.txt"), CALIB).unwrap();
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result"]);
+    assert!(
+        said(&run).contains("do not fit profile tiny") && said(&run).contains("--profile small, or shrink the images with --scale 0.5")
+    );
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--scale", "0.5", "--quiet"]);
+    assert!(run.status.success(), "black images are a value, not a failure: {}", said(&run));
+}
+
+#[test]
+fn an_existing_folder_is_replaced_only_when_asked() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 2);
+    let args = ["run", "rig", "--profile", "tiny", "--quiet", "--out", "result"];
+    assert!(dynvox(root.path(), &args).status.success());
+    let again = dynvox(root.path(), &args);
+    assert!(!again.status.success() && said(&again).contains("--overwrite"));
+    assert!(dynvox(root.path(), &[&args[..], &["--overwrite"]].concat()).status.success());
+    assert_eq!(names(root.path()), ["result", "rig"]);
+    assert!(dynvox(root.path(), &args[..5]).status.success(), "without --out");
+    assert_eq!(names(&root.path().join("out")), ["rig-001"]);
+}
+
+#[test]
+fn inspect_tells_what_is_there_and_how_to_map_it() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 2);
+    let told = dynvox(root.path(), &["inspect", "rig"]);
+    let text = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(told.status.success());
+    for words in ["rig: folder", "2 stereo pairs of 160 x 64 px", "baseline 0.5000 m", "no times.txt", "tiny, small", "dynvox run rig"] {
+        assert!(text.contains(words), "{words} in {text}");
+    }
+    fs::remove_file(root.path().join("rig/calib.txt")).unwrap();
+    let told = dynvox(root.path(), &["inspect", "rig"]);
+    assert!(!told.status.success() && String::from_utf8_lossy(&told.stdout).contains("calib.txt is missing"));
+}
+
+#[test]
+fn budget_shows_every_profile_and_the_regions_sum_to_the_slab() {
+    let root = TempDir::new().unwrap();
+    let all = String::from_utf8(dynvox(root.path(), &["budget"]).stdout).unwrap();
+    assert!(["tiny", "small", "onboard", "desktop"].iter().all(|name| all.contains(name)));
+    let tiny = String::from_utf8(dynvox(root.path(), &["budget", "--profile", "tiny"]).stdout).unwrap();
+    let bytes = |line: &str| -> u64 { line.split_whitespace().nth_back(2).unwrap().replace(',', "").parse().unwrap() };
+    let lines: Vec<&str> = tiny.lines().skip(1).collect();
+    let (slab, regions) = lines.split_last().unwrap();
+    assert_eq!(regions.iter().map(|line| bytes(line)).sum::<u64>(), bytes(slab));
+    assert_eq!(bytes(slab), dynvox_core::Capacity::TINY.bytes() as u64);
+}
+
+#[test]
+fn a_written_street_is_mapped_as_a_kitti_folder() {
+    let root = TempDir::new().unwrap();
+    let small = ["--set", "street.width=160", "--set", "street.height=64"];
+    let written = dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "3"], &small[..]].concat());
+    assert!(written.status.success(), "{}", said(&written));
+    let from_disk = dynvox(root.path(), &["run", "street", "--images", "colour", "--profile", "tiny", "--out", "a", "--json"]);
+    let settings = [&small[..], &["--set", "street.frames=3"]].concat();
+    let from_memory = dynvox(root.path(), &[&["run", "--profile", "tiny", "--out", "b", "--json"], &settings[..]].concat());
+    let digest = |output: &Output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["digest"].clone();
+    assert_eq!(digest(&from_disk), digest(&from_memory), "PNG files lose nothing");
+    let refused = dynvox(root.path(), &["synth", "--out", "x", "--set", "street.width=1"]);
+    assert!(!refused.status.success() && said(&refused).contains("width") && !root.path().join("x").exists(), "{}", said(&refused));
+}
