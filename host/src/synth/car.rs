@@ -156,7 +156,7 @@ fn half_ring(section: &Section) -> [(f64, f64); 8] {
     let waist = sill + 0.45 * (belt - sill);
     [
         (0.88 * wide, sill),
-        (0.97 * wide, sill + 0.10),
+        (0.97 * wide, sill + 0.3 * (waist - sill)),
         (wide, waist),
         (0.985 * wide, belt - 0.04),
         (0.96 * wide, belt),

@@ -25,7 +25,7 @@ pub fn shell(painter: &Painter, shape: &Shape, spot: &Spot, coat: Tone) -> Paint
     let speck = painter.textures.fine.at(z * 0.7 + x, y * 0.7 + x, 0.7 * place.f, 0.7 * place.f);
     let dirt = 0.25 * (1.0 - above(0.45, place.up, 0.4));
     let mut tone = blend(times(coat, 1.0 + 0.03 * speck), [0.10, 0.09, 0.08], dirt);
-    let mut gloss = 0.16;
+    let mut gloss = 0.30;
     tone = blend(tone, times(coat, 0.22), joints(shape, &place) * side);
     // The strip below the doors and the bumpers' lower edge are black.
     tone = blend(tone, BLACK, 1.0 - above(0.30, place.up, place.f));
@@ -36,9 +36,9 @@ pub fn shell(painter: &Painter, shape: &Shape, spot: &Spot, coat: Tone) -> Paint
     }
     let glass = glass(shape, &place, side, nz);
     if glass > 0.0 {
-        let sky = 0.10 * (0.5 - 0.5 * ny).max(0.0) + 0.05 * above(shape.side_height_m[0] + 0.2, place.up, 0.2);
+        let sky = 0.06 * (0.5 - 0.5 * ny).max(0.0) + 0.05 * above(shape.side_height_m[0] + 0.2, place.up, 0.2);
         tone = blend(tone, blend(GLASS, [0.45, 0.52, 0.62], sky), glass);
-        gloss += 0.12 * glass;
+        gloss += 0.20 * glass;
     }
     let ends = if z > 0.0 { front(shape, &place) } else { rear(shape, &place) };
     for (share, paint) in ends {

@@ -224,10 +224,10 @@ fn balcony(mesh: &mut Mesh, dice: &mut Dice, house: &House, middle: f64, floor: 
         }
         return;
     }
-    let bars = 14;
+    let bars = 11;
     for k in 0..=bars {
         let x = middle - half + 0.03 + (2.0 * half - 0.06) * f64::from(k) / f64::from(bars);
-        mesh.cuboid(rail, Point::new(x - 0.012, top, out - 0.04), Point::new(x + 0.012, floor - 0.12, out - 0.016), &[2, 3]);
+        mesh.cuboid(rail, Point::new(x - 0.012, top, out - 0.04), Point::new(x + 0.012, floor - 0.12, out - 0.016), &[2, 3, 4]);
     }
     for x in [middle - half, middle + half - 0.04] {
         for k in 0..5 {

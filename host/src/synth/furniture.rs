@@ -45,10 +45,10 @@ pub fn tree(mesh: &mut Mesh, dice: &mut Dice) {
 
 /// One bough: leaf sheets on a ragged ball. Their normals lean outwards, so that the crown is lit as a whole.
 fn crown_part(mesh: &mut Mesh, dice: &mut Dice, leaves: &[u16], (blob, middle): (Point, Point), radius: f64) {
-    for _ in 0..70 {
+    for _ in 0..44 {
         let out = direction(dice);
         let place = blob + out * (radius * dice.between(0.55, 1.05));
-        let size = dice.between(0.14, 0.3);
+        let size = dice.between(0.18, 0.36);
         let facing = (out + direction(dice) * 0.7).normalize();
         let u = facing.cross(&direction(dice)).normalize();
         let v = facing.cross(&u);
@@ -63,7 +63,7 @@ fn crown_part(mesh: &mut Mesh, dice: &mut Dice, leaves: &[u16], (blob, middle): 
         mesh.polygon(
             surface,
             facing,
-            &[corner(-1.0, -0.2 * p), corner(-0.2, -q), corner(0.9, -0.3), corner(0.6 * q, 0.7), corner(-0.4, p)],
+            &[corner(-1.0, -0.3 * p), corner(0.1, -q), corner(1.0, 0.2), corner(-0.2 * q, p)],
         );
         let soft = (facing * 0.35 + (place - middle).normalize() + out * 0.5).normalize();
         for vertex in &mut mesh.vertices[first..] {

@@ -37,7 +37,7 @@ impl Light {
             let cosine = normal.dot(&to_eye).clamp(0.0, 1.0);
             let mirrored = normal * (2.0 * normal.dot(&to_eye)) - to_eye;
             let grazing = (1.0 - cosine) * (1.0 - cosine);
-            let share = painted.gloss * (0.35 + 0.65 * grazing);
+            let share = painted.gloss * (0.12 + 0.88 * grazing * grazing);
             let sky = above(-0.05, -mirrored.y, 0.5);
             let (wall, road) = (0.22, 0.14);
             let low = wall + (road - wall) * above(0.0, mirrored.y, 0.3);
@@ -86,8 +86,8 @@ impl Light {
     }
 }
 
-/// Linear light as a grey level 0 to 255, before noise: a soft shoulder, then the root as the curve of the eye.
+/// Linear light as a grey level 0 to 255, before noise: a soft shoulder, the root as the curve of the eye, and a black point.
 pub fn develop(light: f32) -> f32 {
     let soft = light * (1.0 + light * 0.16) / (1.0 + light * 0.95);
-    255.0 * soft.clamp(0.0, 1.0).sqrt()
+    (272.0 * soft.clamp(0.0, 1.0).sqrt() - 20.0).clamp(0.0, 255.0)
 }

@@ -35,6 +35,8 @@ pub struct Mesh {
     pub vertices: Vec<Vertex>,
     /// Faces.
     pub triangles: Vec<Triangle>,
+    /// Each face's plane: normal and offset, a face is seen from where normal * eye >= offset; infinite where seen from both sides.
+    pub planes: Vec<[f64; 4]>,
     /// Materials.
     pub surfaces: Vec<Surface>,
     /// Middle of the bounding sphere.
@@ -52,7 +54,8 @@ impl Mesh {
 
     /// Adds a convex polygon that faces `outward`; texture coordinates come with the corners.
     pub fn polygon(&mut self, surface: u16, outward: Point, corners: &[(Point, [f32; 3])]) {
-        let raw = (corners[1].0 - corners[0].0).cross(&(corners[2].0 - corners[0].0));
+        let fan = corners.windows(2).skip(1);
+        let raw = fan.fold(Point::zeros(), |sum, pair| sum + (pair[0].0 - corners[0].0).cross(&(pair[1].0 - corners[0].0)));
         let flipped = raw.dot(&outward) < 0.0;
         let scale = if flipped { -1.0 } else { 1.0 } / (raw.norm() + 1e-12);
         let normal = [0, 1, 2].map(|k| (raw[k] * scale) as f32);
@@ -141,8 +144,17 @@ impl Mesh {
         }
     }
 
-    /// Finds the bounding sphere; call it when the mesh is complete.
+    /// Finds the bounding sphere and the faces' planes; call it when the mesh is complete.
     pub fn finish(mut self) -> Self {
+        let plane = |triangle: &Triangle| {
+            if self.surfaces[triangle.surface as usize].two_sided {
+                return [f64::INFINITY; 4];
+            }
+            let [a, b, c] = triangle.corners.map(|corner| self.vertices[corner as usize].place_m);
+            let normal = (b - a).cross(&(c - a));
+            [normal.x, normal.y, normal.z, normal.dot(&a)]
+        };
+        self.planes = self.triangles.iter().map(plane).collect();
         let (low, high) = self.bounds_m();
         self.middle_m = (low + high) * 0.5;
         self.radius_m = self.vertices.iter().map(|vertex| (vertex.place_m - self.middle_m).norm()).fold(0.0, f64::max);

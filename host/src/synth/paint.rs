@@ -130,7 +130,7 @@ impl Painter {
         let [fs, fd, _] = spot.footprint_m;
         let fine = self.textures.fine.at(s, d, fs, fd);
         let broad = self.textures.broad.at(s, d, fs, fd);
-        let mut shade = 1.0 + 0.20 * fine + 0.10 * broad;
+        let mut shade = 1.0 + 0.36 * fine + 0.09 * broad;
         let mut tint = surface.tone;
         // Wheels polish two tracks in each lane; the gutter is dirty.
         let lane = (d - 1.6) * (1.0 / 3.2);
@@ -188,7 +188,7 @@ impl Painter {
         let own = (unit(cell(surface.seed, column.rem_euclid(480), row)) - 0.5) * survives(size, fs.max(fd));
         let fine = self.fine(3, spot, 1.0);
         let broad = self.broad(4, spot, 1.0);
-        let shade = 1.0 + 0.13 * fine + 0.12 * broad + 0.28 * own;
+        let shade = 1.0 + 0.22 * fine + 0.10 * broad + 0.26 * own;
         Painted::dull(blend(times(surface.tone, shade), surface.second, 0.7 * joint))
     }
 
@@ -221,7 +221,7 @@ impl Painter {
         let streak = self.textures.broad.at(u * 2.0, v * 0.18, 2.0 * fu, 0.18 * fv);
         let height = -spot.surface_m[1];
         let splash = ((0.9 - height) * 0.5).clamp(0.0, 0.35);
-        let shade = 1.0 + 0.07 * fine + 0.055 * broad + 0.06 * streak - splash * (0.7 + 0.3 * broad);
+        let shade = 1.0 + 0.11 * fine + 0.06 * broad + 0.06 * streak - splash * (0.7 + 0.3 * broad);
         Painted::dull(times(surface.tone, shade))
     }
 
@@ -238,7 +238,7 @@ impl Painter {
         let own = (unit(h) - 0.5) * 2.0 * spread * kept;
         let fine = self.fine(surface.seed, spot, 1.0);
         let broad = self.broad(surface.seed, spot, 1.0);
-        let shade = 1.0 + own + 0.10 * fine + 0.07 * broad;
+        let shade = 1.0 + own + 0.15 * fine + 0.07 * broad;
         let mut tone = times(surface.tone, shade);
         // A few burnt stones.
         tone[0] *= 1.0 + 0.15 * kept * (unit(h << 9) - 0.5);

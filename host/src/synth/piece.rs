@@ -8,6 +8,8 @@ use super::draws::Dice;
 use super::furniture;
 use super::mesh::{Mesh, Point};
 use super::path::{Course, PIECE_M};
+use super::scene::Placed;
+use super::shadow::{ShadowTile, SunAxes};
 use super::surface::{Kind, Surface, Tone, tone};
 use super::{facade, layout};
 
@@ -19,6 +21,8 @@ pub struct Piece {
     pub t_street_piece: Transform,
     /// Parked cars.
     pub parked: Vec<ParkedCar>,
+    /// What its things hold up against the sun.
+    pub shadow: ShadowTile,
 }
 
 /// A parked car.
@@ -64,14 +68,17 @@ pub fn choose_car(dice: &mut Dice) -> (CarKind, Tone) {
 }
 
 /// Generates piece `number`.
-pub fn piece(config: &StreetConfig, course: &Course, number: i64) -> Piece {
+pub fn piece(config: &StreetConfig, course: &Course, sun: &SunAxes, number: i64) -> Piece {
     let builder = Builder::new(config, course, number);
     let mut things = builder.ground();
     for side in [Side::Left, Side::Right] {
         builder.houses(side, &mut things);
         builder.pavement_things(side, &mut things);
     }
-    Piece { things, t_street_piece: builder.t_street_piece, parked: builder.parked() }
+    let placed = Placed::new(&builder.t_street_piece);
+    // The ground, first of the things, shades nothing.
+    let shadow = ShadowTile::new(sun, things.iter().skip(1).map(|mesh| (mesh, placed)));
+    Piece { things, t_street_piece: builder.t_street_piece, parked: builder.parked(), shadow }
 }
 
 #[derive(Clone, Copy, PartialEq)]

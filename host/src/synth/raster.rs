@@ -127,14 +127,15 @@ impl Band {
     pub fn draw(&mut self, number: u32, setup: &Setup) {
         let first = (setup.rows.0 as usize).max(self.first_row);
         let last = (setup.rows.1 as usize).min(self.first_row + self.rows - 1);
-        let depth = setup.inverse_depth();
+        let [per_column, per_row, constant] = setup.inverse_depth();
+        let slope = per_column as f32;
+        let sides = Sides::new(setup);
         for (sample, (du, dv)) in OFFSETS_PX.into_iter().enumerate() {
             for row in first..=last {
                 let v = row as f64 + dv;
-                let Some((from, to)) = span(setup, du, v) else { continue };
+                let Some((from, to)) = sides.span(du, v) else { continue };
                 let start = (sample * self.rows + row - self.first_row) * self.width;
-                let begin = (depth[0] * (from as f64 + du) + depth[1] * v + depth[2]) as f32;
-                let slope = depth[0] as f32;
+                let begin = (per_column * (from as f64 + du) + per_row * v + constant) as f32;
                 let range = start + from..=start + to;
                 let slots = self.inverse_depth[range.clone()].iter_mut().zip(&mut self.seen[range]);
                 for (k, (near, seen)) in slots.enumerate() {
@@ -148,27 +149,45 @@ impl Band {
     }
 }
 
-/// Columns of a row inside all three edges. A hair's breadth is added so that neighbours leave no crack.
-fn span(setup: &Setup, du: f64, v: f64) -> Option<(usize, usize)> {
-    const HAIR_PX: f64 = 1e-9;
-    let (mut from, mut to) = (f64::from(setup.columns.0), f64::from(setup.columns.1));
-    for [per_column, per_row, constant] in setup.weights {
-        let here = per_row * v + constant;
-        if per_column > 1e-13 {
-            let edge = -here / per_column - du - HAIR_PX;
-            from = if edge > from { edge } else { from };
-        } else if per_column < -1e-13 {
-            let edge = -here / per_column - du + HAIR_PX;
-            to = if edge < to { edge } else { to };
-        } else if here < 0.0 {
+/// A triangle's edges as columns over rows: inside is right of all of the left ones and left of all of the right ones.
+struct Sides {
+    left: [(f64, f64); 3],
+    right: [(f64, f64); 3],
+    columns: (f64, f64),
+}
+
+impl Sides {
+    fn new(setup: &Setup) -> Self {
+        // A hair's breadth is added so that neighbours leave no crack.
+        const HAIR_PX: f64 = 1e-9;
+        let columns = (f64::from(setup.columns.0), f64::from(setup.columns.1));
+        let mut sides = Self { left: [(0.0, -1e9); 3], right: [(0.0, 1e9); 3], columns };
+        for (k, [per_column, per_row, constant]) in setup.weights.into_iter().enumerate() {
+            // An edge along a row is nearly one: its line is far away or covers all.
+            let per_column = if per_column.abs() < 1e-13 { 1e-13 } else { per_column };
+            let line = (-per_row / per_column, -constant / per_column);
+            if per_column > 0.0 {
+                sides.left[k] = (line.0, line.1 - HAIR_PX);
+            } else {
+                sides.right[k] = (line.0, line.1 + HAIR_PX);
+            }
+        }
+        sides
+    }
+
+    /// First and last column of a row of samples.
+    fn span(&self, du: f64, v: f64) -> Option<(usize, usize)> {
+        let at = |(slope, start): (f64, f64)| slope * v + start - du;
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        let smaller = |a: f64, b: f64| if a < b { a } else { b };
+        let from = larger(larger(at(self.left[0]), at(self.left[1])), larger(at(self.left[2]), self.columns.0));
+        let to = smaller(smaller(at(self.right[0]), at(self.right[1])), smaller(at(self.right[2]), self.columns.1));
+        if !(from <= to) {
             return None;
         }
+        // Neither is negative: a cast is the floor.
+        let (first, last) = (from as usize, to as usize);
+        let first = first + usize::from((first as f64) < from);
+        (first <= last).then_some((first, last))
     }
-    // `from` and `to` are not negative, so truncation is the floor.
-    if !(to >= 0.0 && from <= to) {
-        return None;
-    }
-    let (mut first, last) = (from as usize, to as usize);
-    first += usize::from((first as f64) < from);
-    (first <= last).then_some((first, last))
 }

@@ -75,6 +75,24 @@ impl Renderer<'_> {
         whole
     }
 
+    pub fn census(&self, scene: &Scene) -> String {
+        let clock = std::time::Instant::now();
+        let parts: Vec<Vec<Setup>> = scene.things.iter().enumerate().map(|(number, thing)| self.set_up(thing, number as u32, 0.0)).collect();
+        let setups: Vec<Setup> = parts.into_iter().flatten().collect();
+        let t1 = clock.elapsed();
+        let (width, height) = (self.pinhole.width, self.pinhole.height);
+        let mut band = Band::new(width, 0, height);
+        for (number, setup) in setups.iter().enumerate() { band.draw(number as u32, setup); }
+        let t2 = clock.elapsed() - t1;
+        let (mut edges, mut shades) = (0, 0);
+        for row in 0..height { for c in 0..width {
+            let s: [u32; SAMPLES] = core::array::from_fn(|k| band.row(k, row)[c]);
+            let mut g: Vec<u32> = s.iter().map(|&k| if k == SKY { NO_GROUP } else { setups[k as usize].group }).collect();
+            g.sort(); g.dedup(); shades += g.len(); if g.len() > 1 { edges += 1; }
+        } }
+        format!("setup {t1:?} for {}, raster {t2:?}, {edges} edge pixels, {:.2} shades a pixel", setups.len(), shades as f64 / (width * height) as f64)
+    }
+
     fn set_up(&self, thing: &Thing, number: u32, offset_m: f64) -> Vec<Setup> {
         let mesh = thing.mesh(self.bodies);
         let shift = Point::new(offset_m, 0.0, 0.0);
@@ -82,12 +100,17 @@ impl Renderer<'_> {
         if self.out_of_sight(middle, mesh.radius_m) {
             return Vec::new();
         }
+        // The eye in the mesh's frame tells faces that look away before anything is computed.
+        let eye = thing.to_camera.turn.tr_mul(&(shift - thing.to_camera.shift));
         let places: Vec<Point> = mesh.vertices.iter().map(|vertex| thing.to_camera.point(vertex.place_m) - shift).collect();
         let mut setups = Vec::new();
-        for (index, triangle) in mesh.triangles.iter().enumerate() {
-            let surface = &mesh.surfaces[triangle.surface as usize];
+        for (index, (triangle, plane)) in mesh.triangles.iter().zip(&mesh.planes).enumerate() {
+            let two_sided = plane[0].is_infinite();
+            if !two_sided && plane[0] * eye.x + plane[1] * eye.y + plane[2] * eye.z < plane[3] {
+                continue;
+            }
             let corners = triangle.corners.map(|corner| places[corner as usize]);
-            if let Some(setup) = Setup::new(&self.pinhole, corners, surface.two_sided) {
+            if let Some(setup) = Setup::new(&self.pinhole, corners, two_sided) {
                 let group = number << 12 | u32::from(triangle.surface);
                 setups.push(Setup { thing: number, triangle: index as u32, group, ..setup });
             }
@@ -204,7 +227,7 @@ impl Shading<'_> {
         let place = turn * (ray * depth + Point::new(self.offset_m, 0.0, 0.0)) + self.scene.anchor_camera.shift;
         let place = place.map(|value| value as f32);
         let own = Vector3::from(spot.own_normal);
-        let normal = thing.to_anchor.turn.map(|value| value as f32) * own;
+        let normal = thing.turn * own;
         let mut normal = normal * (1.0 / normal.dot(&normal).sqrt());
         let to_eye = direction * (-1.0 / direction.dot(&direction).sqrt());
         let thin = surface.two_sided;

@@ -8,8 +8,11 @@ use nalgebra::{Matrix3, Vector3};
 use super::config::CarKind;
 use super::mesh::{Mesh, Point};
 use super::piece::Piece;
-use super::shadow::{GroundLight, ShadowMap};
+use super::shadow::{GroundLight, ShadowMap, ShadowTile, SunAxes};
 use super::surface::Tone;
+
+/// Cars farther than this from the lit square's middle throw no shadow into it, m.
+const SHADOWED_M: f64 = 90.0;
 
 /// A rotation and a shift, ready for many points.
 #[derive(Clone, Copy)]
@@ -45,8 +48,8 @@ pub enum Source {
 pub struct Thing {
     /// The mesh.
     pub source: Source,
-    /// Mesh to the street's axes around the anchor.
-    pub to_anchor: Placed,
+    /// Mesh axes to the street's.
+    pub turn: Matrix3<f32>,
     /// Mesh to the left camera.
     pub to_camera: Placed,
     /// Paint, for cars.
@@ -84,13 +87,12 @@ impl Scene {
         pieces: &[Arc<Piece>],
         cars: &[(CarKind, Tone, Transform)],
         t_street_camera: &Transform,
-        (anchor, to_sun): (Point, Point),
+        (anchor, sun): (Point, SunAxes),
     ) -> Self {
         let t_camera_street = t_street_camera.inverse();
         let thing = |source, t_street_mesh: &Transform, coat, instance| {
-            let mut to_anchor = Placed::new(t_street_mesh);
-            to_anchor.shift -= anchor;
-            Thing { source, to_anchor, to_camera: Placed::new(&(t_camera_street * t_street_mesh)), coat, instance }
+            let turn = Placed::new(t_street_mesh).turn.map(|value| value as f32);
+            Thing { source, turn, to_camera: Placed::new(&(t_camera_street * t_street_mesh)), coat, instance }
         };
         let mut things = Vec::new();
         for piece in pieces {
@@ -105,22 +107,21 @@ impl Scene {
         anchor_camera.shift -= anchor;
         let ahead = anchor_camera.turn * Vector3::z();
         let focus = anchor + anchor_camera.shift + ahead * 40.0;
-        let mut shadow = ShadowMap::new(to_sun, anchor, focus);
+        let mut shadow = ShadowMap::new(sun, anchor, focus);
         let mut ground = GroundLight::new(anchor, focus);
-        for thing in &things {
-            let mesh = thing.mesh(bodies);
-            if !shadow.may_see(thing.to_anchor.point(mesh.middle_m), mesh.radius_m) {
+        for piece in pieces {
+            shadow.lay(&piece.shadow);
+        }
+        for (kind, _, t_street_car) in cars {
+            let placed = Placed::new(t_street_car);
+            if (placed.shift - focus).norm() > SHADOWED_M {
                 continue;
             }
-            let places: Vec<Point> = mesh.vertices.iter().map(|vertex| thing.to_anchor.point(vertex.place_m)).collect();
-            for triangle in &mesh.triangles {
-                shadow.draw(triangle.corners.map(|corner| places[corner as usize]));
-            }
-            if thing.instance > 0 {
-                let (low, high) = mesh.bounds_m();
-                let half = (0.5 * (high.x - low.x) - 0.12, 0.5 * (high.z - low.z));
-                ground.cover(thing.to_anchor.shift, thing.to_anchor.turn * Vector3::x(), thing.to_anchor.turn * Vector3::z(), half);
-            }
+            let mesh = &bodies[*kind as usize];
+            shadow.lay(&ShadowTile::new(&sun, core::iter::once((mesh, placed))));
+            let (low, high) = mesh.bounds_m();
+            let half = (0.5 * (high.x - low.x) - 0.12, 0.5 * (high.z - low.z));
+            ground.cover(placed.shift - anchor, placed.turn * Vector3::x(), placed.turn * Vector3::z(), half);
         }
         Self { things, anchor_camera, shadow, ground }
     }

@@ -3,16 +3,107 @@
 
 use nalgebra::Vector3;
 
-use super::mesh::Point;
+use super::mesh::{Mesh, Point};
+use super::scene::Placed;
 
 const SIDE: usize = 1024;
 const TEXEL_M: f64 = 0.10;
+/// Depth where nothing stands.
+const FAR_M: f32 = -1e6;
 /// How far a surface is moved towards the light before it is compared, m.
 const BIAS_M: f32 = 0.07;
 
+/// The sun's view of the street: two axes across the light and one towards it.
+#[derive(Clone, Copy)]
+pub struct SunAxes([Vector3<f64>; 3]);
+
+impl SunAxes {
+    /// Axes for a direction.
+    pub fn new(to_sun: Point) -> Self {
+        let u = to_sun.cross(&Vector3::y()).normalize();
+        Self([u, to_sun.cross(&u), to_sun])
+    }
+
+    /// Texel coordinates and way towards the sun of a place in the street.
+    fn texel(&self, place: Point) -> Point {
+        Point::new(place.dot(&self.0[0]) / TEXEL_M, place.dot(&self.0[1]) / TEXEL_M, place.dot(&self.0[2]))
+    }
+}
+
+/// What a piece of street or a car holds up against the sun, on the texels of the whole street. Depths count from `base_m`.
+pub struct ShadowTile {
+    corner: [i64; 2],
+    size: [usize; 2],
+    base_m: f64,
+    depth_m: Vec<f32>,
+}
+
+impl ShadowTile {
+    /// Draws meshes, each with its place in the street. Only faces towards the sun count: what is closed throws the same shadow.
+    pub fn new<'a>(axes: &SunAxes, meshes: impl Iterator<Item = (&'a Mesh, Placed)> + Clone) -> Self {
+        let (mut low, mut high) = (Point::repeat(f64::MAX), Point::repeat(f64::MIN));
+        for (mesh, placed) in meshes.clone() {
+            for vertex in &mesh.vertices {
+                let texel = axes.texel(placed.point(vertex.place_m));
+                (low, high) = (low.inf(&texel), high.sup(&texel));
+            }
+        }
+        let corner = [libm::floor(low.x) as i64, libm::floor(low.y) as i64];
+        let size = [(high.x - low.x) as usize + 2, (high.y - low.y) as usize + 2];
+        let mut tile = Self { corner, size, base_m: high.z, depth_m: vec![FAR_M; size[0] * size[1]] };
+        let origin = Point::new(corner[0] as f64, corner[1] as f64, high.z);
+        for (mesh, placed) in meshes {
+            let places: Vec<Point> = mesh.vertices.iter().map(|vertex| axes.texel(placed.point(vertex.place_m)) - origin).collect();
+            for triangle in &mesh.triangles {
+                tile.draw(triangle.corners.map(|corner| places[corner as usize]), mesh.surfaces[triangle.surface as usize].two_sided);
+            }
+        }
+        tile
+    }
+
+    fn draw(&mut self, [a, b, c]: [Point; 3], two_sided: bool) {
+        let area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
+        if area.abs() < 1e-9 || (area < 0.0 && !two_sided) {
+            return;
+        }
+        let low = |p: f64, q: f64, r: f64| libm::ceil(p.min(q).min(r)).max(0.0);
+        let high = |p: f64, q: f64, r: f64, last: usize| libm::floor(p.max(q).max(r)).min(last as f64 - 1.0);
+        let (first, last) = (low(a.y, b.y, c.y), high(a.y, b.y, c.y, self.size[1]));
+        if first > last || low(a.x, b.x, c.x) > high(a.x, b.x, c.x, self.size[0]) {
+            return;
+        }
+        let (d1, d2) = (b.z - a.z, c.z - a.z);
+        let slope_u = (d1 * (c.y - a.y) - d2 * (b.y - a.y)) / area;
+        let slope_v = (d2 * (b.x - a.x) - d1 * (c.x - a.x)) / area;
+        for row in first as usize..=last as usize {
+            let v = row as f64;
+            let (mut from, mut to) = (f64::MAX, f64::MIN);
+            for (p, q) in [(a, b), (b, c), (c, a)] {
+                if (p.y <= v) != (q.y <= v) {
+                    let u = p.x + (q.x - p.x) * ((v - p.y) / (q.y - p.y));
+                    from = from.min(u);
+                    to = to.max(u);
+                }
+            }
+            let (from, to) = (libm::ceil(from).max(0.0), libm::floor(to).min(self.size[0] as f64 - 1.0));
+            if from > to {
+                continue;
+            }
+            let begin = a.z + slope_u * (from - a.x) + slope_v * (v - a.y);
+            let cells = &mut self.depth_m[row * self.size[0] + from as usize..=row * self.size[0] + to as usize];
+            for (k, cell) in cells.iter_mut().enumerate() {
+                let here = (begin + slope_u * k as f64) as f32;
+                *cell = if here > *cell { here } else { *cell };
+            }
+        }
+    }
+}
+
 /// Depth towards the sun over a square of the street.
 pub struct ShadowMap {
-    axes: [Vector3<f64>; 3],
+    axes: SunAxes,
+    corner: [i64; 2],
+    base_m: f64,
     /// Texel coordinates of the anchor.
     offset: [f64; 2],
     depth_m: Vec<f32>,
@@ -20,64 +111,26 @@ pub struct ShadowMap {
 
 impl ShadowMap {
     /// An empty map around `focus`; places are given relative to `anchor`, a point of the street.
-    pub fn new(to_sun: Point, anchor: Point, focus: Point) -> Self {
-        let u = to_sun.cross(&Vector3::y()).normalize();
-        let v = to_sun.cross(&u);
-        let axes = [u, v, to_sun];
-        let offset = [0, 1].map(|k| {
-            let corner = libm::floor(focus.dot(&axes[k]) / TEXEL_M) - 0.5 * SIDE as f64;
-            anchor.dot(&axes[k]) / TEXEL_M - corner
-        });
-        Self { axes, offset, depth_m: vec![-1e6; SIDE * SIDE] }
+    pub fn new(axes: SunAxes, anchor: Point, focus: Point) -> Self {
+        let (middle, anchor) = (axes.texel(focus), axes.texel(anchor));
+        let corner = [middle.x, middle.y].map(|value| libm::floor(value) as i64 - (SIDE / 2) as i64);
+        let offset = [anchor.x - corner[0] as f64, anchor.y - corner[1] as f64];
+        Self { axes, corner, base_m: anchor.z, offset, depth_m: vec![FAR_M; SIDE * SIDE] }
     }
 
-    fn texel(&self, place: Point) -> (f64, f64, f64) {
-        (place.dot(&self.axes[0]) / TEXEL_M + self.offset[0], place.dot(&self.axes[1]) / TEXEL_M + self.offset[1], place.dot(&self.axes[2]))
-    }
-
-    /// Whether a ball may touch the map.
-    pub fn may_see(&self, middle: Point, radius_m: f64) -> bool {
-        let (u, v, _) = self.texel(middle);
-        let (reach, side) = (radius_m / TEXEL_M, SIDE as f64);
-        u > -reach && v > -reach && u < side + reach && v < side + reach
-    }
-
-    /// Draws a triangle; the highest towards the sun stays.
-    pub fn draw(&mut self, corners: [Point; 3]) {
-        let [a, b, c] = corners.map(|corner| self.texel(corner));
-        let area = (b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1);
-        if area.abs() < 1e-9 {
-            return;
-        }
-        let low = |p: f64, q: f64, r: f64| libm::ceil(p.min(q).min(r)).max(0.0);
-        let high = |p: f64, q: f64, r: f64| libm::floor(p.max(q).max(r)).min(SIDE as f64 - 1.0);
-        let (first, last) = (low(a.1, b.1, c.1), high(a.1, b.1, c.1));
-        if first > last || low(a.0, b.0, c.0) > high(a.0, b.0, c.0) {
-            return;
-        }
-        let gradient = |p: f64, q: f64, r: f64| {
-            let (d1, d2) = (q - p, r - p);
-            ((d1 * (c.1 - a.1) - d2 * (b.1 - a.1)) / area, (d2 * (b.0 - a.0) - d1 * (c.0 - a.0)) / area)
+    /// Lays a tile into the map; the highest towards the sun stays.
+    pub fn lay(&mut self, tile: &ShadowTile) {
+        let shift = [tile.corner[0] - self.corner[0], tile.corner[1] - self.corner[1]];
+        let span = |k: usize| {
+            let (from, to) = (shift[k].max(0), (shift[k] + tile.size[k] as i64).min(SIDE as i64));
+            (from < to).then(|| (from as usize, to as usize, (from - shift[k]) as usize))
         };
-        let (slope_u, slope_v) = gradient(a.2, b.2, c.2);
-        for row in first as usize..=last as usize {
-            let v = row as f64;
-            let (mut from, mut to) = (f64::MAX, f64::MIN);
-            for (p, q) in [(a, b), (b, c), (c, a)] {
-                if (p.1 <= v) != (q.1 <= v) {
-                    let u = p.0 + (q.0 - p.0) * ((v - p.1) / (q.1 - p.1));
-                    from = from.min(u);
-                    to = to.max(u);
-                }
-            }
-            let (from, to) = (libm::ceil(from).max(0.0), libm::floor(to).min(SIDE as f64 - 1.0));
-            if from > to {
-                continue;
-            }
-            let begin = a.2 + slope_u * (from - a.0) + slope_v * (v - a.1);
-            let cells = &mut self.depth_m[row * SIDE + from as usize..=row * SIDE + to as usize];
-            for (k, cell) in cells.iter_mut().enumerate() {
-                let here = (begin + slope_u * k as f64) as f32;
+        let (Some((left, right, skip_u)), Some((top, bottom, skip_v))) = (span(0), span(1)) else { return };
+        let lift = (tile.base_m - self.base_m) as f32;
+        for row in top..bottom {
+            let source = &tile.depth_m[(row - top + skip_v) * tile.size[0] + skip_u..];
+            for (cell, &here) in self.depth_m[row * SIDE + left..row * SIDE + right].iter_mut().zip(source) {
+                let here = here + lift;
                 *cell = if here > *cell { here } else { *cell };
             }
         }
@@ -85,7 +138,7 @@ impl ShadowMap {
 
     /// Shares of sunlight that reach `place` (relative to the anchor), 0 to 1; outside the map it shines.
     pub fn light(&self, place: Vector3<f32>, normal: Vector3<f32>) -> f32 {
-        let axis = |k: usize| self.axes[k].map(|value| value as f32);
+        let axis = |k: usize| self.axes.0[k].map(|value| value as f32);
         let lifted = place + normal * 0.06;
         let scale = 1.0 / TEXEL_M as f32;
         // Two look-ups half a texel to either side, averaged: a tent over three texels each way.

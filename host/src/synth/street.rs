@@ -13,13 +13,14 @@ use super::draws::Dice;
 use super::frame::{ObjectTruth, SynthFrame};
 use super::layout;
 use super::light::Light;
-use super::mesh::{Mesh, Point};
+use super::mesh::Mesh;
 use super::paint::Painter;
 use super::path::{Course, PIECE_M, Stretch};
 use super::piece::{Piece, piece};
 use super::render::Renderer;
 use super::scene::Scene;
 use super::sensor::{Sensor, luma};
+use super::shadow::SunAxes;
 use super::surface::Tone;
 use super::traffic;
 
@@ -55,6 +56,7 @@ pub struct Street {
     course: Course,
     painter: Painter,
     light: Light,
+    sun: SunAxes,
     bodies: [Mesh; 5],
     pieces: Mutex<VecDeque<(i64, Arc<Piece>)>>,
     t_camera0_street: Transform,
@@ -98,6 +100,7 @@ impl Street {
             course,
             painter: Painter::new(),
             light: Light { to_sun: to_sun.map(|value| value as f32) },
+            sun: SunAxes::new(to_sun),
             bodies: CarKind::ALL.map(car::body),
             pieces: Mutex::new(VecDeque::new()),
             t_camera0_street: t_street_camera.inverse(),
@@ -181,8 +184,7 @@ impl Street {
         let cars = self.present(&pieces, &stretch, time_s, reach);
         let anchor = stretch.point(libm::floor(along / PIECE_M) * PIECE_M);
         let placed: Vec<_> = cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
-        let to_sun = Point::from(self.light.to_sun.map(f64::from));
-        let scene = Scene::new(&self.bodies, &pieces, &placed, &t_street_camera, (anchor, to_sun));
+        let scene = Scene::new(&self.bodies, &pieces, &placed, &t_street_camera, (anchor, self.sun));
         Surroundings { scene, t_street_camera, cars }
     }
 
@@ -209,13 +211,21 @@ impl Street {
         if let Some(known) = find(&lock()) {
             return known;
         }
-        let made = Arc::new(piece(&self.config, &self.course, number));
+        let made = Arc::new(piece(&self.config, &self.course, &self.sun, number));
         let mut kept = lock();
         if kept.len() >= KEPT_PIECES {
             kept.pop_front();
         }
         kept.push_back((number, Arc::clone(&made)));
         made
+    }
+
+    pub(super) fn census(&self, index: u32) -> String {
+        let around = self.surroundings(index);
+        let renderer =
+            Renderer { painter: &self.painter, light: &self.light, bodies: &self.bodies, pinhole: camera::pinhole(&self.config) };
+        let meshes: Vec<_> = around.scene.things.iter().map(|t| t.mesh(&self.bodies)).collect();
+        format!("{} things {} vertices {} triangles; {}", meshes.len(), meshes.iter().map(|m| m.vertices.len()).sum::<usize>(), meshes.iter().map(|m| m.triangles.len()).sum::<usize>(), renderer.census(&around.scene))
     }
 
     /// Car bodies, for the LiDAR.

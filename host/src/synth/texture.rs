@@ -159,6 +159,6 @@ pub struct Textures {
 impl Textures {
     /// Draws them; the same for every street.
     pub fn new() -> Self {
-        Self { fine: Ripmap::grain(11, 3.0, 1.12), broad: Ripmap::grain(12, 24.0, 0.85), leaves: Ripmap::foliage(13, 2.0) }
+        Self { fine: Ripmap::grain(11, 3.0, 1.25), broad: Ripmap::grain(12, 24.0, 0.85), leaves: Ripmap::foliage(13, 2.0) }
     }
 }

@@ -49,7 +49,7 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
         bars = bars.max(within(0.30 * height, 0.30 * height + 0.05, v, fv));
     }
     let frame = times(surface.second, 1.0 + 0.04 * painter.fine(h, spot, 1.0));
-    Painted { tone: blend(tone, frame, bars), gloss: 0.10 * (1.0 - bars), open: 1.0 }
+    Painted { tone: blend(tone, frame, bars), gloss: 0.30 * (1.0 - bars), open: 1.0 }
 }
 
 /// A shop: large panes, goods and lamps behind them.
@@ -74,7 +74,7 @@ pub fn shop(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
     if width > 1.8 {
         bars = bars.max(within(0.5 * width - 0.035, 0.5 * width + 0.035, u, fu));
     }
-    Painted { tone: blend(tone, surface.second, bars), gloss: 0.10 * (1.0 - bars), open: 1.0 }
+    Painted { tone: blend(tone, surface.second, bars), gloss: 0.30 * (1.0 - bars), open: 1.0 }
 }
 
 /// A shop's name: letters of strokes that spell nothing.
