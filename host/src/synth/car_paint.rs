@@ -1,8 +1,10 @@
 //! A car's shell, painted by place: glass, lamps, grille, plates, joints.
 
 use super::car::Shape;
+use super::draws::cell;
 use super::paint::{Painted, Painter, Spot, above, blend, stripes, times, within};
 use super::surface::{Surface, Tone};
+use super::texture::floor;
 
 const GLASS: Tone = [0.022, 0.028, 0.034];
 const BLACK: Tone = [0.018, 0.018, 0.02];
@@ -110,8 +112,13 @@ fn rear(shape: &Shape, p: &Place) -> [(f32, Tone); 5] {
 }
 
 fn plate_tone(p: &Place) -> Tone {
-    let ink = stripes(p.x, 0.065, 0.03, p.f);
-    blend([0.72, 0.72, 0.68], BLACK, 0.7 * ink)
+    // Glyphs of their own width each, a gap after the third.
+    let number = floor((p.x + 0.26) / 0.065);
+    let h = cell(0xCA2, number, 0);
+    let at = p.x + 0.26 - number as f32 * 0.065;
+    let stroke = within(0.010, 0.022, at, p.f).max(within(0.036, 0.048, at, p.f) * (h & 1) as f32);
+    let ink = if number == 3 || number == 0 { 0.0 } else { stroke };
+    blend([0.72, 0.72, 0.68], BLACK, 0.8 * ink)
 }
 
 /// A wheel's side in coordinates -1..1: tyre, spokes, hub.

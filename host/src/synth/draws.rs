@@ -3,6 +3,7 @@
 use dynvox_core::random::Random;
 
 /// Mixes 64 bits so that each input bit moves every output bit (SplitMix64's finaliser).
+#[inline]
 pub fn mix(value: u64) -> u64 {
     let a = (value ^ (value >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let b = (a ^ (a >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -15,6 +16,7 @@ pub fn hash(seed: u64, a: i64, b: i64) -> u64 {
 }
 
 /// A cheap hash of a texture cell, for the shader.
+#[inline]
 pub fn cell(seed: u32, a: i32, b: i32) -> u32 {
     let mut h = seed ^ (a as u32).wrapping_mul(0x9E37_79B1) ^ (b as u32).wrapping_mul(0x85EB_CA77);
     h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
@@ -23,6 +25,7 @@ pub fn cell(seed: u32, a: i32, b: i32) -> u32 {
 }
 
 /// Uniform in 0..1 from 32 bits.
+#[inline]
 pub fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }

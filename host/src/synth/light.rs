@@ -87,6 +87,7 @@ impl Light {
 }
 
 /// Linear light as a grey level 0 to 255, before noise: a soft shoulder, the root as the curve of the eye, and a black point.
+#[inline]
 pub fn develop(light: f32) -> f32 {
     let soft = light * (1.0 + light * 0.16) / (1.0 + light * 0.95);
     (272.0 * soft.clamp(0.0, 1.0).sqrt() - 20.0).clamp(0.0, 255.0)

@@ -44,20 +44,24 @@ pub struct Painter {
 }
 
 /// Share of a footprint that lies above an edge.
+#[inline]
 pub fn above(edge: f32, x: f32, footprint: f32) -> f32 {
     ((x - edge) / (footprint + 1e-4) + 0.5).clamp(0.0, 1.0)
 }
 
 /// Share of a footprint between two edges.
+#[inline]
 pub fn within(from: f32, to: f32, x: f32, footprint: f32) -> f32 {
     (above(from, x, footprint) - above(to, x, footprint)).max(0.0)
 }
 
 /// Share of a footprint on the stripes 0..width of every period.
+#[inline]
 pub fn stripes(x: f32, period: f32, width: f32, footprint: f32) -> f32 {
     let half = 0.5 * (footprint + 1e-4);
+    let per = 1.0 / period;
     let sum = |x: f32| {
-        let count = x / period;
+        let count = x * per;
         let whole = floor(count) as f32;
         whole * width + ((count - whole) * period).min(width)
     };
@@ -65,17 +69,20 @@ pub fn stripes(x: f32, period: f32, width: f32, footprint: f32) -> f32 {
 }
 
 /// One tone turned towards another.
+#[inline]
 pub fn blend(a: Tone, b: Tone, share: f32) -> Tone {
     [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * share)
 }
 
 /// A tone under a factor, never below nothing.
+#[inline]
 pub fn times(tone: Tone, factor: f32) -> Tone {
     let factor = factor.max(0.02);
     tone.map(|value| value * factor)
 }
 
 /// How much of a detail of some size survives a footprint.
+#[inline]
 pub fn survives(size: f32, footprint: f32) -> f32 {
     (1.5 - footprint / size).clamp(0.0, 1.0)
 }
@@ -128,9 +135,9 @@ impl Painter {
     fn road(&self, surface: &Surface, spot: &Spot) -> Painted {
         let [s, d, _] = spot.surface_m;
         let [fs, fd, _] = spot.footprint_m;
-        let fine = self.textures.fine.at(s, d, fs, fd);
+        let fine = self.textures.asphalt.at(s, d, fs, fd);
         let broad = self.textures.broad.at(s, d, fs, fd);
-        let mut shade = 1.0 + 0.36 * fine + 0.09 * broad;
+        let mut shade = 1.0 + 0.50 * fine + 0.06 * broad;
         let mut tint = surface.tone;
         // Wheels polish two tracks in each lane; the gutter is dirty.
         let lane = (d - 1.6) * (1.0 / 3.2);

@@ -42,6 +42,8 @@ pub struct Setup {
     pub columns: (i32, i32),
     /// Rows it may touch, first and last.
     pub rows: (i32, i32),
+    /// Its exact extent over rows, px.
+    pub extent_px: (f64, f64),
 }
 
 impl Setup {
@@ -56,14 +58,14 @@ impl Setup {
         if volume.abs() < 1e-14 || (volume > 0.0 && !two_sided) {
             return None;
         }
-        let (columns, rows) = reach(pinhole, corners)?;
+        let (columns, rows, extent_px) = reach(pinhole, corners)?;
         let scale = 1.0 / (volume * pinhole.focal_px);
         let (u, v) = pinhole.center_px;
         let weights = planes.map(|plane| {
             let (x, y) = (plane.x * scale, plane.y * scale);
             [x, y, plane.z * (1.0 / volume) - x * u - y * v]
         });
-        Some(Self { weights, thing: 0, triangle: 0, group: 0, columns, rows })
+        Some(Self { weights, thing: 0, triangle: 0, group: 0, columns, rows, extent_px })
     }
 
     /// Inverse depth's plane.
@@ -73,8 +75,11 @@ impl Setup {
     }
 }
 
+/// Columns, rows, and the exact extent over rows.
+type Reach = ((i32, i32), (i32, i32), (f64, f64));
+
 /// Columns and rows a triangle may touch, its part behind the eye cut off.
-fn reach(pinhole: &Pinhole, corners: [Vector3<f64>; 3]) -> Option<((i32, i32), (i32, i32))> {
+fn reach(pinhole: &Pinhole, corners: [Vector3<f64>; 3]) -> Option<Reach> {
     let (mut low, mut high) = ((f64::MAX, f64::MAX), (f64::MIN, f64::MIN));
     let mut take = |point: Vector3<f64>| {
         let scale = pinhole.focal_px / point.z;
@@ -96,7 +101,7 @@ fn reach(pinhole: &Pinhole, corners: [Vector3<f64>; 3]) -> Option<((i32, i32), (
         return None;
     }
     let span = |low: f64, high: f64, last: f64| ((low - 0.5).max(0.0) as i32, (high + 0.5).min(last) as i32);
-    Some((span(low.0, high.0, last.0), span(low.1, high.1, last.1)))
+    Some((span(low.0, high.0, last.0), span(low.1, high.1, last.1), (low.1 - 1e-9, high.1 + 1e-9)))
 }
 
 /// What a band of rows sees: for each sample an inverse depth and a setup's number.
@@ -125,17 +130,24 @@ impl Band {
 
     /// Draws one triangle into all samples.
     pub fn draw(&mut self, number: u32, setup: &Setup) {
-        let first = (setup.rows.0 as usize).max(self.first_row);
-        let last = (setup.rows.1 as usize).min(self.first_row + self.rows - 1);
+        let first = setup.rows.0.max(self.first_row as i32);
+        let last = setup.rows.1.min((self.first_row + self.rows) as i32 - 1);
         let [per_column, per_row, constant] = setup.inverse_depth();
         let slope = per_column as f32;
         let sides = Sides::new(setup);
         for (sample, (du, dv)) in OFFSETS_PX.into_iter().enumerate() {
-            for row in first..=last {
-                let v = row as f64 + dv;
+            // Rows whose sample lies within the triangle's extent; casts saturate at the band's own rows.
+            let (top, bottom) = (setup.extent_px.0 - dv, setup.extent_px.1 - dv);
+            let top_row = top as i32 + i32::from(top > f64::from(top as i32));
+            if bottom < 0.0 {
+                continue;
+            }
+            for row in first.max(top_row)..=last.min(bottom as i32) {
+                let v = f64::from(row) + dv;
+                let row = row as usize;
                 let Some((from, to)) = sides.span(du, v) else { continue };
                 let start = (sample * self.rows + row - self.first_row) * self.width;
-                let begin = (per_column * (from as f64 + du) + per_row * v + constant) as f32;
+                let begin = (per_column * (f64::from(from as u32) + du) + per_row * v + constant) as f32;
                 let range = start + from..=start + to;
                 let slots = self.inverse_depth[range.clone()].iter_mut().zip(&mut self.seen[range]);
                 for (k, (near, seen)) in slots.enumerate() {
@@ -186,8 +198,8 @@ impl Sides {
             return None;
         }
         // Neither is negative: a cast is the floor.
-        let (first, last) = (from as usize, to as usize);
-        let first = first + usize::from((first as f64) < from);
-        (first <= last).then_some((first, last))
+        let (first, last) = (from as i32, to as i32);
+        let first = first + i32::from(f64::from(first) < from);
+        (first <= last).then_some((first as usize, last as usize))
     }
 }

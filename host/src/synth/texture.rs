@@ -11,7 +11,10 @@ const ONE: f32 = 4096.0;
 
 /// A tile of noise with mean 0 and standard deviation 1.
 pub struct Ripmap {
-    levels: Vec<Vec<i16>>,
+    /// All levels one after the other, rows of the picture outermost.
+    texels: Vec<i16>,
+    /// Where each level starts.
+    starts: [u32; (LOG + 1) * (LOG + 1)],
     /// Texels a metre.
     texels_per_m: f32,
 }
@@ -22,12 +25,14 @@ impl Ripmap {
         base.iter_mut().for_each(|value| *value -= mean);
         let deviation = (base.iter().map(|value| value * value).sum::<f32>() / base.len() as f32).sqrt();
         base.iter_mut().for_each(|value| *value /= deviation);
-        let mut levels = Vec::new();
+        let mut texels: Vec<i16> = Vec::with_capacity(4 * SIDE * SIDE);
+        let mut starts = [0; (LOG + 1) * (LOG + 1)];
         let mut column = base;
         for lv in 0..=LOG {
             let mut row = column.clone();
             for lu in 0..=LOG {
-                levels.push(row.iter().map(|value| (value.clamp(-7.9, 7.9) * ONE) as i16).collect());
+                starts[lv * (LOG + 1) + lu] = texels.len() as u32;
+                texels.extend(row.iter().map(|value| (value.clamp(-7.9, 7.9) * ONE) as i16));
                 if lu < LOG {
                     row = row.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
                 }
@@ -37,7 +42,7 @@ impl Ripmap {
                 column = pairs.flat_map(|two| (0..SIDE).map(|k| 0.5 * (two[k] + two[SIDE + k]))).collect();
             }
         }
-        Self { levels, texels_per_m: SIDE as f32 / tile_m }
+        Self { texels, starts, texels_per_m: SIDE as f32 / tile_m }
     }
 
     /// Fine noise of equal strength at every scale, a little more at the finest.
@@ -109,8 +114,9 @@ impl Ripmap {
         value
     }
 
+    #[inline]
     fn bilinear(&self, lu: usize, lv: usize, u: f32, v: f32) -> f32 {
-        let picture = &self.levels[lv * (LOG + 1) + lu];
+        let picture = &self.texels[self.starts[lv * (LOG + 1) + lu] as usize..][..1 << (2 * LOG - lu - lv)];
         let (wide, tall) = (LOG - lu, LOG - lv);
         let u = u * inverse_power(lu) - 0.5;
         let v = v * inverse_power(lv) - 0.5;
@@ -127,29 +133,34 @@ impl Ripmap {
 }
 
 /// Largest integer not above.
+#[inline]
 pub fn floor(value: f32) -> i32 {
     let whole = value as i32;
     whole.wrapping_sub(i32::from(value < whole as f32))
 }
 
+#[inline]
 fn inverse_power(level: usize) -> f32 {
     f32::from_bits((127 - level as u32) << 23)
 }
 
 /// Level of reduction for a footprint in texels, and how far towards the next: the logarithm read off the exponent.
+#[inline]
 fn level(texels: f32) -> (usize, f32) {
     // Nearly a texel is a texel: the look-up's own interpolation is wider than that.
     let bits = (texels.clamp(1.0, 400.0)).to_bits();
     let whole = (bits >> 23) as usize - 127;
     let part = (bits & 0x7F_FFFF) as f32 * (1.0 / 8_388_608.0);
-    let sharp = (part * 1.5 - 0.25).clamp(0.0, 1.0);
+    let sharp = (part * 2.2 - 0.6).clamp(0.0, 1.0);
     (whole, sharp)
 }
 
 /// The pictures a street needs.
 pub struct Textures {
-    /// Asphalt, render, stone: 3 m, 6 mm a texel.
+    /// Render, brick, stone: 3 m, 6 mm a texel.
     pub fine: Ripmap,
+    /// Asphalt: the same size, mostly single stones.
+    pub asphalt: Ripmap,
     /// Stains and wear: 24 m, 5 cm a texel.
     pub broad: Ripmap,
     /// Leaves: 2 m.
@@ -159,6 +170,6 @@ pub struct Textures {
 impl Textures {
     /// Draws them; the same for every street.
     pub fn new() -> Self {
-        Self { fine: Ripmap::grain(11, 3.0, 1.25), broad: Ripmap::grain(12, 24.0, 0.85), leaves: Ripmap::foliage(13, 2.0) }
+        Self { fine: Ripmap::grain(11, 3.0, 1.25), asphalt: Ripmap::grain(14, 3.0, 1.5), broad: Ripmap::grain(12, 24.0, 0.85), leaves: Ripmap::foliage(13, 2.0) }
     }
 }
