@@ -232,8 +232,8 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
     for row in 0..rows - 1 {
         for column in 0..columns - 1 {
             let (a, b, c, d) = (index(row, column), index(row, column + 1), index(row + 1, column), index(row + 1, column + 1));
-            mesh.triangles.push(Triangle { corners: [a, b, c], surface });
-            mesh.triangles.push(Triangle { corners: [b, d, c], surface });
+            mesh.triangles.push(Triangle { corners: [a, b, c], surface, slight: false });
+            mesh.triangles.push(Triangle { corners: [b, d, c], surface, slight: false });
         }
     }
     for (row, direction) in [(0, 1.0), (rows - 1, -1.0)] {

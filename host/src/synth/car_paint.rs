@@ -28,7 +28,9 @@ pub fn shell(painter: &Painter, shape: &Shape, spot: &Spot, coat: Tone) -> Paint
     let dirt = 0.25 * (1.0 - above(0.45, place.up, 0.4));
     let mut tone = blend(times(coat, 1.0 + 0.03 * speck), [0.10, 0.09, 0.08], dirt);
     let mut gloss = 0.30;
-    tone = blend(tone, times(coat, 0.22), joints(shape, &place) * side);
+    if side > 0.0 {
+        tone = blend(tone, times(coat, 0.22), joints(shape, &place) * side);
+    }
     // The strip below the doors and the bumpers' lower edge are black.
     tone = blend(tone, BLACK, 1.0 - above(0.30, place.up, place.f));
     for axle in shape.axles_m {
@@ -42,9 +44,11 @@ pub fn shell(painter: &Painter, shape: &Shape, spot: &Spot, coat: Tone) -> Paint
         tone = blend(tone, blend(GLASS, [0.45, 0.52, 0.62], sky), glass);
         gloss += 0.20 * glass;
     }
-    let ends = if z > 0.0 { front(shape, &place) } else { rear(shape, &place) };
-    for (share, paint) in ends {
-        tone = blend(tone, paint, share);
+    if z.abs() > shape.half_m[0] - 0.6 {
+        let ends = if z > 0.0 { front(shape, &place) } else { rear(shape, &place) };
+        for (share, paint) in ends {
+            tone = blend(tone, paint, share);
+        }
     }
     Painted { tone, gloss, open: 1.0 }
 }

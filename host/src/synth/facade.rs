@@ -115,7 +115,9 @@ pub fn house(mesh: &mut Mesh, dice: &mut Dice, width: f64) {
     roof(mesh, dice, &house, roofline, frame_tone);
     let pipe = mesh.surface(Surface::new(Kind::Plain, scaled(tone(120, 120, 118), dice.between(0.5, 1.4)), seed ^ 3));
     let x = if dice.chance(0.5) { 0.18 } else { width - 0.18 };
+    mesh.slight = true;
     mesh.bar(pipe, (Point::new(x, roofline, 0.09), 0.05), (Point::new(x, -0.05, 0.09), 0.05), 6);
+    mesh.slight = false;
 }
 
 /// One floor's front: wall around the openings, then each opening with reveals, pane and sill.
@@ -151,6 +153,7 @@ fn recess(mesh: &mut Mesh, house: &House, wall: u16, opening: &Opening) {
 }
 
 fn sill_and_surround(mesh: &mut Mesh, house: &House, opening: &Opening) {
+    mesh.slight = true;
     let &Opening { left, right, top, bottom, .. } = opening;
     let at = |x0: f64, y0: f64, x1: f64, y1: f64, out: f64| (Point::new(x0, y0, 0.0), Point::new(x1, y1, out));
     let (low, high) = at(left - 0.08, bottom, right + 0.08, bottom + 0.08, 0.09);
@@ -172,6 +175,7 @@ fn sill_and_surround(mesh: &mut Mesh, house: &House, opening: &Opening) {
             }
         }
     }
+    mesh.slight = false;
 }
 
 fn window(mesh: &mut Mesh, dice: &mut Dice, frame: Tone, width: f64, height: f64) -> u16 {
@@ -224,6 +228,7 @@ fn balcony(mesh: &mut Mesh, dice: &mut Dice, house: &House, middle: f64, floor: 
         }
         return;
     }
+    mesh.slight = true;
     let bars = 11;
     for k in 0..=bars {
         let x = middle - half + 0.03 + (2.0 * half - 0.06) * f64::from(k) / f64::from(bars);
@@ -237,6 +242,7 @@ fn balcony(mesh: &mut Mesh, dice: &mut Dice, house: &House, middle: f64, floor: 
         mesh.cuboid(rail, Point::new(x, top - 0.05, 0.0), Point::new(x + 0.05, top, out), &[]);
     }
     mesh.cuboid(rail, Point::new(middle - half, top - 0.05, out - 0.06), Point::new(middle + half, top, out), &[]);
+    mesh.slight = false;
 }
 
 /// A band of trim over the whole front.

@@ -60,11 +60,7 @@ fn crown_part(mesh: &mut Mesh, dice: &mut Dice, leaves: &[u16], (blob, middle): 
         let corner = |a: f64, b: f64| (place + (u * a + v * b) * size, [(shift[0] + a * size) as f32, (shift[1] + b * size) as f32, 0.0]);
         let (p, q) = (dice.between(0.5, 1.0), dice.between(0.5, 1.0));
         let first = mesh.vertices.len();
-        mesh.polygon(
-            surface,
-            facing,
-            &[corner(-1.0, -0.3 * p), corner(0.1, -q), corner(1.0, 0.2), corner(-0.2 * q, p)],
-        );
+        mesh.polygon(surface, facing, &[corner(-1.0, -0.3 * p), corner(0.1, -q), corner(1.0, 0.2), corner(-0.2 * q, p)]);
         let soft = (facing * 0.35 + (place - middle).normalize() + out * 0.5).normalize();
         for vertex in &mut mesh.vertices[first..] {
             vertex.normal = [soft.x as f32, soft.y as f32, soft.z as f32];

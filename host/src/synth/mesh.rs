@@ -26,6 +26,8 @@ pub struct Triangle {
     pub corners: [u32; 3],
     /// Position in `Mesh::surfaces`.
     pub surface: u16,
+    /// Part of something about a tenth of a metre thick that covers no hole: not drawn where that is far below a pixel.
+    pub slight: bool,
 }
 
 /// A rigid thing.
@@ -43,6 +45,8 @@ pub struct Mesh {
     pub middle_m: Point,
     /// Radius of the bounding sphere.
     pub radius_m: f64,
+    /// Whether what is added next is slight.
+    pub slight: bool,
 }
 
 impl Mesh {
@@ -63,7 +67,7 @@ impl Mesh {
         self.vertices.extend(corners.iter().map(|&(place_m, surface_m)| Vertex { place_m, surface_m, normal }));
         for k in 1..corners.len() as u32 - 1 {
             let (a, b) = if flipped { (k + 1, k) } else { (k, k + 1) };
-            self.triangles.push(Triangle { corners: [first, first + a, first + b], surface });
+            self.triangles.push(Triangle { corners: [first, first + a, first + b], surface, slight: self.slight });
         }
     }
 
@@ -131,7 +135,7 @@ impl Mesh {
         let raw = (b.place_m - a.place_m).cross(&(c.place_m - a.place_m));
         let normal = [0, 1, 2].map(|k| f64::from(a.normal[k]) + f64::from(b.normal[k]) + f64::from(c.normal[k]));
         let corners = if raw.dot(&Point::from(normal)) < 0.0 { [corners[0], corners[2], corners[1]] } else { corners };
-        self.triangles.push(Triangle { corners, surface });
+        self.triangles.push(Triangle { corners, surface, slight: self.slight });
     }
 
     /// Moves everything from vertex `first` on into another frame.

@@ -71,14 +71,14 @@ pub fn stripes(x: f32, period: f32, width: f32, footprint: f32) -> f32 {
 /// One tone turned towards another.
 #[inline]
 pub fn blend(a: Tone, b: Tone, share: f32) -> Tone {
-    [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * share)
+    [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share, a[2] + (b[2] - a[2]) * share]
 }
 
 /// A tone under a factor, never below nothing.
 #[inline]
 pub fn times(tone: Tone, factor: f32) -> Tone {
     let factor = factor.max(0.02);
-    tone.map(|value| value * factor)
+    [tone[0] * factor, tone[1] * factor, tone[2] * factor]
 }
 
 /// How much of a detail of some size survives a footprint.

@@ -16,6 +16,8 @@ use super::sensor::Sensor;
 use super::surface::{Kind, Tone};
 
 const BAND_ROWS: usize = 16;
+/// Slight parts are left out where they are thinner than a third of a pixel: depth over focal length, m/px.
+const SLIGHT_PER_PX: f64 = 0.25;
 /// Group of the sky.
 const NO_GROUP: u32 = u32::MAX;
 
@@ -75,24 +77,6 @@ impl Renderer<'_> {
         whole
     }
 
-    pub fn census(&self, scene: &Scene) -> String {
-        let clock = std::time::Instant::now();
-        let parts: Vec<Vec<Setup>> = scene.things.iter().enumerate().map(|(number, thing)| self.set_up(thing, number as u32, 0.0)).collect();
-        let setups: Vec<Setup> = parts.into_iter().flatten().collect();
-        let t1 = clock.elapsed();
-        let (width, height) = (self.pinhole.width, self.pinhole.height);
-        let mut band = Band::new(width, 0, height);
-        for (number, setup) in setups.iter().enumerate() { band.draw(number as u32, setup); }
-        let t2 = clock.elapsed() - t1;
-        let (mut edges, mut shades) = (0, 0);
-        for row in 0..height { for c in 0..width {
-            let s: [u32; SAMPLES] = core::array::from_fn(|k| band.row(k, row)[c]);
-            let mut g: Vec<u32> = s.iter().map(|&k| if k == SKY { NO_GROUP } else { setups[k as usize].group }).collect();
-            g.sort(); g.dedup(); shades += g.len(); if g.len() > 1 { edges += 1; }
-        } }
-        format!("setup {t1:?} for {}, raster {t2:?}, {edges} edge pixels, {:.2} shades a pixel", setups.len(), shades as f64 / (width * height) as f64)
-    }
-
     fn set_up(&self, thing: &Thing, number: u32, offset_m: f64) -> Vec<Setup> {
         let mesh = thing.mesh(self.bodies);
         let shift = Point::new(offset_m, 0.0, 0.0);
@@ -100,12 +84,16 @@ impl Renderer<'_> {
         if self.out_of_sight(middle, mesh.radius_m) {
             return Vec::new();
         }
+        let far = middle.z - mesh.radius_m > SLIGHT_PER_PX * self.pinhole.focal_px;
         // The eye in the mesh's frame tells faces that look away before anything is computed.
         let eye = thing.to_camera.turn.tr_mul(&(shift - thing.to_camera.shift));
         let places: Vec<Point> = mesh.vertices.iter().map(|vertex| thing.to_camera.point(vertex.place_m) - shift).collect();
         let mut setups = Vec::new();
         for (index, (triangle, plane)) in mesh.triangles.iter().zip(&mesh.planes).enumerate() {
             let two_sided = plane[0].is_infinite();
+            if triangle.slight && far {
+                continue;
+            }
             if !two_sided && plane[0] * eye.x + plane[1] * eye.y + plane[2] * eye.z < plane[3] {
                 continue;
             }
@@ -205,7 +193,8 @@ impl Shading<'_> {
         let mesh = thing.mesh(self.renderer.bodies);
         let triangle = &mesh.triangles[setup.triangle as usize];
         let surface = &mesh.surfaces[triangle.surface as usize];
-        let corners = triangle.corners.map(|corner| &mesh.vertices[corner as usize]);
+        let [first, second, third] = triangle.corners;
+        let corners = [&mesh.vertices[first as usize], &mesh.vertices[second as usize], &mesh.vertices[third as usize]];
         let inverse = setup.inverse_depth();
         let depth = 1.0 / (inverse[0] * u + inverse[1] * v + inverse[2]);
         // Barycentric coordinates of the second and third corner, and how they change per column and row.
@@ -217,11 +206,11 @@ impl Shading<'_> {
         let ((b, b_u, b_v), (c, c_u, c_v)) = (share(1), share(2));
         let mut spot = Spot { surface_m: [0.0; 3], footprint_m: [0.0; 3], own_normal: [0.0; 3] };
         for k in 0..3 {
-            let [p, q, r] = corners.map(|corner| corner.surface_m[k]);
+            let [p, q, r] = [corners[0].surface_m[k], corners[1].surface_m[k], corners[2].surface_m[k]];
             spot.surface_m[k] = p + b * (q - p) + c * (r - p);
             let (du, dv) = (b_u * (q - p) + c_u * (r - p), b_v * (q - p) + c_v * (r - p));
             spot.footprint_m[k] = (du * du + dv * dv).sqrt();
-            let [p, q, r] = corners.map(|corner| corner.normal[k]);
+            let [p, q, r] = [corners[0].normal[k], corners[1].normal[k], corners[2].normal[k]];
             spot.own_normal[k] = p + b * (q - p) + c * (r - p);
         }
         let place = turn * (ray * depth + Point::new(self.offset_m, 0.0, 0.0)) + self.scene.anchor_camera.shift;

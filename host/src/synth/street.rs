@@ -220,14 +220,6 @@ impl Street {
         made
     }
 
-    pub(super) fn census(&self, index: u32) -> String {
-        let around = self.surroundings(index);
-        let renderer =
-            Renderer { painter: &self.painter, light: &self.light, bodies: &self.bodies, pinhole: camera::pinhole(&self.config) };
-        let meshes: Vec<_> = around.scene.things.iter().map(|t| t.mesh(&self.bodies)).collect();
-        format!("{} things {} vertices {} triangles; {}", meshes.len(), meshes.iter().map(|m| m.vertices.len()).sum::<usize>(), meshes.iter().map(|m| m.triangles.len()).sum::<usize>(), renderer.census(&around.scene))
-    }
-
     /// Car bodies, for the LiDAR.
     pub(super) fn bodies(&self) -> &[Mesh; 5] {
         &self.bodies

@@ -352,7 +352,9 @@ fn pictures_to_look_at() {
 /// Prints CPU time per frame when DYNVOX_LOOK is set.
 #[test]
 fn time_spent() {
-    if std::env::var("DYNVOX_LOOK").is_err() { return }
+    if std::env::var("DYNVOX_LOOK").is_err() {
+        return;
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     pool.install(|| {
         for (width, height) in [(640, 192), (1242, 375)] {
@@ -367,8 +369,18 @@ fn time_spent() {
                 (0..20).for_each(|_| work());
                 (cpu() - start) / 20.0
             };
-            println!("{width}: scene {:.1} ms, frame {:.1} ms, lidar {:.1} ms", least(&|| { street.surroundings(10); }), least(&|| { street.frame(10); }), least(&|| { street.lidar(10); }));
-            println!("{width}: {}", street.census(10));
+            println!(
+                "{width}: scene {:.1} ms, frame {:.1} ms, lidar {:.1} ms",
+                least(&|| {
+                    street.surroundings(10);
+                }),
+                least(&|| {
+                    street.frame(10);
+                }),
+                least(&|| {
+                    street.lidar(10);
+                })
+            );
         }
     });
 }

@@ -97,7 +97,9 @@ impl Ripmap {
 
     /// Mean noise around (`u_m`, `v_m`) over a footprint.
     pub fn at(&self, u_m: f32, v_m: f32, footprint_u_m: f32, footprint_v_m: f32) -> f32 {
-        let (u, v) = (u_m * self.texels_per_m, v_m * self.texels_per_m);
+        // Places in 1/256 texel: the whole look-up is integer arithmetic.
+        let scale = 256.0 * self.texels_per_m;
+        let (u, v) = ((u_m * scale) as i32, (v_m * scale) as i32);
         let (lu, fu) = level(footprint_u_m * self.texels_per_m);
         let (lv, fv) = level(footprint_v_m * self.texels_per_m);
         let mut value = self.bilinear(lu, lv, u, v);
@@ -115,20 +117,20 @@ impl Ripmap {
     }
 
     #[inline]
-    fn bilinear(&self, lu: usize, lv: usize, u: f32, v: f32) -> f32 {
+    fn bilinear(&self, lu: usize, lv: usize, u: i32, v: i32) -> f32 {
         let picture = &self.texels[self.starts[lv * (LOG + 1) + lu] as usize..][..1 << (2 * LOG - lu - lv)];
         let (wide, tall) = (LOG - lu, LOG - lv);
-        let u = u * inverse_power(lu) - 0.5;
-        let v = v * inverse_power(lv) - 0.5;
-        let (iu, iv) = (floor(u), floor(v));
-        let (fu, fv) = (u - iu as f32, v - iv as f32);
+        // Texels are centred on halves.
+        let (u, v) = ((u >> lu) - 128, (v >> lv) - 128);
+        let (fu, fv) = (u & 255, v & 255);
         let (mask_u, mask_v) = ((1_i32 << wide) - 1, (1_i32 << tall) - 1);
-        let (u0, u1) = ((iu & mask_u) as usize, (iu.wrapping_add(1) & mask_u) as usize);
-        let (v0, v1) = (((iv & mask_v) as usize) << wide, ((iv.wrapping_add(1) & mask_v) as usize) << wide);
-        let at = |k: usize| f32::from(picture[k]);
-        let top = at(v0 + u0) + (at(v0 + u1) - at(v0 + u0)) * fu;
-        let bottom = at(v1 + u0) + (at(v1 + u1) - at(v1 + u0)) * fu;
-        (top + (bottom - top) * fv) * (1.0 / ONE)
+        let (u0, u1) = ((u >> 8 & mask_u) as usize, ((u >> 8) + 1 & mask_u) as usize);
+        let (v0, v1) = (((v >> 8 & mask_v) as usize) << wide, (((v >> 8) + 1 & mask_v) as usize) << wide);
+        let at = |k: usize| i32::from(picture[k]);
+        let (a, b, c, d) = (at(v0 + u0), at(v0 + u1), at(v1 + u0), at(v1 + u1));
+        // 16 + 8 bits, four of them dropped so that the second product fits 32.
+        let (top, bottom) = ((a * 256 + (b - a) * fu) >> 4, (c * 256 + (d - c) * fu) >> 4);
+        (top * 256 + (bottom - top) * fv) as f32 * (1.0 / (ONE * 4096.0))
     }
 }
 
@@ -139,11 +141,6 @@ pub fn floor(value: f32) -> i32 {
     whole.wrapping_sub(i32::from(value < whole as f32))
 }
 
-#[inline]
-fn inverse_power(level: usize) -> f32 {
-    f32::from_bits((127 - level as u32) << 23)
-}
-
 /// Level of reduction for a footprint in texels, and how far towards the next: the logarithm read off the exponent.
 #[inline]
 fn level(texels: f32) -> (usize, f32) {
@@ -151,7 +148,7 @@ fn level(texels: f32) -> (usize, f32) {
     let bits = (texels.clamp(1.0, 400.0)).to_bits();
     let whole = (bits >> 23) as usize - 127;
     let part = (bits & 0x7F_FFFF) as f32 * (1.0 / 8_388_608.0);
-    let sharp = (part * 2.2 - 0.6).clamp(0.0, 1.0);
+    let sharp = (part * 3.0 - 1.0).clamp(0.0, 1.0);
     (whole, sharp)
 }
 
@@ -170,6 +167,11 @@ pub struct Textures {
 impl Textures {
     /// Draws them; the same for every street.
     pub fn new() -> Self {
-        Self { fine: Ripmap::grain(11, 3.0, 1.25), asphalt: Ripmap::grain(14, 3.0, 1.5), broad: Ripmap::grain(12, 24.0, 0.85), leaves: Ripmap::foliage(13, 2.0) }
+        Self {
+            fine: Ripmap::grain(11, 3.0, 1.25),
+            asphalt: Ripmap::grain(14, 3.0, 1.5),
+            broad: Ripmap::grain(12, 24.0, 0.85),
+            leaves: Ripmap::foliage(13, 2.0),
+        }
     }
 }

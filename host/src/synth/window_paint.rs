@@ -19,21 +19,23 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
     let ([u, v, _], [fu, fv, _], [width, height]) = (spot.surface_m, spot.footprint_m, surface.size_m);
     let h = surface.seed;
     let mut tone = glass(painter, surface, spot);
-    let folds = 1.0
-        + 0.12 * painter.fine(h, &Spot { footprint_m: [fu, 0.2 * fv, 0.0], surface_m: [u * 1.5, v * 0.2, 0.0], own_normal: [0.0; 3] }, 1.0);
+    let folds = || {
+        let hung = Spot { footprint_m: [fu, 0.2 * fv, 0.0], surface_m: [u * 1.5, v * 0.2, 0.0], own_normal: [0.0; 3] };
+        1.0 + 0.12 * painter.fine(h, &hung, 1.0)
+    };
     let cloth = [[0.62, 0.60, 0.55], [0.55, 0.50, 0.40], [0.60, 0.60, 0.62], [0.40, 0.30, 0.26]][(h >> 3) as usize & 3];
     match h % 6 {
         0 | 1 => {
             let open = 0.2 + 0.25 * unit(h << 6);
             let hang = 1.0 - within(open * width, (1.0 - open) * width, u, fu);
-            tone = blend(tone, times(cloth, 0.5 * folds), 0.8 * hang);
+            tone = blend(tone, times(cloth, 0.5 * folds()), 0.8 * hang);
         }
         2 => {
             let drawn = height * (0.2 + 0.7 * unit(h << 8));
             let slat = 1.0 - 0.25 * stripes(v, 0.06, 0.02, fv);
             tone = blend(tone, times(cloth, 0.55 * slat), 0.9 * (1.0 - above(drawn, v, fv)));
         }
-        3 => tone = blend(tone, times(cloth, 0.42 * folds), 0.55),
+        3 => tone = blend(tone, times(cloth, 0.42 * folds()), 0.55),
         _ => {}
     }
     let border = 0.055;
@@ -48,8 +50,7 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
     if (h >> 5) & 1 == 0 {
         bars = bars.max(within(0.30 * height, 0.30 * height + 0.05, v, fv));
     }
-    let frame = times(surface.second, 1.0 + 0.04 * painter.fine(h, spot, 1.0));
-    Painted { tone: blend(tone, frame, bars), gloss: 0.30 * (1.0 - bars), open: 1.0 }
+    Painted { tone: blend(tone, surface.second, bars), gloss: 0.30 * (1.0 - bars), open: 1.0 }
 }
 
 /// A shop: large panes, goods and lamps behind them.
