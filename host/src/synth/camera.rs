@@ -22,7 +22,7 @@ pub fn along_m(config: &StreetConfig, time_s: f64) -> f64 {
 
 /// Where the camera is at a time.
 pub fn t_street_camera(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64) -> Transform {
-    let mut dice = Dice::new(config.seed, 0xCA3E_2A, 0);
+    let mut dice = Dice::new(config.seed, 0x00CA_3E2A, 0);
     let mut wave = |parts: [(f64, f64); 2]| {
         let turn = 2.0 * core::f64::consts::PI;
         let sum: f64 = parts.iter().map(|&(size, rate)| size * libm::sin(turn * (rate * time_s + dice.unit()))).sum();

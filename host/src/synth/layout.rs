@@ -50,7 +50,8 @@ pub const fn is_oncoming(lane: Lane) -> bool {
 
 /// Whether a piece has a pedestrian crossing.
 pub fn crossing(seed: u64, piece: i64) -> bool {
-    piece > 0 && hash(seed ^ 0xC055, piece, 0) % 5 == 0 && hash(seed ^ 0xC055, piece - 1, 0) % 5 != 0
+    let drawn = |piece: i64| hash(seed ^ 0xC055, piece, 0).is_multiple_of(5);
+    piece > 0 && drawn(piece) && !drawn(piece - 1)
 }
 
 /// Stretches of parking strip kept free for scripted cars: right side or not, from, to.

@@ -309,7 +309,7 @@ fn shifted(seed: u32, spot: &Spot, tile_m: f32) -> (f32, f32) {
 fn manhole(seed: u32, (s, d): (f32, f32), (fs, fd): (f32, f32)) -> Option<f32> {
     let (cs, cd) = (floor(s * (1.0 / 6.0)), floor((d + 9.6) * (1.0 / 3.2)));
     let h = cell(seed ^ 0x77, cs, cd);
-    if h % 5 != 0 {
+    if !h.is_multiple_of(5) {
         return None;
     }
     let (x, y) = (s - cs as f32 * 6.0 - 1.0 - 4.0 * unit(h << 5), d + 9.6 - cd as f32 * 3.2 - 1.6);

@@ -59,19 +59,24 @@ impl Course {
     /// The stretch of street from piece `first` to piece `last`, both included. Time: linear in the distance from the start.
     pub fn stretch(&self, first: i64, last: i64) -> Stretch<'_> {
         let step = |piece: i64| self.advance(piece as f64 * PIECE_M, (piece + 1) as f64 * PIECE_M);
+        // Both ways from the street's start, so that a piece's place does not depend on where the stretch begins.
+        let mut starts_m = Vec::new();
         let mut start = Vector3::zeros();
-        for piece in 0..first {
-            start += step(piece);
-        }
         for piece in (first..0).rev() {
             start -= step(piece);
+            if piece <= last {
+                starts_m.push(start);
+            }
         }
-        let starts = (first..=last).scan(start, |next, piece| {
-            let this = *next;
-            *next += step(piece);
-            Some(this)
-        });
-        Stretch { course: self, first, starts_m: starts.collect() }
+        starts_m.reverse();
+        let mut start = Vector3::zeros();
+        for piece in 0..=last {
+            if piece >= first {
+                starts_m.push(start);
+            }
+            start += step(piece);
+        }
+        Stretch { course: self, first, starts_m }
     }
 }
 

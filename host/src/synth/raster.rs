@@ -194,7 +194,7 @@ impl Sides {
         let smaller = |a: f64, b: f64| if a < b { a } else { b };
         let from = larger(larger(at(self.left[0]), at(self.left[1])), larger(at(self.left[2]), self.columns.0));
         let to = smaller(smaller(at(self.right[0]), at(self.right[1])), smaller(at(self.right[2]), self.columns.1));
-        if !(from <= to) {
+        if from > to {
             return None;
         }
         // Neither is negative: a cast is the floor.

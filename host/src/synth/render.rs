@@ -133,6 +133,10 @@ struct Shading<'a> {
 }
 
 impl Shading<'_> {
+    fn thing(&self, seen: u32) -> &Thing {
+        &self.scene.things[self.setups[seen as usize].thing as usize]
+    }
+
     fn group(&self, seen: u32) -> u32 {
         if seen == SKY { NO_GROUP } else { self.setups[seen as usize].group }
     }
@@ -145,15 +149,13 @@ impl Shading<'_> {
         for row in 0..band.rows {
             let seen: [&[u32]; SAMPLES] = core::array::from_fn(|sample| band.row(sample, row));
             let v = (band.first_row + row) as f64;
-            for column in 0..width {
+            for (column, &centre) in seen[0].iter().enumerate() {
                 let samples = core::array::from_fn(|sample| seen[sample][column]);
                 let (light, depth_m) = self.pixel(column as f64, v, samples);
                 let levels = light.map(|value| develop(value * self.gain));
                 picture.rgb.push(self.sensor.read((band.first_row + row) * width + column, levels));
                 picture.depth_m.push(depth_m);
-                let instance =
-                    if samples[0] == SKY { 0 } else { self.scene.things[self.setups[samples[0] as usize].thing as usize].instance };
-                picture.instances.push(instance);
+                picture.instances.push(if centre == SKY { 0 } else { self.thing(centre).instance });
             }
         }
         picture

@@ -121,6 +121,7 @@ fn a_frame_is_the_same_whatever_was_asked_for_before_and_on_any_number_of_thread
     assert!(after_others == alone(1));
     assert!(after_others == alone(2));
     assert!(after_others.0 != street.frame(38));
+    assert_eq!(after_others.0.t_world_camera, street.t_world_camera(37));
 }
 
 #[test]
@@ -324,17 +325,29 @@ fn a_configuration_survives_toml_and_bad_ones_are_refused_by_name() {
     assert!(refused(StreetConfig { speed_m_s: f64::NAN, ..StreetConfig::default() }).contains("speed_m_s"));
 }
 
-/// Writes pictures to look at when DYNVOX_LOOK names a folder.
+/// `DYNVOX_LOOK=folder cargo test --release -p dynvox --lib synth -- --ignored --nocapture` writes pictures to look at and prints the
+/// time of a frame on one thread.
 #[test]
+#[ignore = "writes pictures for eyes, checks nothing"]
 fn pictures_to_look_at() {
-    let Ok(folder) = std::env::var("DYNVOX_LOOK") else { return };
+    let folder = std::env::var("DYNVOX_LOOK").expect("name a folder in DYNVOX_LOOK");
+    let seed = std::env::var("DYNVOX_LOOK_SEED").map_or(1, |seed| seed.parse().unwrap());
     std::fs::create_dir_all(&folder).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for (width, height) in [(640, 192), (1242, 375)] {
-        let street = Street::new(StreetConfig { width, height, ..StreetConfig::default() }).unwrap();
+        let street = Street::new(StreetConfig { seed, width, height, ..StreetConfig::default() }).unwrap();
         for index in [0, 40, 80, 150] {
-            let start = std::time::Instant::now();
             let frame = street.frame(index);
-            println!("{width} frame {index}: {:?}", start.elapsed());
+            let time = |work: &(dyn Fn() + Sync)| {
+                let one = || {
+                    let start = std::time::Instant::now();
+                    pool.install(work);
+                    start.elapsed().as_secs_f64() * 1e3
+                };
+                (0..5).map(|_| one()).fold(f64::MAX, f64::min)
+            };
+            let (pair, scan) = (time(&|| drop(street.frame(index))), time(&|| drop(street.lidar(index))));
+            println!("{width} x {height}, frame {index}: {pair:.1} ms, LiDAR {scan:.1} ms");
             let save = |name: &str, pixels: &[u8], colour| {
                 let path = format!("{folder}/{width}_{index:03}_{name}.png");
                 image::save_buffer(path, pixels, width, height, colour).unwrap();
@@ -347,40 +360,4 @@ fn pictures_to_look_at() {
             save("masks", &masks, image::ExtendedColorType::L8);
         }
     }
-}
-
-/// Prints CPU time per frame when DYNVOX_LOOK is set.
-#[test]
-fn time_spent() {
-    if std::env::var("DYNVOX_LOOK").is_err() {
-        return;
-    }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    pool.install(|| {
-        for (width, height) in [(640, 192), (1242, 375)] {
-            let street = Street::new(StreetConfig { width, height, ..StreetConfig::default() }).unwrap();
-            street.frame(10);
-            let cpu = || {
-                let text = std::fs::read_to_string("/proc/self/stat").unwrap();
-                text.split(' ').skip(13).take(2).map(|value| value.parse::<f64>().unwrap()).sum::<f64>() * 10.0
-            };
-            let least = |work: &dyn Fn()| {
-                let start = cpu();
-                (0..20).for_each(|_| work());
-                (cpu() - start) / 20.0
-            };
-            println!(
-                "{width}: scene {:.1} ms, frame {:.1} ms, lidar {:.1} ms",
-                least(&|| {
-                    street.surroundings(10);
-                }),
-                least(&|| {
-                    street.frame(10);
-                }),
-                least(&|| {
-                    street.lidar(10);
-                })
-            );
-        }
-    });
 }

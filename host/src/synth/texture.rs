@@ -124,8 +124,8 @@ impl Ripmap {
         let (u, v) = ((u >> lu) - 128, (v >> lv) - 128);
         let (fu, fv) = (u & 255, v & 255);
         let (mask_u, mask_v) = ((1_i32 << wide) - 1, (1_i32 << tall) - 1);
-        let (u0, u1) = ((u >> 8 & mask_u) as usize, ((u >> 8) + 1 & mask_u) as usize);
-        let (v0, v1) = (((v >> 8 & mask_v) as usize) << wide, (((v >> 8) + 1 & mask_v) as usize) << wide);
+        let (u0, u1) = (((u >> 8) & mask_u) as usize, (((u >> 8) + 1) & mask_u) as usize);
+        let (v0, v1) = ((((v >> 8) & mask_v) as usize) << wide, ((((v >> 8) + 1) & mask_v) as usize) << wide);
         let at = |k: usize| i32::from(picture[k]);
         let (a, b, c, d) = (at(v0 + u0), at(v0 + u1), at(v1 + u0), at(v1 + u1));
         // 16 + 8 bits, four of them dropped so that the second product fits 32.
