@@ -26,7 +26,7 @@ pub fn shell(painter: &Painter, shape: &Shape, spot: &Spot, coat: Tone) -> Paint
     let side = above(0.55, nx.abs(), 0.1);
     let speck = painter.textures.fine.at(z * 0.7 + x, y * 0.7 + x, 0.7 * place.f, 0.7 * place.f);
     let dirt = 0.25 * (1.0 - above(0.45, place.up, 0.4));
-    let mut tone = blend(times(coat, 1.0 + 0.03 * speck), [0.10, 0.09, 0.08], dirt);
+    let mut tone = blend(times(coat, 1.0 + 0.06 * speck), [0.10, 0.09, 0.08], dirt);
     let mut gloss = 0.30;
     if side > 0.0 {
         tone = blend(tone, times(coat, 0.22), joints(shape, &place) * side);

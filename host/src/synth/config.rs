@@ -22,7 +22,7 @@ pub struct StreetConfig {
     pub baseline_m: f64,
     /// Height of the cameras above the road, m.
     pub camera_height_m: f64,
-    /// Speed of the camera along the street, m/s.
+    /// Speed of the camera along the street, m/s. The camera never brakes: scripted cars in its lane must be faster or leave it.
     pub speed_m_s: f64,
     /// Whether the street bends; straight on otherwise.
     pub curvature: bool,

@@ -79,10 +79,8 @@ pub fn house(mesh: &mut Mesh, dice: &mut Dice, width: f64) {
         trim: mesh.surface(Surface::new(Kind::Plain, trim_tone, seed ^ 1)),
         reveal_m: dice.between(0.10, 0.24),
         surrounds: dice.chance(0.55),
-        shutters: None,
+        shutters: shuttered.then(|| mesh.surface(Surface::new(Kind::Fence, shutter_tone, seed ^ 2))),
     };
-    let shutters = shuttered.then(|| mesh.surface(Surface::new(Kind::Fence, shutter_tone, seed ^ 2)));
-    let house = House { shutters, ..house };
     let floors = [2, 3, 3, 4, 4, 5][dice.below(6)];
     let ground_height = dice.between(3.3, 3.9);
     let floor_height = dice.between(2.9, 3.3);
@@ -217,11 +215,10 @@ fn balcony(mesh: &mut Mesh, dice: &mut Dice, house: &House, middle: f64, floor: 
     let rail = mesh.surface(Surface::new(Kind::Plain, scaled(tone(70, 72, 76), dice.between(0.5, 1.5)), dice.seed()));
     let top = floor - 1.1;
     if dice.chance(0.35) {
-        let panel = |a: Point, b: Point| (a, b);
         let edges = [
-            panel(Point::new(middle - half, top, out - 0.05), Point::new(middle + half, floor - 0.12, out)),
-            panel(Point::new(middle - half, top, 0.0), Point::new(middle - half + 0.05, floor - 0.12, out - 0.05)),
-            panel(Point::new(middle + half - 0.05, top, 0.0), Point::new(middle + half, floor - 0.12, out - 0.05)),
+            (Point::new(middle - half, top, out - 0.05), Point::new(middle + half, floor - 0.12, out)),
+            (Point::new(middle - half, top, 0.0), Point::new(middle - half + 0.05, floor - 0.12, out - 0.05)),
+            (Point::new(middle + half - 0.05, top, 0.0), Point::new(middle + half, floor - 0.12, out - 0.05)),
         ];
         for (low, high) in edges {
             mesh.cuboid(house.wall, low, high, &[]);

@@ -2,10 +2,13 @@
 //!
 //! A [`Street`] gives rectified stereo pairs in colour and grey with sensor noise, exact depth, instance masks, poses of the camera and
 //! of every car, and simulated LiDAR. Frame `i` depends on the configuration and `i` alone: frames may be asked for in any order, on any
-//! number of threads. Only plain arithmetic and `libm` are used, so that the pictures are the same bits on every machine.
+//! number of threads. Only plain arithmetic, the root and `libm` are used, so that the pictures are the same bits on every machine.
 //!
 //! Memory: about a dozen [`PIECE_M`]-metre pieces of street near the camera and one frame's buffers, however far the camera drives.
-//! Time: see the tests; about linear in pixels. What can go wrong: a configuration out of range is refused by [`Street::new`].
+//! Time: about 40,000 triangles a view are set up whatever the size, the rest is linear in pixels. What can go wrong: a configuration
+//! out of range is refused by [`Street::new`].
+//!
+//! Left out: lens and motion blur, rolling shutter, pedestrians, rain; glass shows no rooms; the LiDAR's revolution takes no time.
 //!
 //! ```
 //! use dynvox::synth::{Street, StreetConfig};
