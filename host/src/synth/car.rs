@@ -146,7 +146,17 @@ pub fn shape(kind: CarKind) -> Shape {
         ),
     };
     let (side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m) = glass;
-    Shape { half_m, axles_m, wheel_m, side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m, lamps_m }
+    Shape {
+        half_m,
+        axles_m,
+        wheel_m,
+        side_glass_m,
+        side_height_m,
+        pillars_m,
+        windscreen_m,
+        rear_glass_m,
+        lamps_m,
+    }
 }
 
 /// Points of the right half of a cross-section, from the sill to the top: (x, height).
@@ -169,7 +179,10 @@ fn half_ring(section: &Section) -> [(f64, f64); 8] {
 /// Builds a body.
 pub fn body(kind: CarKind) -> Mesh {
     let mut mesh = Mesh::default();
-    let shell = mesh.surface(Surface { size_m: [kind as u32 as f32, 0.0], ..Surface::new(Kind::Car, tone(255, 255, 255), 0) });
+    let shell = mesh.surface(Surface {
+        size_m: [kind as u32 as f32, 0.0],
+        ..Surface::new(Kind::Car, tone(255, 255, 255), 0)
+    });
     hull(&mut mesh, shell, sections(kind));
     let figures = shape(kind);
     let tyre = mesh.surface(Surface::new(Kind::Plain, tone(30, 30, 32), 0));

@@ -92,17 +92,17 @@ impl StreetConfig {
         ];
         for (name, size) in [("width", self.width), ("height", self.height)] {
             if !(32..=8192).contains(&size) {
-                return Some(format!("synth.{name} is {size}; it must lie within 32 to 8192 px"));
+                return Some(format!("street.{name} is {size}; it must lie within 32 to 8192 px"));
             }
         }
         for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
-                return Some(format!("synth.{name} is {value}; it must be a positive number"));
+                return Some(format!("street.{name} is {value}; it must be a positive number"));
             }
         }
         for (name, value, low, high) in held {
             if !(low..=high).contains(&value) {
-                return Some(format!("synth.{name} is {value}; it must lie within {low} to {high}"));
+                return Some(format!("street.{name} is {value}; it must lie within {low} to {high}"));
             }
         }
         self.traffic.problem()
@@ -130,20 +130,20 @@ impl Traffic {
         let Self::Moving(moving) = self else { return None };
         for (name, gap) in [("oncoming_gap_m", moving.oncoming_gap_m), ("overtaking_gap_m", moving.overtaking_gap_m)] {
             if !(gap == 0.0 || (30.0..=1e6).contains(&gap)) {
-                return Some(format!("synth.traffic.{name} is {gap}; it must be 0 (no such cars) or at least 30 m"));
+                return Some(format!("street.traffic.{name} is {gap}; it must be 0 (no such cars) or at least 30 m"));
             }
         }
         let speeds = [moving.oncoming_speed_m_s, moving.overtaking_speed_m_s];
         if speeds.into_iter().chain(moving.cars.iter().map(|car| car.profile.speed_m_s())).any(|speed| !(0.0..=60.0).contains(&speed)) {
-            return Some("a speed in synth.traffic lies outside 0 to 60 m/s".to_owned());
+            return Some("a speed in street.traffic lies outside 0 to 60 m/s".to_owned());
         }
         moving.cars.iter().find_map(|car| match car.profile {
             SpeedProfile::Starting { acceleration_m_s2: rate, .. } | SpeedProfile::Stopping { deceleration_m_s2: rate, .. }
                 if !(rate.is_finite() && rate > 0.0) =>
             {
-                Some(format!("an acceleration in synth.traffic is {rate}; it must be a positive number of m/s²"))
+                Some(format!("an acceleration in street.traffic is {rate}; it must be a positive number of m/s²"))
             }
-            _ if !car.start_m.is_finite() => Some("a start_m in synth.traffic is not a number".to_owned()),
+            _ if !car.start_m.is_finite() => Some("a start_m in street.traffic is not a number".to_owned()),
             _ => None,
         })
     }

@@ -197,7 +197,13 @@ fn upper_floor(
         let sill = if balcony { bottom - 0.12 } else { bottom - 0.85 };
         let head = (bottom - 0.85 - height).max(top + 0.3);
         let pane = window(mesh, dice, frame, width, sill - head);
-        let opening = Opening { left: middle - 0.5 * width, right: middle + 0.5 * width, top: head, bottom: sill, pane };
+        let opening = Opening {
+            left: middle - 0.5 * width,
+            right: middle + 0.5 * width,
+            top: head,
+            bottom: sill,
+            pane,
+        };
         openings.push(opening);
         if balcony {
             self::balcony(mesh, dice, house, middle, bottom);

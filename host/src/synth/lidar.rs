@@ -84,7 +84,13 @@ impl Street {
                 return None;
             }
             let (directions, beams) = reach(corners)?;
-            Some(Face { planes: planes.map(|plane| plane / volume), thing: number as u32, triangle: triangle as u32, directions, beams })
+            Some(Face {
+                planes: planes.map(|plane| plane / volume),
+                thing: number as u32,
+                triangle: triangle as u32,
+                directions,
+                beams,
+            })
         };
         mesh.triangles.iter().enumerate().filter_map(face).collect()
     }
@@ -100,7 +106,11 @@ impl Street {
             [0, 1, 2].map(|k| shares[0] * a[k] + shares[1] * b[k] + shares[2] * c[k])
         };
         let spread = (0.003 * range_m) as f32;
-        let spot = Spot { surface_m: mix(|vertex| vertex.surface_m), footprint_m: [spread; 3], own_normal: mix(|vertex| vertex.normal) };
+        let spot = Spot {
+            surface_m: mix(|vertex| vertex.surface_m),
+            footprint_m: [spread; 3],
+            own_normal: mix(|vertex| vertex.normal),
+        };
         let painted = self.painter().paint(&mesh.surfaces[triangle.surface as usize], &spot, thing.coat);
         let [red, green, blue] = painted.tone;
         let noise_m = self.config().lidar_noise_m;

@@ -3,6 +3,8 @@
 //! The heading is a bounded sum of sines, so that the street never meets itself however long it gets. Positions are summed from the
 //! street's start piece by piece in one order: any frame, asked for alone, finds the same bits.
 
+use std::sync::{Mutex, PoisonError};
+
 use dynvox_core::geometry::{Transform, exp};
 use nalgebra::{Translation3, Vector3};
 
@@ -25,10 +27,12 @@ const GAUSS: [(f64, f64); 5] = [
 ];
 
 /// The line's shape.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Course {
     amplitude_rad: [f64; 2],
     phase_rad: [f64; 2],
+    /// A piece already walked to and its start: driving on costs nothing more. The sum is the same from there as from the start.
+    walked: Mutex<(i64, Vector3<f64>)>,
 }
 
 impl Course {
@@ -36,7 +40,11 @@ impl Course {
     pub fn new(config: &StreetConfig) -> Self {
         let mut dice = Dice::new(config.seed, 0x0C0_0125E, 0);
         let amplitude_rad = if config.curvature { AMPLITUDE_RAD } else { [0.0; 2] };
-        Self { amplitude_rad, phase_rad: [TURN * dice.unit(), TURN * dice.unit()] }
+        Self {
+            amplitude_rad,
+            phase_rad: [TURN * dice.unit(), TURN * dice.unit()],
+            walked: Mutex::default(),
+        }
     }
 
     /// Heading at arc length `s_m`, rad, positive to the right; 0 at the start.
@@ -56,7 +64,8 @@ impl Course {
         })
     }
 
-    /// The stretch of street from piece `first` to piece `last`, both included. Time: linear in the distance from the start.
+    /// The stretch of street from piece `first` to piece `last`, both included. Time: linear in the way
+    /// from the last stretch when driving on, else from the street's start.
     pub fn stretch(&self, first: i64, last: i64) -> Stretch<'_> {
         let step = |piece: i64| self.advance(piece as f64 * PIECE_M, (piece + 1) as f64 * PIECE_M);
         // Both ways from the street's start, so that a piece's place does not depend on where the stretch begins.
@@ -69,8 +78,12 @@ impl Course {
             }
         }
         starts_m.reverse();
-        let mut start = Vector3::zeros();
-        for piece in 0..=last {
+        let mut walked = self.walked.lock().unwrap_or_else(PoisonError::into_inner);
+        let (known, mut start) = if walked.0 <= first { *walked } else { Default::default() };
+        for piece in known..=last {
+            if piece == first {
+                *walked = (piece, start);
+            }
             if piece >= first {
                 starts_m.push(start);
             }

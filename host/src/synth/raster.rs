@@ -119,7 +119,13 @@ impl Band {
     /// An empty band.
     pub fn new(width: usize, first_row: usize, rows: usize) -> Self {
         let samples = SAMPLES * rows * width;
-        Self { first_row, rows, width, inverse_depth: vec![0.0; samples], seen: vec![SKY; samples] }
+        Self {
+            first_row,
+            rows,
+            width,
+            inverse_depth: vec![0.0; samples],
+            seen: vec![SKY; samples],
+        }
     }
 
     /// The setups seen by a row's pixels at one sample.

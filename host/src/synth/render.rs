@@ -144,8 +144,11 @@ impl Shading<'_> {
     fn band(&self, band: &Band) -> Picture {
         let width = self.renderer.pinhole.width;
         let count = band.rows * width;
-        let mut picture =
-            Picture { rgb: Vec::with_capacity(count), depth_m: Vec::with_capacity(count), instances: Vec::with_capacity(count) };
+        let mut picture = Picture {
+            rgb: Vec::with_capacity(count),
+            depth_m: Vec::with_capacity(count),
+            instances: Vec::with_capacity(count),
+        };
         for row in 0..band.rows {
             let seen: [&[u32]; SAMPLES] = core::array::from_fn(|sample| band.row(sample, row));
             let v = (band.first_row + row) as f64;

@@ -26,7 +26,10 @@ pub struct Placed {
 impl Placed {
     /// The same motion as a matrix.
     pub fn new(motion: &Transform) -> Self {
-        Self { turn: motion.rotation.to_rotation_matrix().into_inner(), shift: motion.translation.vector }
+        Self {
+            turn: motion.rotation.to_rotation_matrix().into_inner(),
+            shift: motion.translation.vector,
+        }
     }
 
     /// Moves a point.
@@ -92,7 +95,13 @@ impl Scene {
         let t_camera_street = t_street_camera.inverse();
         let thing = |source, t_street_mesh: &Transform, coat, instance| {
             let turn = Placed::new(t_street_mesh).turn.map(|value| value as f32);
-            Thing { source, turn, to_camera: Placed::new(&(t_camera_street * t_street_mesh)), coat, instance }
+            Thing {
+                source,
+                turn,
+                to_camera: Placed::new(&(t_camera_street * t_street_mesh)),
+                coat,
+                instance,
+            }
         };
         let mut things = Vec::new();
         for piece in pieces {

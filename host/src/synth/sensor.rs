@@ -11,7 +11,10 @@ pub struct Sensor {
 impl Sensor {
     /// `camera` is 0 on the left, 1 on the right; `sigma` is the noise at mid grey in grey levels.
     pub fn new(seed: u64, frame: u32, camera: u32, sigma: f64) -> Self {
-        Self { key: mix(seed ^ mix(u64::from(frame) << 1 | u64::from(camera))), sigma: sigma as f32 }
+        Self {
+            key: mix(seed ^ mix(u64::from(frame) << 1 | u64::from(camera))),
+            sigma: sigma as f32,
+        }
     }
 
     /// Grey levels as the sensor reads them.

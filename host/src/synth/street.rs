@@ -136,8 +136,12 @@ impl Street {
     /// Frame `index` with all its truth.
     pub fn frame(&self, index: u32) -> SynthFrame {
         let around = self.surroundings(index);
-        let renderer =
-            Renderer { painter: &self.painter, light: &self.light, bodies: &self.bodies, pinhole: camera::pinhole(&self.config) };
+        let renderer = Renderer {
+            painter: &self.painter,
+            light: &self.light,
+            bodies: &self.bodies,
+            pinhole: camera::pinhole(&self.config),
+        };
         let view = |camera: u32, offset_m: f64, gain: f64| {
             let sensor = Sensor::new(self.config.seed, index, camera, self.config.noise_sigma);
             renderer.picture(&around.scene, offset_m, gain as f32, &sensor)
@@ -195,7 +199,13 @@ impl Street {
             cars.push(Present { id, kind, paint, t_street_car, speed_m_s });
         }
         for car in pieces.iter().flat_map(|piece| &piece.parked) {
-            cars.push(Present { id: car.id, kind: car.kind, paint: car.paint, t_street_car: car.t_street_car, speed_m_s: 0.0 });
+            cars.push(Present {
+                id: car.id,
+                kind: car.kind,
+                paint: car.paint,
+                t_street_car: car.t_street_car,
+                speed_m_s: 0.0,
+            });
         }
         cars.sort_by_key(|car| car.id);
         // 8 parking places a piece and traffic 30 m apart leave this bound far away; scripts could reach it.

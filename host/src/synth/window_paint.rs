@@ -20,7 +20,11 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
     let h = surface.seed;
     let mut tone = glass(painter, surface, spot);
     let folds = || {
-        let hung = Spot { footprint_m: [fu, 0.2 * fv, 0.0], surface_m: [u * 1.5, v * 0.2, 0.0], own_normal: [0.0; 3] };
+        let hung = Spot {
+            footprint_m: [fu, 0.2 * fv, 0.0],
+            surface_m: [u * 1.5, v * 0.2, 0.0],
+            own_normal: [0.0; 3],
+        };
         1.0 + 0.12 * painter.fine(h, &hung, 1.0)
     };
     let cloth = [[0.62, 0.60, 0.55], [0.55, 0.50, 0.40], [0.60, 0.60, 0.62], [0.40, 0.30, 0.26]][(h >> 3) as usize & 3];
