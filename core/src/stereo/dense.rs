@@ -93,18 +93,12 @@ impl DenseMatching<'_> {
     #[inline(always)]
     fn match_pixel<const LEFT: bool>(&self, point: &Descriptor, others: Candidates<'_>, listed: &[u8], plane: i16) -> i16 {
         // Energy above, disparity below: the least key is the least energy and, of equal ones, the smallest disparity.
-        let mut best = u32::MAX;
-        for &d in listed {
-            let Some(other) = others.at::<LEFT>(usize::from(d)) else { break };
-            best = best.min((distance(point, other) << 12) + (self.cost.elsewhere << 8) + u32::from(d));
-        }
+        let mut best = least_listed::<LEFT>(point, others, listed, self.cost.elsewhere);
         let mean = usize::from((plane & 255) as u8);
         let costs = if plane >= STEEP { &self.cost.about_steep } else { &self.cost.about_plane };
         let low = mean.saturating_sub(self.cost.radius);
-        for (d, cost) in (low..=mean + self.cost.radius).zip(costs.iter().skip(low + self.cost.radius - mean)) {
-            let Some(other) = others.at::<LEFT>(d) else { break };
-            best = best.min((distance(point, other) << 12) + (cost << 8) + d as u32);
-        }
+        let costs = costs.get(low + self.cost.radius - mean..=2 * self.cost.radius).unwrap_or(&[]);
+        best = best.min(least_near::<LEFT>(point, others, low, costs));
         if best == u32::MAX {
             return NO_PLANE;
         }
@@ -113,13 +107,13 @@ impl DenseMatching<'_> {
     }
 
     /// Where between d - 1 and d + 1 the distance has its least value, if it falls and rises with the same slope; 1/64 px about d.
-    #[inline(always)]
+    #[inline(never)]
     fn fraction<const LEFT: bool>(&self, point: &Descriptor, others: Candidates<'_>, d: usize) -> i16 {
         if !self.config.subpixel {
             return 0;
         }
-        let at = |d: Option<usize>| others.at::<LEFT>(d?).map(|other| distance(point, other) as i32);
-        let (Some(before), Some(here), Some(after)) = (at(d.checked_sub(1)), at(Some(d)), at(Some(d + 1))) else { return 0 };
+        let [Some(before), Some(here), Some(after)] = [d.wrapping_sub(1), d, d + 1].map(|d| others.at::<LEFT>(d)) else { return 0 };
+        let [before, here, after] = [before, here, after].map(|other| distance(point, other) as i32);
         let rise = before.max(after) - here;
         if before < here || after < here || rise == 0 {
             return 0;
@@ -142,6 +136,29 @@ impl<'a> Candidates<'a> {
     fn at<const LEFT: bool>(self, d: usize) -> Option<&'a Descriptor> {
         self.columns.get(if LEFT { self.reach.wrapping_sub(d) } else { d })
     }
+}
+
+/// The least key among listed disparities. Never inlined, as all loops over distances here: on its own the compiler keeps the descriptor
+/// in one register, in the midst of others it takes it to pieces.
+#[inline(never)]
+fn least_listed<const LEFT: bool>(point: &Descriptor, others: Candidates<'_>, listed: &[u8], cost: u32) -> u32 {
+    let mut best = u32::MAX;
+    for &d in listed {
+        let Some(other) = others.at::<LEFT>(usize::from(d)) else { break };
+        best = best.min((distance(point, other) << 12) + (cost << 8) + u32::from(d));
+    }
+    best
+}
+
+/// The least key among disparities from `low` on, as many as there are costs.
+#[inline(never)]
+fn least_near<const LEFT: bool>(point: &Descriptor, others: Candidates<'_>, low: usize, costs: &[u32]) -> u32 {
+    let mut best = u32::MAX;
+    for (i, cost) in costs.iter().enumerate() {
+        let Some(other) = others.at::<LEFT>(low + i) else { break };
+        best = best.min((distance(point, other) << 12) + (cost << 8) + (low + i) as u32);
+    }
+    best
 }
 
 /// The members of a set, ascending.

@@ -105,7 +105,7 @@ pub(super) fn distance_of_four(a: &[Descriptor; 4], [e, f, g, h]: [&Descriptor; 
 }
 
 /// Texture of a descriptor: the sum of its gradients' magnitudes.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn texture(a: &Descriptor) -> u32 {
     distance(a, &Descriptor([FLAT; 16]))
 }

@@ -16,55 +16,60 @@ pub(super) const NO_PLANE: i16 = -1;
 pub(super) const STEEP: i16 = 256;
 
 /// Draws the planes into image rows `first..` of `out`, `width` wide: the disparity in whole px, plus [`STEEP`], or [`NO_PLANE`].
-/// Where triangles touch the later one wins.
+/// Triangles are drawn to the pixels beyond their edges; the later one wins.
 pub(super) fn draw_planes(mesh: &Triangulation<'_>, slope_max: f32, first: usize, width: usize, out: &mut [i16]) {
     out.fill(NO_PLANE);
     let rows = out.len() / width;
-    // In 1/65536 px per px; a slope of 1000 fits.
-    let slope_max = (slope_max * 65_536.0) as i64;
-    for corners in mesh.triangles() {
+    // A slope of 1000 fits.
+    let slope_max = (slope_max * ONE as f32) as i64;
+    for mut corners in mesh.triangles() {
+        corners.sort_unstable_by_key(|point| (point.v, point.u));
+        let [top, middle, bottom] = corners;
+        let (from, to) = (usize::from(top.v).max(first), (usize::from(bottom.v) + 1).min(first + rows));
+        if from >= to {
+            continue;
+        }
         let Some(plane) = Plane::through(corners) else { continue };
-        let steep = plane.slope_u.abs() > slope_max || plane.slope_v.abs() > slope_max;
-        let [top, middle, bottom] = by_row(corners);
-        let (from, to) = (usize::from(top.v).max(first), usize::from(bottom.v).min(first + rows.saturating_sub(1)));
-        for v in from..=to {
-            let v_ = v as i64;
-            let long = crossing(top, bottom, v_);
-            let short = if v_ < i64::from(middle.v) { crossing(top, middle, v_) } else { crossing(middle, bottom, v_) };
-            let (Some(long), Some(short)) = (long, short) else { continue };
-            // Rightwards from the first column not left of the edge; both ends are in the image as all corners are.
-            let (left, right) =
-                if long.0 < short.0 || (long.0 == short.0 && long.1 < short.1) { (long.1, short.0) } else { (short.1, long.0) };
-            let start = (v - first) * width;
-            if let Some(span) = out.get_mut(start..start + width).and_then(|row| row.get_mut(left as usize..=right as usize)) {
-                plane.draw(left, v_, if steep { STEEP } else { 0 }, span);
+        let mark = if plane.slope_u.abs() > slope_max || plane.slope_v.abs() > slope_max { STEEP } else { 0 };
+        let (long, upper, lower) = (Edge::new(top, bottom), Edge::new(top, middle), Edge::new(middle, bottom));
+        let drawn = out.chunks_exact_mut(width).enumerate().take(to - first).skip(from - first);
+        for (v, row) in drawn.map(|(i, row)| ((first + i) as i64, row)) {
+            let (a, b) = (long.column(v), if v < i64::from(middle.v) { upper.column(v) } else { lower.column(v) });
+            let (left, right) = (a.min(b) >> SHIFT, (a.max(b) >> SHIFT) + 1);
+            let end = width.min(right as usize + 1);
+            if let Some(span) = row.get_mut(left as usize..end) {
+                plane.draw(left, v, mark, span);
             }
         }
     }
 }
 
-fn by_row(mut corners: [SupportPoint; 3]) -> [SupportPoint; 3] {
-    corners.sort_unstable_by_key(|point| (point.v, point.u));
-    corners
+/// Slopes and columns are in 1/65536 px: off by at most 0.03 px across 2,000.
+const SHIFT: u32 = 16;
+/// One px in that unit.
+const ONE: i64 = 1 << SHIFT;
+
+/// An edge of a triangle, downwards.
+struct Edge {
+    from: SupportPoint,
+    slope: i64,
 }
 
-/// Where the edge a-b crosses row v: the columns rounded down and up. An edge along the row gives its second end.
-fn crossing(a: SupportPoint, b: SupportPoint, v: i64) -> Option<(i64, i64)> {
-    let (au, av, bu, bv) = (i64::from(a.u), i64::from(a.v), i64::from(b.u), i64::from(b.v));
-    if av == bv {
-        return Some((bu, bu));
+impl Edge {
+    fn new(from: SupportPoint, to: SupportPoint) -> Self {
+        let (columns, rows) = (i64::from(to.u) - i64::from(from.u), i64::from(to.v) - i64::from(from.v));
+        // An edge along the row is met in its own row only, where the other edges give its ends.
+        Self { from, slope: (columns * ONE).checked_div(rows).unwrap_or(0) }
     }
-    let numerator = (bu - au) * (v - av);
-    let down = au + numerator.div_euclid(bv - av);
-    Some((down, down + i64::from(numerator.rem_euclid(bv - av) != 0)))
+
+    fn column(&self, v: i64) -> i64 {
+        i64::from(self.from.u) * ONE + self.slope * (v - i64::from(self.from.v))
+    }
 }
 
-/// d(u, v) = d0 + slope_u (u - u0) + slope_v (v - v0), kept as exact fractions over `determinant`.
+/// d(u, v) = d0 + slope_u (u - u0) + slope_v (v - v0).
 struct Plane {
     origin: SupportPoint,
-    numerator_u: i64,
-    numerator_v: i64,
-    determinant: i64,
     slope_u: i64,
     slope_v: i64,
 }
@@ -74,21 +79,19 @@ impl Plane {
         let d = |x: u16, y: u16| i64::from(x) - i64::from(y);
         let (bu, bv, bd) = (d(b.u, a.u), d(b.v, a.v), d(b.disparity, a.disparity));
         let (cu, cv, cd) = (d(c.u, a.u), d(c.v, a.v), d(c.disparity, a.disparity));
-        let determinant = bu * cv - bv * cu;
-        let (numerator_u, numerator_v) = (bd * cv - bv * cd, bu * cd - bd * cu);
-        let slope = |numerator: i64| (numerator << 16).checked_div(determinant);
-        Some(Self { origin: a, numerator_u, numerator_v, determinant, slope_u: slope(numerator_u)?, slope_v: slope(numerator_v)? })
+        let slope = |numerator: i64| (numerator * ONE).checked_div(bu * cv - bv * cu);
+        Some(Self { origin: a, slope_u: slope(bd * cv - bv * cd)?, slope_v: slope(bu * cd - bd * cu)? })
     }
 
-    /// Fills a run of row `v` from column `left`, in 1/65536 px: exact at its first pixel, at most 0.03 px off after 2,000.
+    /// Fills a run of row `v` from column `left`.
     fn draw(&self, left: i64, v: i64, mark: i16, span: &mut [i16]) {
-        let from_origin = self.numerator_u * (left - i64::from(self.origin.u)) + self.numerator_v * (v - i64::from(self.origin.v));
-        let Some(offset) = (from_origin << 16).checked_div(self.determinant) else { return };
-        let start = (i64::from(self.origin.disparity) << 16) + offset + (1 << 15);
-        let (start, slope) = (start as i32, self.slope_u as i32);
+        let offset = self.slope_u * (left - i64::from(self.origin.u)) + self.slope_v * (v - i64::from(self.origin.v));
+        let start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
+        let slope = self.slope_u as i32;
+        // Within a triangle all fits; a pixel beyond the edge of a very steep one may wrap, and its plane is not preferred anyway.
         for (i, out) in span.iter_mut().enumerate() {
-            let disparity = (start.wrapping_add(slope.wrapping_mul(i as i32)) >> 16).clamp(0, i32::from(DISPARITY_LIMIT));
-            *out = disparity as i16 + mark;
+            let disparity = start.wrapping_add(slope.wrapping_mul(i as i32)) >> SHIFT;
+            *out = disparity.clamp(0, i32::from(DISPARITY_LIMIT)) as i16 + mark;
         }
     }
 }
