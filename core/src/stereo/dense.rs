@@ -67,7 +67,8 @@ impl DenseMatching<'_> {
     /// result is kept, in px in the right one, which is only compared with.
     fn match_row<const LEFT: bool>(&self, here: &[Descriptor], other: &[Descriptor], v: usize, planes: &mut [i16]) {
         let (first, end) = (MARGIN, here.len().saturating_sub(MARGIN));
-        let grid = &self.cells[usize::from(!LEFT)];
+        let [left_cells, right_cells] = &self.cells;
+        let grid = if LEFT { left_cells } else { right_cells };
         let size = self.config.grid_size;
         let sets = grid.cells.get(v / size * grid.columns..).unwrap_or(&[]);
         let least_texture = u32::from(self.config.match_texture);

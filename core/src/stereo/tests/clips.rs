@@ -57,3 +57,23 @@ fn both_presets_are_as_true_as_published_on_kitti_2012() {
         assert!(scores[1] >= covered, "{name}: {:.2} % covered", scores[1]);
     }
 }
+
+/// Another implementation's disparities of the same pairs: not truth, but whoever disagrees with them everywhere has a mistake.
+#[test]
+fn agrees_with_the_published_implementation_where_both_see() {
+    let clip = |folder: &str, frame: usize| format!("kitti-odometry/sequences/06/{folder}/{frame:06}.png");
+    for frame in [0, 25, 50] {
+        let (Some(left), Some(right)) = (grey(&clip("image_0", frame)), grey(&clip("image_1", frame))) else {
+            println!("skipped: agrees_with_the_published_implementation_where_both_see");
+            return;
+        };
+        let published = deep(&clip("disp_elas", frame)).unwrap();
+        let (report, estimate) = disparity(&StereoConfig::dynslam(), &left, &right, &Serial);
+        let [off, covered, median, _] = score(&estimate, &published);
+        println!(
+            "06 {frame}: {off:.2} % off by more than 3 px, {covered:.1} % covered, median {median:.3} px, density {:.3}",
+            report.density()
+        );
+        assert!(off < 6.0 && covered > 93.0 && median < 0.35);
+    }
+}

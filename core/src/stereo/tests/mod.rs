@@ -5,7 +5,11 @@ mod scenes;
 mod trouble;
 
 use super::*;
-use crate::{Serial, memory::Carver};
+use crate::{
+    Capacity, Executor, Serial,
+    image::View,
+    memory::{Carver, SLAB_ALIGN},
+};
 use std::{boxed::Box, vec, vec::Vec};
 
 /// An image as the tests hold it.
@@ -29,8 +33,8 @@ pub(super) fn capacity(image_width: usize, image_height: usize) -> Capacity {
 /// Runs `work` on a matcher in a slab of exactly its size.
 pub(super) fn with_matcher<R>(capacity: &Capacity, work: impl FnOnce(&mut StereoMatcher<'_>) -> R) -> R {
     let bytes = StereoMatcher::bytes(capacity);
-    let mut memory: Box<[u8]> = vec![0xA5; bytes + crate::memory::SLAB_ALIGN].into_boxed_slice();
-    let skip = memory.as_ptr().align_offset(crate::memory::SLAB_ALIGN);
+    let mut memory: Box<[u8]> = vec![0xA5; bytes + SLAB_ALIGN].into_boxed_slice();
+    let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut memory[skip..skip + bytes], bytes).unwrap();
     let mut matcher = StereoMatcher::carve(capacity, &mut carver).unwrap();
     assert_eq!(carver.footprint().bytes(), bytes, "what was cut is what was promised");

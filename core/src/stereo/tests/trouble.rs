@@ -1,7 +1,7 @@
 //! Input without an answer, input that fits nothing, and configurations at their limits: values, never panics.
 
 use super::{scenes::surface, *};
-use crate::random::Random;
+use crate::{config::Problems, random::Random};
 use std::thread;
 
 /// Really at once: the first of two on a thread of its own.

@@ -1,0 +1,327 @@
+//! The matcher: its rooms in the slab, and the steps from two images to disparities.
+
+use super::{
+    MIN_IMAGE_SIZE, StereoConfig, StereoReport, StereoStatus, StereoStep, bands,
+    bands::Bands,
+    config::{DISPARITY_LIMIT, MIN_CANDIDATE_STEP, MIN_GRID_SIZE},
+    delaunay::{SupportPoint, Triangulation},
+    dense::{DenseBand, DenseMatching, NONE, WORKING_ONE_PX},
+    descriptor::{Descriptor, Gradients},
+    gaps,
+    gaps::Filling,
+    gradient, median, plausible, prior,
+    prior::{CellGrid, DisparitySet, PlaneCost},
+    smooth, speckle, support,
+    support::{NO_MATCH, SupportMatching},
+};
+use crate::{
+    config::Problems,
+    executor::Executor,
+    image::{DISPARITY_ONE_PX, View},
+    memory::{Capacity, Carver, SlabError, region_bytes},
+};
+
+/// Descriptor rows per band: support points need two of each image.
+const ROWS: usize = 4;
+/// Bands work is split into.
+const BANDS: usize = 4;
+
+/// The matcher: its rooms in the slab and the disparities of the last pair.
+pub struct StereoMatcher<'s> {
+    /// Four bytes a pixel: the gradients of both images, later the runs of the speckle filter.
+    gradients: &'s mut [u32],
+    /// Left planes, then left disparities in working units, in the end the result.
+    disparity: &'s mut [u16],
+    /// Right planes, then right disparities, then the image between two filters.
+    other: &'s mut [i16],
+    rows: &'s mut [Descriptor],
+    support: &'s mut [i16],
+    support_before: &'s mut [i16],
+    left_mesh: Triangulation<'s>,
+    right_mesh: Triangulation<'s>,
+    left_cells: &'s mut [DisparitySet],
+    right_cells: &'s mut [DisparitySet],
+    labels: &'s mut [u32],
+    image_width: usize,
+    image_height: usize,
+    width: usize,
+    height: usize,
+}
+
+impl core::fmt::Debug for StereoMatcher<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("StereoMatcher").field("width", &self.width).field("height", &self.height).finish_non_exhaustive()
+    }
+}
+
+/// Support points there can be: one per candidate.
+const fn most_points(capacity: &Capacity) -> usize {
+    support::candidates(capacity.image_width, MIN_CANDIDATE_STEP) * support::candidates(capacity.image_height, MIN_CANDIDATE_STEP)
+}
+
+/// Cells of the grid prior there can be.
+const fn most_cells(capacity: &Capacity) -> usize {
+    prior::cells(capacity.image_width, MIN_GRID_SIZE) * prior::cells(capacity.image_height, MIN_GRID_SIZE)
+}
+
+/// Entries of a region with one per pixel; one at least, so that there is an image to show before the first pair.
+const fn most_pixels(capacity: &Capacity) -> usize {
+    if capacity.pixels() == 0 { 1 } else { capacity.pixels() }
+}
+
+impl<'s> StereoMatcher<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        let (pixels, points, cells) = (most_pixels(capacity), most_points(capacity), most_cells(capacity));
+        region_bytes::<u32>(pixels)
+            + region_bytes::<u16>(pixels)
+            + region_bytes::<i16>(pixels)
+            + region_bytes::<Descriptor>(BANDS * ROWS * capacity.image_width)
+            + 2 * region_bytes::<i16>(points)
+            + 2 * Triangulation::bytes(points)
+            + 2 * region_bytes::<DisparitySet>(cells)
+            + region_bytes::<u32>(2 * capacity.image_width)
+    }
+
+    /// Cuts the matcher's rooms.
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        let (pixels, points, cells) = (most_pixels(capacity), most_points(capacity), most_cells(capacity));
+        Ok(Self {
+            gradients: carver.cut("stereo.gradients", pixels)?,
+            disparity: carver.cut("stereo.disparity", pixels)?,
+            other: carver.cut("stereo.other", pixels)?,
+            rows: carver.cut("stereo.rows", BANDS * ROWS * capacity.image_width)?,
+            support: carver.cut("stereo.support", points)?,
+            support_before: carver.cut("stereo.support_before", points)?,
+            left_mesh: Triangulation::carve(points, ["stereo.points_left", "stereo.triangles_left", "stereo.hull_left"], carver)?,
+            right_mesh: Triangulation::carve(points, ["stereo.points_right", "stereo.triangles_right", "stereo.hull_right"], carver)?,
+            left_cells: carver.cut("stereo.cells_left", cells)?,
+            right_cells: carver.cut("stereo.cells_right", cells)?,
+            labels: carver.cut("stereo.labels", 2 * capacity.image_width)?,
+            image_width: capacity.image_width,
+            image_height: capacity.image_height,
+            width: 1,
+            height: 1,
+        })
+    }
+
+    /// Disparities of the left image, of the last pair given to [`StereoMatcher::compute`]: 1/256 px, 0 = none, exactly as large as the
+    /// image (as much of it as the capacity holds, all none, where the pair was refused).
+    #[expect(clippy::expect_used, reason = "both sides are at least 1 and their product is at most the region's length, by `begin`")]
+    pub fn disparity_q8(&self) -> View<'_, u16> {
+        View::new(self.disparity, self.width, self.height).expect("the disparity region holds the image")
+    }
+
+    /// Computes the disparities of a rectified pair.
+    pub fn compute<E: Executor>(&mut self, config: &StereoConfig, left: View<'_, u8>, right: View<'_, u8>, executor: &E) -> StereoReport {
+        self.compute_observed(config, left, right, executor, |_| ())
+    }
+
+    /// As [`StereoMatcher::compute`], calling `done` after each step: no clock enters the core, so whoever times the steps does it there.
+    pub fn compute_observed<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        left: View<'_, u8>,
+        right: View<'_, u8>,
+        executor: &E,
+        mut done: impl FnMut(StereoStep),
+    ) -> StereoReport {
+        let status = self.begin(config, left, right);
+        let mut report = StereoReport { status, pixels: (self.width * self.height) as u32, ..StereoReport::default() };
+        if report.status != StereoStatus::Matched {
+            return report;
+        }
+        self.find_gradients(left, right, executor);
+        done(StereoStep::Gradients);
+        self.match_support(config, executor, &mut report);
+        done(StereoStep::Support);
+        self.sift_support(config, &mut report);
+        done(StereoStep::Sifting);
+        self.triangulate(config, executor, &mut report);
+        done(StereoStep::Triangulation);
+        if report.triangles_left == 0 || report.triangles_right == 0 {
+            report.status = StereoStatus::TooFewSupportPoints;
+            return report;
+        }
+        self.match_densely(config, executor, &mut report);
+        done(StereoStep::DenseMatching);
+        self.remove_speckles(config, &mut report);
+        done(StereoStep::Speckles);
+        self.fill_gaps(config, &mut report);
+        done(StereoStep::Gaps);
+        self.smooth(config, executor);
+        done(StereoStep::Smoothing);
+        self.finish(&mut report);
+        done(StereoStep::Output);
+        report
+    }
+
+    /// Checks the input, takes the image's size and blanks the result.
+    fn begin(&mut self, config: &StereoConfig, left: View<'_, u8>, right: View<'_, u8>) -> StereoStatus {
+        self.width = left.width().min(self.image_width).max(1);
+        self.height = left.height().min(self.image_height).max(1);
+        self.disparity.fill(0);
+        let mut problems = Problems::new();
+        config.validate(&mut problems);
+        if !problems.is_empty() {
+            StereoStatus::ConfigRefused
+        } else if (left.width(), left.height()) != (right.width(), right.height()) {
+            StereoStatus::SizesDiffer
+        } else if left.width() > self.image_width || left.height() > self.image_height {
+            StereoStatus::TooLarge
+        } else if left.width() < MIN_IMAGE_SIZE || left.height() < MIN_IMAGE_SIZE {
+            StereoStatus::TooSmall
+        } else {
+            StereoStatus::Matched
+        }
+    }
+
+    fn find_gradients<E: Executor>(&mut self, left: View<'_, u8>, right: View<'_, u8>, executor: &E) {
+        let (width, bands) = (self.width, Bands::of(self.height));
+        let [left_du, left_dv, right_du, right_dv] = split_planes(self.gradients, width * self.height);
+        for (image, du, dv) in [(left, left_du, left_dv), (right, right_du, right_dv)] {
+            let jobs = zip3(bands.first(), bands.split(du, width), bands.split(dv, width));
+            bands::each(executor, jobs, |(first, du, dv)| gradient::gradients(image, first, du, dv));
+        }
+    }
+
+    fn match_support<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+        let [left, right] = gradients(self.gradients, self.width, self.height);
+        let (columns, rows) =
+            (support::candidates(self.width, config.candidate_step), support::candidates(self.height, config.candidate_step));
+        let bands = Bands::of(rows);
+        let matching = SupportMatching { config, left, right };
+        let jobs = zip3(bands.first(), bands.split(self.support, columns), Bands::of(BANDS).split(self.rows, ROWS * self.width));
+        bands::each(executor, jobs, |(first, grid, scratch)| matching.match_rows(first, grid, scratch));
+        let grid = self.support.get(..columns * rows).unwrap_or(&[]);
+        report.candidates = grid.len() as u32;
+        report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
+    }
+
+    fn sift_support(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+        let step = config.candidate_step;
+        let (columns, rows) = (support::candidates(self.width, step), support::candidates(self.height, step));
+        let Some(grid) = self.support.get_mut(..columns * rows) else { return };
+        report.implausible = plausible::remove_implausible(config, grid, columns, self.support_before);
+        report.redundant = plausible::remove_redundant(config, grid, columns);
+        self.left_mesh.clear();
+        self.right_mesh.clear();
+        for (j, row) in grid.chunks_exact(columns).enumerate() {
+            for (i, &disparity) in row.iter().enumerate().filter(|(_, d)| **d != NO_MATCH) {
+                let (u, v, disparity) = ((i * step) as u16, (j * step) as u16, disparity as u16);
+                self.left_mesh.add(SupportPoint { u, v, disparity });
+                report.hidden_right += u32::from(self.right_mesh.add(SupportPoint { u: u - disparity, v, disparity }));
+            }
+        }
+        report.support_points = self.left_mesh.points().len() as u32;
+    }
+
+    fn triangulate<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+        let columns = prior::cells(self.width, config.grid_size);
+        let cells = columns * prior::cells(self.height, config.grid_size);
+        let prepare = |mesh: &mut Triangulation<'_>, sets: &mut [DisparitySet]| {
+            mesh.triangulate();
+            prior::mark_cells(config, mesh.points(), columns, sets.get_mut(..cells).unwrap_or(&mut []));
+        };
+        executor.join(|| prepare(&mut self.left_mesh, self.left_cells), || prepare(&mut self.right_mesh, self.right_cells));
+        report.triangles_left = self.left_mesh.triangle_count() as u32;
+        report.triangles_right = self.right_mesh.triangle_count() as u32;
+    }
+
+    fn match_densely<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+        let (width, bands) = (self.width, Bands::of(self.height));
+        let columns = prior::cells(width, config.grid_size);
+        let matching = DenseMatching {
+            config,
+            gradients: gradients(self.gradients, width, self.height),
+            cells: [CellGrid { cells: self.left_cells, columns }, CellGrid { cells: self.right_cells, columns }],
+            cost: PlaneCost::new(config),
+        };
+        let disparity: &mut [i16] = bytemuck::cast_slice_mut(self.disparity);
+        let images = zip3(bands.first(), bands.split(disparity, width), bands.split(self.other, width));
+        let scratch = Bands::of(BANDS).split(self.rows, ROWS * width);
+        let mut jobs = [(); BANDS].map(|()| None);
+        for ((job, (first, left, right)), scratch) in jobs.iter_mut().zip(images).zip(scratch) {
+            *job = Some(DenseBand { first, left, right, scratch, counts: [0; 2] });
+        }
+        let (left_mesh, right_mesh) = (&self.left_mesh, &self.right_mesh);
+        bands::each(executor, jobs.each_mut(), |band| {
+            if let Some(band) = band {
+                prior::draw_planes(left_mesh, config.plane_slope_max, band.first, width, band.left);
+                prior::draw_planes(right_mesh, config.plane_slope_max, band.first, width, band.right);
+                matching.match_band(band);
+            }
+        });
+        for [matched, inconsistent] in jobs.iter().flatten().map(|band| band.counts) {
+            report.matched += matched;
+            report.inconsistent += inconsistent;
+        }
+    }
+
+    fn remove_speckles(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+        let similarity = working(config.speckle_similarity);
+        let runs: &mut [i32] = bytemuck::cast_slice_mut(self.gradients);
+        let image = image_of(self.disparity, self.width * self.height);
+        report.speckles = speckle::remove_speckles(image, self.width, similarity, config.speckle_size, runs, self.labels);
+    }
+
+    fn fill_gaps(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+        let filling = Filling { width: config.gap_width, discontinuity: working(config.gap_discontinuity) as u16 };
+        let image = image_of(self.disparity, self.width * self.height);
+        report.filled = gaps::fill_rows(image, self.width, filling) + gaps::fill_columns(image, self.width, filling, self.labels);
+    }
+
+    fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
+        let (width, pixels, bands) = (self.width, self.width * self.height, Bands::of(self.height));
+        let image = image_of(self.disparity, pixels);
+        let other = self.other.get_mut(..pixels).unwrap_or(&mut []);
+        if config.adaptive_mean {
+            let rows = zip3(bands.first(), bands.split(image, width), bands.split(other, width));
+            bands::each(executor, rows, |(_, from, to)| smooth::mean_along_rows(from, width, to));
+            let columns = zip3(bands.first(), bands.split(image, width), [(); BANDS]);
+            bands::each(executor, columns, |(first, to, ())| smooth::mean_along_columns(other, width, first, to));
+        }
+        if config.median {
+            other.copy_from_slice(image);
+            let rows = zip3(bands.first(), bands.split(image, width), [(); BANDS]);
+            bands::each(executor, rows, |(first, to, ())| median::median(other, width, first, to));
+        }
+    }
+
+    /// Turns working units into the result's.
+    fn finish(&mut self, report: &mut StereoReport) {
+        for disparity in self.disparity.iter_mut().take(self.width * self.height) {
+            let working = *disparity as i16;
+            // Smoothed values stay between those they come from: 0..=255 px.
+            *disparity = if working == NONE { 0 } else { working as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16) };
+            report.valid += u32::from(*disparity != 0);
+        }
+    }
+}
+
+/// Whole px in working units, held at the largest difference two disparities can have.
+fn working(px: u16) -> i16 {
+    px.min(DISPARITY_LIMIT) as i16 * WORKING_ONE_PX
+}
+
+/// The first `pixels` of the disparity region as working units.
+fn image_of(disparity: &mut [u16], pixels: usize) -> &mut [i16] {
+    bytemuck::cast_slice_mut(disparity).get_mut(..pixels).unwrap_or(&mut [])
+}
+
+/// The gradient region as four images: horizontal and vertical gradient of the left image, then of the right one.
+fn split_planes(gradients: &mut [u32], pixels: usize) -> [&mut [u8]; 4] {
+    let mut planes = bytemuck::cast_slice_mut::<u32, u8>(gradients).chunks_exact_mut(pixels);
+    [(); 4].map(|()| planes.next().unwrap_or(&mut []))
+}
+
+/// The gradients of both images.
+fn gradients(region: &[u32], width: usize, height: usize) -> [Gradients<'_>; 2] {
+    let mut planes = bytemuck::cast_slice::<u32, u8>(region).chunks_exact(width * height);
+    [(); 2].map(|()| Gradients { du: planes.next().unwrap_or(&[]), dv: planes.next().unwrap_or(&[]), width, height })
+}
+
+/// Three arrays as one of triples.
+fn zip3<A, B, C>([a, b, c, d]: [A; 4], [e, f, g, h]: [B; 4], [i, j, k, l]: [C; 4]) -> [(A, B, C); 4] {
+    [(a, e, i), (b, f, j), (c, g, k), (d, h, l)]
+}
