@@ -5,7 +5,7 @@
 //! new point form a fan from one hull neighbour to the other, so a walk along the fan visits every edge in question: no stack.
 //! Predicates are integer determinants: with coordinates below 2^13 the in-circle one stays below 2^57.
 //!
-//! Memory: 68 bytes a point. Time: about linear on street scenes (a few flips a point). Four points on one circle keep the diagonal
+//! Memory: 66 bytes a point. Time: about linear on street scenes (a few flips a point). Four points on one circle keep the diagonal
 //! that the order of insertion gives. Points on one line make no triangle.
 
 use crate::memory::{Carver, SlabError, region_bytes};

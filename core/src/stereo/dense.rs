@@ -104,24 +104,26 @@ impl DenseMatching<'_> {
             return NO_PLANE;
         }
         let d = (best & 255) as i16;
-        if LEFT { d * WORKING_ONE_PX + self.fraction::<LEFT>(point, others, d as usize) } else { d }
+        match (LEFT, self.config.subpixel) {
+            (true, true) => d * WORKING_ONE_PX + fraction(point, others, d as usize),
+            (true, false) => d * WORKING_ONE_PX,
+            (false, _) => d,
+        }
     }
+}
 
-    /// Where between d - 1 and d + 1 the distance has its least value, if it falls and rises with the same slope; 1/64 px about d.
-    #[inline(never)]
-    fn fraction<const LEFT: bool>(&self, point: &Descriptor, others: Candidates<'_>, d: usize) -> i16 {
-        if !self.config.subpixel {
-            return 0;
-        }
-        let [Some(before), Some(here), Some(after)] = [d.wrapping_sub(1), d, d + 1].map(|d| others.at::<LEFT>(d)) else { return 0 };
-        let [before, here, after] = [before, here, after].map(|other| distance(point, other) as i32);
-        let rise = before.max(after) - here;
-        if before < here || after < here || rise == 0 {
-            return 0;
-        }
-        // Less than half a pixel, so that it still rounds to d.
-        (i32::from(WORKING_ONE_PX / 2 - 1) * (before - after) / rise) as i16
-    }
+/// Where between d - 1 and d + 1 the distance has its least value, if it falls and rises with the same slope; 1/64 px about d, less than
+/// half a pixel, so that it still rounds to d. Left image only.
+#[inline(never)]
+fn fraction(point: &Descriptor, others: Candidates<'_>, d: usize) -> i16 {
+    // In the right image disparity grows to the left.
+    let beside = others.reach.checked_sub(d + 1).and_then(|from| others.columns.get(from..)?.first_chunk());
+    let Some([after, here, before]) = beside else { return 0 };
+    let (before, here, after) = (distance(point, before) as i32, distance(point, here) as i32, distance(point, after) as i32);
+    let (least, rise) = (before.min(after), before.max(after) - here);
+    // Divided first and judged later: a branch here is a coin toss.
+    let offset = (i32::from(WORKING_ONE_PX / 2 - 1) * (before - after) / rise.max(1)) as i16;
+    if least < here { 0 } else { offset }
 }
 
 /// The descriptors of the other image's row that a pixel may match.

@@ -11,32 +11,46 @@ const REACH: usize = 4;
 /// Differences are in 1/64 px; from here on a pixel has no weight. A little below 4 px, so that eight products stay within `i16`.
 const CUT: i16 = 252;
 
-/// The weighted mean of `taps` about `centre`. At most 8 x 31 x 126 = 31,248 in the numerator; the centre alone makes the denominator 63.
-#[inline(always)]
-fn mean(centre: i16, taps: [i16; 2 * REACH + 1]) -> i16 {
-    let (mut numerator, mut denominator) = (0i16, 0i16);
-    for tap in taps {
-        // Against NONE the difference is at most 2^15 - 64: no overflow, no weight.
-        let difference = tap.wrapping_sub(centre);
-        let weight = (CUT - difference.wrapping_abs().min(CUT)) >> 2;
-        numerator = numerator.wrapping_add(weight.wrapping_mul(difference));
-        denominator = denominator.wrapping_add(weight);
+/// Pixels worked on at once: their sums stay in the nearest cache.
+const BLOCK: usize = 256;
+
+/// The eight other pixels of each window.
+type Taps<'a> = [&'a [i16]; 2 * REACH];
+
+/// The weighted mean of each centre and its taps. Centre, taps and `to` are of one length.
+///
+/// One tap after the other for a block of pixels, so that each loop is short and runs on vectors.
+fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
+    for (block, (centre, to)) in centre.chunks(BLOCK).zip(to.chunks_mut(BLOCK)).enumerate() {
+        // At most 8 x 31 x 126 = 31,248 in the numerator; the centre alone makes the denominator 63.
+        let (mut numerators, mut denominators) = ([0i16; BLOCK], [CUT >> 2; BLOCK]);
+        for tap in taps {
+            let tap = tap.get(block * BLOCK..).unwrap_or(&[]);
+            let sums = numerators.iter_mut().zip(&mut denominators);
+            for ((numerator, denominator), (&tap, &centre)) in sums.zip(tap.iter().zip(centre)) {
+                // Against NONE the difference is at most 2^15 - 64: no overflow, no weight.
+                let difference = tap.wrapping_sub(centre);
+                let weight = (CUT - difference.max(difference.wrapping_neg()).min(CUT)) >> 2;
+                *numerator = numerator.wrapping_add(weight.wrapping_mul(difference));
+                *denominator = denominator.wrapping_add(weight);
+            }
+        }
+        for ((to, &centre), (&numerator, &denominator)) in to.iter_mut().zip(centre).zip(numerators.iter().zip(&denominators)) {
+            // Adding 1.5 x 2^23 rounds to the nearest integer, halves to even, and leaves it in the low bits: no conversion, no check.
+            let rounded = f32::from(numerator) / f32::from(denominator) + 12_582_912.0;
+            let offset = rounded.to_bits() as i16;
+            *to = if centre == NONE { NONE } else { centre.wrapping_add(offset) };
+        }
     }
-    // Rounded to the nearest by truncating a positive number.
-    let offset = (f32::from(numerator) / f32::from(denominator) + 512.5) as i32 - 512;
-    if centre == NONE { NONE } else { centre.wrapping_add(offset as i16) }
 }
 
-/// Smooths along the rows of `from` into `to`.
-#[expect(clippy::indexing_slicing, reason = "each of the nine slices is cut to n = width - 8 items, and i < n")]
+/// Smooths along the rows of `from` into `to`. Pixels nearer than four to an end stay as they are.
+#[expect(clippy::indexing_slicing, reason = "each slice is cut to n = width - 8 items")]
 pub(super) fn mean_along_rows(from: &[i16], width: usize, to: &mut [i16]) {
     for (from, to) in from.chunks_exact(width).zip(to.chunks_exact_mut(width)) {
         to.copy_from_slice(from);
         let Some(n) = width.checked_sub(2 * REACH) else { continue };
-        let taps: [&[i16]; 2 * REACH + 1] = core::array::from_fn(|k| &from[k..][..n]);
-        for (i, to) in to[REACH..][..n].iter_mut().enumerate() {
-            *to = mean(taps[REACH][i], taps.map(|tap| tap[i]));
-        }
+        mean(&from[REACH..][..n], window().map(|k| &from[k..][..n]), &mut to[REACH..][..n]);
     }
 }
 
@@ -46,15 +60,18 @@ pub(super) fn mean_along_columns(from: &[i16], width: usize, first: usize, to: &
     let height = from.len() / width;
     for (i, to) in to.chunks_exact_mut(width).enumerate() {
         let v = first + i;
+        let row = |v: usize| &from[v * width..][..width];
         if v < REACH || v + REACH >= height {
-            to.copy_from_slice(&from[v * width..][..width]);
-            continue;
-        }
-        let taps: [&[i16]; 2 * REACH + 1] = core::array::from_fn(|k| &from[(v + k - REACH) * width..][..width]);
-        for (u, to) in to.iter_mut().enumerate() {
-            *to = mean(taps[REACH][u], taps.map(|tap| tap[u]));
+            to.copy_from_slice(row(v));
+        } else {
+            mean(row(v), window().map(|k| row(v + k - REACH)), to);
         }
     }
+}
+
+/// Places in the window but the centre.
+fn window() -> [usize; 2 * REACH] {
+    core::array::from_fn(|k| if k < REACH { k } else { k + 1 })
 }
 
 #[cfg(test)]
@@ -63,7 +80,7 @@ mod tests {
     use crate::random::Random;
     use std::{vec, vec::Vec};
 
-    /// The twin: wide integers, one pixel at a time; division rounds half up.
+    /// The twin: wide integers, one pixel at a time; division rounds halves to even.
     fn plain(image: &[i16], step: usize, at: usize, i: usize, length: usize) -> i16 {
         if at < REACH || at + REACH >= length || image[i] == NONE {
             return image[i];
@@ -75,7 +92,9 @@ mod tests {
             numerator += weight * difference;
             denominator += weight;
         }
-        image[i] + (2 * numerator + denominator).div_euclid(2 * denominator) as i16
+        let (whole, rest) = (numerator.div_euclid(denominator), numerator.rem_euclid(denominator));
+        let up = 2 * rest > denominator || (2 * rest == denominator && whole % 2 != 0);
+        image[i] + (whole + i64::from(up)) as i16
     }
 
     #[test]

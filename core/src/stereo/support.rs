@@ -27,6 +27,9 @@ pub(super) const fn candidates(length: usize, step: usize) -> usize {
     length.div_ceil(step)
 }
 
+/// Costs looked through at once.
+const BLOCK: usize = 32;
+
 /// What is needed to match rows of candidates: the gradients of both images.
 #[derive(Clone, Copy)]
 pub(super) struct SupportMatching<'a> {
@@ -117,7 +120,9 @@ impl SupportMatching<'_> {
     fn distinct(&self, costs: &[i16]) -> Option<usize> {
         let least = |costs: &[i16]| costs.iter().fold(i16::MAX, |a, &b| a.min(b));
         let best = least(costs);
-        let at = costs.iter().position(|&cost| cost == best)?;
+        // By blocks, as looking for equals in one is done many at a time.
+        let block = costs.chunks(BLOCK).position(|block| block.iter().fold(false, |found, &cost| found | (cost == best)))?;
+        let at = block * BLOCK + costs.get(block * BLOCK..)?.iter().position(|&cost| cost == best)?;
         let before = costs.get(..at.saturating_sub(NEIGHBOURHOOD)).map_or(i16::MAX, least);
         let after = costs.get(at + NEIGHBOURHOOD + 1..).map_or(i16::MAX, least);
         (f32::from(best) < self.config.support_ratio * f32::from(before.min(after))).then_some(at)
