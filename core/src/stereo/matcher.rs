@@ -1,7 +1,7 @@
 //! The matcher: its rooms in the slab, and the steps from two images to disparities.
 
 use super::{
-    MIN_IMAGE_SIZE, StereoConfig, StereoReport, StereoStatus, StereoStep, bands,
+    MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, StereoConfig, StereoReport, StereoStatus, StereoStep, bands,
     bands::Bands,
     config::{DISPARITY_LIMIT, MIN_CANDIDATE_STEP, MIN_GRID_SIZE},
     delaunay::{SupportPoint, Triangulation},
@@ -11,7 +11,9 @@ use super::{
     gaps::Filling,
     gradient, median, plausible, prior,
     prior::{CellGrid, DisparitySet, PlaneCost},
-    smooth, speckle, support,
+    smooth, speckle,
+    speckle::Scratch,
+    support,
     support::{NO_MATCH, SupportMatching},
 };
 use crate::{
@@ -32,7 +34,7 @@ pub struct StereoMatcher<'s> {
     gradients: &'s mut [u32],
     /// Left planes, then left disparities in working units, in the end the result.
     disparity: &'s mut [u16],
-    /// Right planes, then right disparities, then the image between two filters.
+    /// Right planes, then right disparities, then the ends of the speckle filter's runs, then the image between two filters.
     other: &'s mut [i16],
     rows: &'s mut [Descriptor],
     support: &'s mut [i16],
@@ -41,7 +43,7 @@ pub struct StereoMatcher<'s> {
     right_mesh: Triangulation<'s>,
     left_cells: &'s mut [DisparitySet],
     right_cells: &'s mut [DisparitySet],
-    labels: &'s mut [u32],
+    columns: &'s mut [u32],
     image_width: usize,
     image_height: usize,
     width: usize,
@@ -80,7 +82,7 @@ impl<'s> StereoMatcher<'s> {
             + 2 * region_bytes::<i16>(points)
             + 2 * Triangulation::bytes(points)
             + 2 * region_bytes::<DisparitySet>(cells)
-            + region_bytes::<u32>(2 * capacity.image_width)
+            + region_bytes::<u32>(capacity.image_width)
     }
 
     /// Cuts the matcher's rooms.
@@ -97,7 +99,7 @@ impl<'s> StereoMatcher<'s> {
             right_mesh: Triangulation::carve(points, ["stereo.points_right", "stereo.triangles_right", "stereo.hull_right"], carver)?,
             left_cells: carver.cut("stereo.cells_left", cells)?,
             right_cells: carver.cut("stereo.cells_right", cells)?,
-            labels: carver.cut("stereo.labels", 2 * capacity.image_width)?,
+            columns: carver.cut("stereo.columns", capacity.image_width)?,
             image_width: capacity.image_width,
             image_height: capacity.image_height,
             width: 1,
@@ -167,7 +169,7 @@ impl<'s> StereoMatcher<'s> {
             StereoStatus::ConfigRefused
         } else if (left.width(), left.height()) != (right.width(), right.height()) {
             StereoStatus::SizesDiffer
-        } else if left.width() > self.image_width || left.height() > self.image_height {
+        } else if left.width() > self.image_width.min(MAX_IMAGE_SIZE) || left.height() > self.image_height.min(MAX_IMAGE_SIZE) {
             StereoStatus::TooLarge
         } else if left.width() < MIN_IMAGE_SIZE || left.height() < MIN_IMAGE_SIZE {
             StereoStatus::TooSmall
@@ -260,15 +262,19 @@ impl<'s> StereoMatcher<'s> {
 
     fn remove_speckles(&mut self, config: &StereoConfig, report: &mut StereoReport) {
         let similarity = working(config.speckle_similarity);
-        let runs: &mut [i32] = bytemuck::cast_slice_mut(self.gradients);
         let image = image_of(self.disparity, self.width * self.height);
-        report.speckles = speckle::remove_speckles(image, self.width, similarity, config.speckle_size, runs, self.labels);
+        let scratch = Scratch {
+            runs: bytemuck::cast_slice_mut(self.gradients),
+            ends: bytemuck::cast_slice_mut(self.other),
+            flags: bytemuck::cast_slice_mut(self.columns),
+        };
+        report.speckles = speckle::remove_speckles(image, self.width, similarity, config.speckle_size, scratch);
     }
 
     fn fill_gaps(&mut self, config: &StereoConfig, report: &mut StereoReport) {
         let filling = Filling { width: config.gap_width, discontinuity: working(config.gap_discontinuity) as u16 };
         let image = image_of(self.disparity, self.width * self.height);
-        report.filled = gaps::fill_rows(image, self.width, filling) + gaps::fill_columns(image, self.width, filling, self.labels);
+        report.filled = gaps::fill_rows(image, self.width, filling) + gaps::fill_columns(image, self.width, filling, self.columns);
     }
 
     fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {

@@ -13,7 +13,7 @@
 //! **Memory.** 8 bytes a pixel: the four gradients (1 each; the runs of the speckle filter lie in the same place later), the left
 //! disparities (2) and the right ones (2). Descriptors, 16 bytes each, are kept for 16 rows only, disparities of the right image only to
 //! be compared with. With P = width x height / 25 candidates for support points, 4 P + 2 x 66 P bytes for them and their triangulations,
-//! and 2 x 32 bytes per 10 x 10 px for the grid prior; in all about 14 bytes a pixel and 264 a column (14.8 at KITTI size). [`StereoMatcher::bytes`] is exact.
+//! and 2 x 32 bytes per 10 x 10 px for the grid prior; in all about 14 bytes a pixel and 260 a column (14.8 at KITTI size). [`StereoMatcher::bytes`] is exact.
 //! No array on the stack exceeds 600 bytes.
 //!
 //! **Bounds.** Support points: one per candidate, at least 5 px apart ([`MIN_CANDIDATE_STEP`]), so they always fit, as do their
@@ -73,3 +73,5 @@ pub use report::{StereoReport, StereoStatus, StereoStep};
 
 /// Least width and height of an image, px.
 pub const MIN_IMAGE_SIZE: usize = 16;
+/// Greatest width and height of an image, px, whatever the capacity: the triangulation is exact up to here.
+pub const MAX_IMAGE_SIZE: usize = 8_192;

@@ -10,7 +10,7 @@ pub enum StereoStatus {
     TooFewSupportPoints,
     /// Left and right image differ in size: no disparity.
     SizesDiffer,
-    /// The images are larger than the capacity: no disparity.
+    /// The images are larger than the capacity, or than [`super::MAX_IMAGE_SIZE`]: no disparity.
     TooLarge,
     /// The images are smaller than [`super::MIN_IMAGE_SIZE`]: no disparity.
     TooSmall,
