@@ -5,18 +5,23 @@
 use super::gradient::FLAT;
 use bytemuck::{Pod, Zeroable};
 
-/// 12 samples of the horizontal gradient, then 4 of the vertical one. Aligned, so that it is loaded as one.
+/// Eleven samples of the horizontal gradient, which tells disparities apart, and five of the vertical one:
+///
+/// ```text
+/// horizontal: . . . . .   vertical: . . . . .
+///             . x x x .             . . x . .
+///             x x x x x             . x x x .
+///             . x x x .             . . x . .
+///             . . . . .             . . . . .
+/// ```
+///
+/// Neighbours lie together so that few loads fetch them all. Aligned, so that it is loaded as one itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub(super) struct Descriptor(pub [u8; 16]);
 
 /// Columns and rows at the image's rim that have no descriptor: two for the window, one because the outermost pixels have no gradient.
 pub(super) const MARGIN: usize = 3;
-
-/// Where the horizontal gradient is sampled, (column, row) from the pixel: it tells disparities apart, so it has most samples.
-const DU: [(usize, usize); 12] = [(2, 0), (1, 1), (3, 1), (0, 2), (1, 2), (2, 2), (2, 2), (3, 2), (4, 2), (1, 3), (3, 3), (2, 4)];
-/// Where the vertical gradient is sampled.
-const DV: [(usize, usize); 4] = [(2, 1), (1, 2), (3, 2), (2, 3)];
 
 /// The gradients of one image.
 #[derive(Clone, Copy)]
@@ -31,53 +36,77 @@ pub(super) struct Gradients<'a> {
     pub height: usize,
 }
 
-impl Gradients<'_> {
+impl<'a> Gradients<'a> {
     /// Builds the descriptors of row `v` into `out`, which is as wide as the image. Those in the margin are left as they are; returns
     /// whether the row has descriptors at all.
-    #[expect(clippy::indexing_slicing, reason = "rows v - 2 ..= v + 2 exist; every slice is cut to n = width - 4 items, and i < n")]
     pub fn describe_row(&self, v: usize, out: &mut [Descriptor]) -> bool {
-        let (w, Some(n)) = (self.width, self.width.checked_sub(4)) else { return false };
-        if v < MARGIN || v + MARGIN >= self.height || out.len() < w {
+        let row = |image: &'a [u8], v: usize| image.get(v * self.width..(v + 1) * self.width).unwrap_or(&[]);
+        if v < MARGIN || v + MARGIN >= self.height || self.width < 2 * MARGIN || out.len() < self.width {
             return false;
         }
-        let a: [&[u8]; 12] = DU.map(|(du, dv)| &self.du[(v + dv - 2) * w + du..][..n]);
-        let b: [&[u8]; 4] = DV.map(|(du, dv)| &self.dv[(v + dv - 2) * w + du..][..n]);
-        let samples: [&[u8]; 16] = core::array::from_fn(|k| if k < 12 { a[k] } else { b[k - 12] });
-        let out = &mut out[2..][..n];
-        let mut i = 0;
-        while i + 16 <= n {
-            transpose(samples.map(|sample| bytes_16(&sample[i..])), &mut out[i..i + 16]);
-            i += 16;
-        }
-        for i in i..n {
-            out[i] = Descriptor(samples.map(|sample| sample[i]));
+        let rows = SampledRows {
+            du: [row(self.du, v - 1), row(self.du, v), row(self.du, v + 1)],
+            dv: [row(self.dv, v - 1), row(self.dv, v), row(self.dv, v + 1)],
+        };
+        let done = rows.describe_most(out);
+        for (u, out) in out.iter_mut().enumerate().take(self.width - MARGIN).skip(done.max(MARGIN)) {
+            *out = rows.describe(u);
         }
         true
     }
 }
 
-/// The first 16 bytes of a slice that has them.
-#[inline(always)]
-fn bytes_16(bytes: &[u8]) -> [u8; 16] {
-    bytes.first_chunk().copied().unwrap_or([0; 16])
+/// The gradients of the rows above, at and below the one described.
+struct SampledRows<'a> {
+    du: [&'a [u8]; 3],
+    dv: [&'a [u8]; 3],
 }
 
-/// Turns 16 samples of 16 pixels each into 16 descriptors, by interleaving halves four times.
-#[inline(always)]
-#[expect(clippy::indexing_slicing, reason = "k < 8, i < 16")]
-fn transpose(mut samples: [[u8; 16]; 16], out: &mut [Descriptor]) {
-    let interleave =
-        |a: &[u8; 16], b: &[u8; 16], half: usize| core::array::from_fn(|i| if i % 2 == 0 { a[half + i / 2] } else { b[half + i / 2] });
-    for _ in 0..4 {
-        let mut next = [[0; 16]; 16];
-        for k in 0..8 {
-            next[2 * k] = interleave(&samples[k], &samples[k + 8], 0);
-            next[2 * k + 1] = interleave(&samples[k], &samples[k + 8], 8);
+impl<'a> SampledRows<'a> {
+    /// Describes pixels from column 2 on, by words, until the words would reach beyond the row; returns where it stopped.
+    fn describe_most(&self, out: &mut [Descriptor]) -> usize {
+        let ([du_above, du_here, du_below], [dv_above, dv_here, dv_below]) = (self.du, self.dv);
+        let from = |row: &'a [u8], column: usize| row.get(column..).unwrap_or(&[]);
+        let words = du_here.array_windows::<8>();
+        let threes = [du_above, du_below, dv_here].map(|row| from(row, 1).array_windows::<4>());
+        let ones = [dv_above, dv_below].map(|row| from(row, 2).iter());
+        let ([above, below, beside], [up, down]) = (threes, ones);
+        let mut end = 2;
+        for (((out, five), (above, below)), (beside, (up, down))) in
+            out.iter_mut().skip(2).zip(words).zip(above.zip(below)).zip(beside.zip(up.zip(down)))
+        {
+            let three = |bytes: &[u8; 4]| u64::from(u32::from_le_bytes(*bytes) & 0xFF_FFFF);
+            let low = (u64::from_le_bytes(*five) & 0xFF_FFFF_FFFF) | three(above) << 40;
+            let high = three(below) | three(beside) << 24 | u64::from(*up) << 48 | u64::from(*down) << 56;
+            *out = Descriptor(bytemuck::cast([low.to_le_bytes(), high.to_le_bytes()]));
+            end += 1;
         }
-        samples = next;
+        end
     }
-    for (out, bytes) in out.iter_mut().zip(samples) {
-        out.0 = bytes;
+
+    /// Describes one pixel, two columns or more from either end of the row.
+    fn describe(&self, u: usize) -> Descriptor {
+        let ([du_above, du_here, du_below], [dv_above, dv_here, dv_below]) = (self.du, self.dv);
+        let at = |row: &[u8], u: usize| row.get(u).copied().unwrap_or(FLAT);
+        let (l, r) = (u - 1, u + 1);
+        Descriptor([
+            at(du_here, u - 2),
+            at(du_here, l),
+            at(du_here, u),
+            at(du_here, r),
+            at(du_here, u + 2),
+            at(du_above, l),
+            at(du_above, u),
+            at(du_above, r),
+            at(du_below, l),
+            at(du_below, u),
+            at(du_below, r),
+            at(dv_here, l),
+            at(dv_here, u),
+            at(dv_here, r),
+            at(dv_above, u),
+            at(dv_below, u),
+        ])
     }
 }
 
@@ -138,10 +167,13 @@ mod tests {
         let mut row = std::vec![Descriptor([0; 16]); width];
         assert!(!gradients.describe_row(2, &mut row) && !gradients.describe_row(6, &mut row));
         assert!(gradients.describe_row(4, &mut row));
+        let at = |image: &[u8], u: usize, v: usize| image[v * width + u];
         for u in MARGIN..width - MARGIN {
-            let at = |image: &[u8], (du, dv): (usize, usize)| image[(4 + dv - 2) * width + u + du - 2];
-            assert_eq!(row[u].0[..12], DU.map(|offset| at(&du, offset)));
-            assert_eq!(row[u].0[12..], DV.map(|offset| at(&dv, offset)));
+            let horizontal =
+                [(u - 2, 4), (u - 1, 4), (u, 4), (u + 1, 4), (u + 2, 4), (u - 1, 3), (u, 3), (u + 1, 3), (u - 1, 5), (u, 5), (u + 1, 5)];
+            let vertical = [(u - 1, 4), (u, 4), (u + 1, 4), (u, 3), (u, 5)];
+            assert_eq!(row[u].0[..11], horizontal.map(|(u, v)| at(&du, u, v)));
+            assert_eq!(row[u].0[11..], vertical.map(|(u, v)| at(&dv, u, v)));
         }
     }
 }
