@@ -94,12 +94,11 @@ impl DenseMatching<'_> {
     #[inline(always)]
     fn match_pixel<const LEFT: bool>(&self, point: &Descriptor, others: Candidates<'_>, listed: &[u8], plane: i16) -> i16 {
         // Energy above, disparity below: the least key is the least energy and, of equal ones, the smallest disparity.
-        let mut best = least_listed::<LEFT>(point, others, listed, self.cost.elsewhere);
         let mean = usize::from((plane & 255) as u8);
         let costs = if plane >= STEEP { &self.cost.about_steep } else { &self.cost.about_plane };
         let low = mean.saturating_sub(self.cost.radius);
         let costs = costs.get(low + self.cost.radius - mean..=2 * self.cost.radius).unwrap_or(&[]);
-        best = best.min(least_near::<LEFT>(point, others, low, costs));
+        let best = least_key::<LEFT>(point, others, listed, self.cost.elsewhere, low, costs);
         if best == u32::MAX {
             return NO_PLANE;
         }
@@ -141,22 +140,22 @@ impl<'a> Candidates<'a> {
     }
 }
 
-/// The least key among listed disparities. Never inlined, as all loops over distances here: on its own the compiler keeps the descriptor
-/// in one register, in the midst of others it takes it to pieces.
+/// The least key among listed disparities and those from `low` on, as many as there are costs. Never inlined, as all loops over distances
+/// here: on its own the compiler keeps the descriptor in one register, in the midst of others it takes it to pieces.
 #[inline(never)]
-fn least_listed<const LEFT: bool>(point: &Descriptor, others: Candidates<'_>, listed: &[u8], cost: u32) -> u32 {
+fn least_key<const LEFT: bool>(
+    point: &Descriptor,
+    others: Candidates<'_>,
+    listed: &[u8],
+    elsewhere: u32,
+    low: usize,
+    costs: &[u32],
+) -> u32 {
     let mut best = u32::MAX;
     for &d in listed {
         let Some(other) = others.at::<LEFT>(usize::from(d)) else { break };
-        best = best.min((distance(point, other) << 12) + (cost << 8) + u32::from(d));
+        best = best.min((distance(point, other) << 12) + (elsewhere << 8) + u32::from(d));
     }
-    best
-}
-
-/// The least key among disparities from `low` on, as many as there are costs.
-#[inline(never)]
-fn least_near<const LEFT: bool>(point: &Descriptor, others: Candidates<'_>, low: usize, costs: &[u32]) -> u32 {
-    let mut best = u32::MAX;
     for (i, cost) in costs.iter().enumerate() {
         let Some(other) = others.at::<LEFT>(low + i) else { break };
         best = best.min((distance(point, other) << 12) + (cost << 8) + (low + i) as u32);

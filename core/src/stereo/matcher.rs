@@ -66,9 +66,13 @@ const fn most_cells(capacity: &Capacity) -> usize {
     prior::cells(capacity.image_width, MIN_GRID_SIZE) * prior::cells(capacity.image_height, MIN_GRID_SIZE)
 }
 
+const fn at_least_one(length: usize) -> usize {
+    if length == 0 { 1 } else { length }
+}
+
 /// Entries of a region with one per pixel; one at least, so that there is an image to show before the first pair.
 const fn most_pixels(capacity: &Capacity) -> usize {
-    if capacity.pixels() == 0 { 1 } else { capacity.pixels() }
+    at_least_one(capacity.image_width) * at_least_one(capacity.image_height)
 }
 
 impl<'s> StereoMatcher<'s> {

@@ -21,7 +21,7 @@
 //! are refused.
 //!
 //! **Time.** Pixels x (5 + disparities in the grid cell, typically 15) descriptor distances for each image, and candidates x disparities
-//! x 4 for the support points. At KITTI size on one thread about two thirds of OpenCV's StereoSGBM in its fast mode (`cargo bench -p
+//! x 4 for the support points. At KITTI size on one thread about 0.6 times OpenCV's StereoSGBM in its fast mode (`cargo bench -p
 //! dynvox-core --bench stereo`). With two threads the image is worked on in four bands of rows; the bands are the same with one.
 //!
 //! **What can go wrong.** A pair without texture has no support points: [`StereoStatus::TooFewSupportPoints`]. Sky between trees is given

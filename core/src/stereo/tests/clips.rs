@@ -74,6 +74,6 @@ fn agrees_with_the_published_implementation_where_both_see() {
             "06 {frame}: {off:.2} % off by more than 3 px, {covered:.1} % covered, median {median:.3} px, density {:.3}",
             report.density()
         );
-        assert!(off < 6.0 && covered > 93.0 && median < 0.35);
+        assert!(off < 7.0 && covered > 95.0 && median < 0.35, "frame {frame}: {off:.2} %, {covered:.1} %, {median:.3} px");
     }
 }

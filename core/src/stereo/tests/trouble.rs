@@ -88,6 +88,17 @@ fn refused_pairs_are_named_and_leave_no_disparity() {
     });
 }
 
+#[test]
+fn a_room_without_width_or_height_refuses_every_pair() {
+    for (width, height) in [(0, 0), (40, 0), (0, 40)] {
+        with_matcher(&capacity(width, height), |matcher| {
+            let report = matcher.compute(&StereoConfig::default(), noise(40, 40, 1).view(), noise(40, 40, 1).view(), &Serial);
+            assert_eq!((report.status, report.valid), (StereoStatus::TooLarge, 0));
+            assert!(matcher.disparity_q8().rows().flatten().all(|&d| d == 0));
+        });
+    }
+}
+
 /// Configurations at the limits of what `validate` lets pass.
 fn extremes() -> Vec<StereoConfig> {
     let base = StereoConfig { support_texture: 0, match_texture: 0, median: true, ..StereoConfig::default() };
