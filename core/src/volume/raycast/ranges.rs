@@ -4,7 +4,7 @@
 //! may cover. Rays then begin right before the surface.
 
 use super::{
-    eye::{Extent, Eye},
+    eye::{AXES, Extent, Eye},
     signs::Layers,
     surface::Surface,
 };
@@ -15,9 +15,7 @@ use crate::{
 };
 
 /// Width of a tile, px, as a shift.
-pub(super) const TILE_SHIFT: usize = 3;
-/// Side of the eighth of a block, cells.
-const PART: usize = BLOCK_SIDE / 2;
+pub(super) const TILE_SHIFT: usize = 1;
 
 /// Depth ranges by tile: a tile is 8 px wide and one row high, for depth changes fast from row to row of a road.
 #[derive(Debug)]
@@ -46,6 +44,7 @@ impl<'s> Ranges<'s> {
     }
 
     /// Enters the crossed cells of all blocks in view.
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     pub fn find(&mut self, surface: &Surface<'_>, eye: &Eye, [near_m, far_m]: [f32; 2]) {
         self.columns = eye.width.div_ceil(1 << TILE_SHIFT);
         if let Some(tiles) = self.depth_m.get_mut(..self.columns * eye.height) {
@@ -53,14 +52,13 @@ impl<'s> Ranges<'s> {
         }
         for (block, cells) in surface.blocks() {
             for_each_box(cells, |low, high| {
-                let at = |axis: usize, c: usize| (block.get(axis).copied().unwrap_or(0) * BLOCK_SIDE as i32 + c as i32) as f32;
-                let bounds = [0, 1, 2].map(|axis| {
-                    let (low, high) = (low.get(axis).copied().unwrap_or(0), high.get(axis).copied().unwrap_or(0));
-                    (at(axis, low), at(axis, high))
-                });
-                let center = bounds.map(|(low, high)| 0.5 * (low + high));
-                // A hundredth of a cell more than the box, so that no rounding starts a ray behind its first cell.
-                let half = bounds.map(|(low, high)| 0.5 * (high - low) + 0.01);
+                let (mut center, mut half) = ([0.0; 3], [0.0; 3]);
+                for axis in AXES {
+                    let (low, high) = (low[axis] as f32, high[axis] as f32);
+                    center[axis] = (block[axis] * BLOCK_SIDE as i32) as f32 + 0.5 * (low + high);
+                    // A hundredth of a cell more than the box, so that no rounding starts a ray behind its first cell.
+                    half[axis] = 0.5 * (high - low) + 0.01;
+                }
                 if let Some(extent) = eye.extent(center, half, near_m, far_m) {
                     self.enter(&extent);
                 }
@@ -85,32 +83,27 @@ impl<'s> Ranges<'s> {
     }
 }
 
-/// Visits tight boxes around the cells set: from `low` to `high` in lattice points of the block.
-fn for_each_box(cells: &Layers, mut visit: impl FnMut([usize; 3], [usize; 3])) {
-    for (z, layers) in cells.as_chunks::<PART>().0.iter().enumerate() {
-        let all = layers.iter().fold(0, |all, layer| all | layer);
-        if all == 0 {
-            continue;
-        }
-        for quarter in 0..4 {
-            let (x, y) = (quarter & 1, quarter >> 1);
-            // The quarter's cells, moved to the low corner: 4 bits in each of 4 bytes.
-            let part = |layer: u64| (layer >> (PART * x + BLOCK_SIDE * PART * y)) as u32 & 0x0F0F_0F0F;
-            let seen = part(all);
-            if seen == 0 {
-                continue;
-            }
-            let half = seen | seen >> 16;
-            let columns = (half | half >> 8) & 0xF;
-            let first_z = layers.iter().position(|&layer| part(layer) != 0).unwrap_or(0);
-            let last_z = layers.iter().rposition(|&layer| part(layer) != 0).unwrap_or(PART - 1);
-            let low = [columns.trailing_zeros() as usize, seen.trailing_zeros() as usize / BLOCK_SIDE, first_z];
-            let high = [columns.ilog2() as usize, seen.ilog2() as usize / BLOCK_SIDE, last_z];
-            let base = [x * PART, y * PART, z * PART];
-            visit(
-                [base[0] + low[0], base[1] + low[1], base[2] + low[2]],
-                [base[0] + high[0] + 1, base[1] + high[1] + 1, base[2] + high[2] + 1],
-            );
+/// Visits tight boxes around the cells set, one for each 2 x 2 x 2 of them: from `low` to `high` in lattice points of the block.
+fn for_each_box(cells: &Layers, mut visit: impl FnMut([i32; 3], [i32; 3])) {
+    /// The first cell of each 2 x 2.
+    const CORNERS: u64 = 0x0055_0055_0055_0055;
+    for (z, &[lower, upper]) in (0i32..).step_by(2).zip(cells.as_chunks::<2>().0) {
+        let both = lower | upper;
+        let mut parts = (both | both >> 1 | both >> 8 | both >> 9) & CORNERS;
+        while parts != 0 {
+            let corner = parts.trailing_zeros();
+            parts &= parts - 1;
+            // Bits 0 and 1 are the first row, 8 and 9 the second.
+            let [lower, upper] = [lower, upper].map(|layer| (layer >> corner) as u32 & 0x0303);
+            let seen = lower | upper;
+            let [left, right] = [seen & 0x0101, seen & 0x0202].map(|bits| i32::from(bits != 0));
+            let [first, second] = [seen & 0x0003, seen & 0x0300].map(|bits| i32::from(bits != 0));
+            let [lower, upper] = [lower, upper].map(|bits| i32::from(bits != 0));
+            let base = [(corner & 7) as i32, (corner >> 3) as i32, z];
+            // An end without cells moves the box's wall in by one.
+            let low = [base[0] + 1 - left, base[1] + 1 - first, base[2] + 1 - lower];
+            let high = [base[0] + 1 + right, base[1] + 1 + second, base[2] + 1 + upper];
+            visit(low, high);
         }
     }
 }
