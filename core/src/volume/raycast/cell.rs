@@ -6,7 +6,7 @@ use crate::geometry::scalar::{max_f32, min_f32};
 /// Most steps towards a root; the first hits it where the field is linear.
 const MAX_REFINEMENTS: usize = 6;
 /// A root is good when the field is this near 0, in units of truncation / 32,767.
-const GOOD_ENOUGH: f32 = 2.0;
+const GOOD_ENOUGH: f32 = 8.0;
 
 /// The eight corners of a cell; corner `x + 2 y + 4 z`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -108,7 +108,7 @@ impl Passage {
                 } else if ray.crossing(axis, cell[axis] + 1) == depth {
                     1.0
                 } else {
-                    within(ray, axis, cell, depth_in_m(depth))
+                    within(ray, axis, cell[axis], depth_in_m(depth))
                 };
             }
         }
@@ -123,14 +123,10 @@ impl Passage {
         [x + (to_x - x) * share, y + (to_y - y) * share, z + (to_z - z) * share]
     }
 
-    /// Where the ray enters.
-    pub fn from(&self) -> [f32; 3] {
-        self.from
-    }
-
-    /// Where the ray leaves.
-    pub fn to(&self) -> [f32; 3] {
-        self.to
+    /// Where the ray enters, or where it leaves.
+    #[inline]
+    pub fn end(&self, leaves: bool) -> [f32; 3] {
+        if leaves { self.to } else { self.from }
     }
 
     /// The share of the way at which `field` falls from `first` > 0 to 0, where it ends at `last` <= 0: false position, which halves the
@@ -163,8 +159,8 @@ impl Passage {
 /// The ray's coordinate in a cell, held within it.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-pub(super) fn within(ray: &Ray, axis: usize, cell: [i32; 3], depth_m: f32) -> f32 {
-    let offset = ray.origin[axis] - cell[axis] as f32;
+pub(super) fn within(ray: &Ray, axis: usize, cell: i32, depth_m: f32) -> f32 {
+    let offset = ray.origin[axis] - cell as f32;
     min_f32(max_f32(offset + ray.slope[axis] * depth_m, 0.0), 1.0)
 }
 

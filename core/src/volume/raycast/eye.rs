@@ -203,11 +203,13 @@ impl Ray {
         cell
     }
 
-    /// Where the ray leaves a block.
+    /// Where the ray leaves a block, and across which axis.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn leaves(&self, block: [i32; 3]) -> Depth {
+    pub fn leaves(&self, block: [i32; 3]) -> (Depth, usize) {
         let out = |axis: usize| self.crossing(axis, (block[axis] + self.ahead(axis)) * BLOCK_SIDE as i32);
-        out(0).min(out(1)).min(out(2))
+        let (x, y, z) = (out(0), out(1), out(2));
+        let first = x.min(y).min(z);
+        (first, if x == first { 0 } else { 2 - usize::from(y == first) })
     }
 }

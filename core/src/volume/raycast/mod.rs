@@ -21,6 +21,7 @@ mod eye;
 mod march;
 mod ranges;
 mod signs;
+mod spot;
 mod surface;
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@
 
 use super::{
     eye::{AXES, Extent, Eye},
-    signs::Layers,
+    signs::Cells,
     surface::Surface,
 };
 use crate::{
@@ -84,10 +84,11 @@ impl<'s> Ranges<'s> {
 }
 
 /// Visits tight boxes around the cells set, one for each 2 x 2 x 2 of them: from `low` to `high` in lattice points of the block.
-fn for_each_box(cells: &Layers, mut visit: impl FnMut([i32; 3], [i32; 3])) {
+fn for_each_box(cells: &Cells, mut visit: impl FnMut([i32; 3], [i32; 3])) {
     /// The first cell of each 2 x 2.
     const CORNERS: u64 = 0x0055_0055_0055_0055;
-    for (z, &[lower, upper]) in (0i32..).step_by(2).zip(cells.as_chunks::<2>().0) {
+    for (z, [lower, upper]) in (0i32..).step_by(2).zip(cells.as_chunks::<2>().0) {
+        let (lower, upper) = (lower.crossed, upper.crossed);
         let both = lower | upper;
         let mut parts = (both | both >> 1 | both >> 8 | both >> 9) & CORNERS;
         while parts != 0 {

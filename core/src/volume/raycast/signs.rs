@@ -63,15 +63,18 @@ fn joined(points: [Layers; 8], join: impl Fn(u64, u64) -> u64) -> Layers {
     cells
 }
 
-/// Cells of a block, a bit each.
+/// The cells of a layer, a bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Cells {
+pub(super) struct CellLayer {
     /// Those the surface runs through: with a corner before it and one behind.
-    pub crossed: Layers,
+    pub crossed: u64,
     /// Those of which all corners were seen.
-    pub whole: Layers,
+    pub whole: u64,
 }
+
+/// The cells of a block.
+pub(super) type Cells = [CellLayer; BLOCK_SIDE];
 
 /// The cells of a block, given the signs of its points (0) and of those after it in x (1), y (2), z (4).
 pub(super) fn cells(signs: [&[Layers; 2]; 8]) -> Cells {
@@ -80,9 +83,14 @@ pub(super) fn cells(signs: [&[Layers; 2]; 8]) -> Cells {
         [*before, *behind] = **signs;
         seen.iter_mut().zip(before.iter().zip(behind.iter())).for_each(|(seen, (before, behind))| *seen = before | behind);
     }
-    let mut crossed = joined(before, |a, b| a | b);
-    crossed.iter_mut().zip(joined(behind, |a, b| a | b)).for_each(|(crossed, behind)| *crossed &= behind);
-    Cells { crossed, whole: joined(seen, |a, b| a & b) }
+    let before = joined(before, |a, b| a | b);
+    let behind = joined(behind, |a, b| a | b);
+    let whole = joined(seen, |a, b| a & b);
+    let mut cells = [CellLayer::default(); BLOCK_SIDE];
+    for (cells, ((before, behind), whole)) in cells.iter_mut().zip(before.into_iter().zip(behind).zip(whole)) {
+        *cells = CellLayer { crossed: before & behind, whole };
+    }
+    cells
 }
 
 #[cfg(test)]
@@ -113,8 +121,9 @@ mod tests {
                     before |= seen && sdf[block][voxel] > 0;
                     behind |= seen && sdf[block][voxel] <= 0;
                 }
-                let bit = |layers: &Layers| layers[cell >> 6] >> (cell & 63) & 1 == 1;
-                assert_eq!((bit(&cells.crossed), bit(&cells.whole)), (before && behind, whole));
+                let layer = cells[cell >> 6];
+                let bits = [layer.crossed, layer.whole].map(|layer| layer >> (cell & 63) & 1 == 1);
+                assert_eq!(bits, [before && behind, whole]);
             }
         }
     }

@@ -86,7 +86,7 @@ impl<'s> Surface<'s> {
         self.index(|_| true);
         self.read_signs(volume, min_weight, executor);
         self.join_neighbours(executor);
-        self.index(|cells| cells.crossed.iter().any(|&layer| layer != 0));
+        self.index(|cells| cells.iter().any(|layer| layer.crossed != 0));
         in_view
     }
 
@@ -216,21 +216,15 @@ impl<'s> Surface<'s> {
         }
     }
 
-    /// The cells of an entry.
+    /// The cells of an entry, and the slots around the last corner of its block.
     #[inline]
-    pub fn cells(&self, entry: usize) -> Option<&Cells> {
-        self.cells.get(entry)
+    pub fn block(&self, entry: usize) -> Option<(&Cells, &[u32; 8])> {
+        Some((self.cells.get(entry)?, self.slots.get(entry)?))
     }
 
-    /// The slots around the last corner of an entry's block.
-    #[inline]
-    pub fn slots(&self, entry: usize) -> Option<&[u32; 8]> {
-        self.slots.get(entry)
-    }
-
-    /// All blocks in view with their crossed cells, in slot order.
-    pub fn blocks(&self) -> impl Iterator<Item = ([i32; 3], &signs::Layers)> {
-        self.local.iter().copied().zip(self.cells.iter().map(|cells| &cells.crossed)).take(self.len)
+    /// All blocks in view with their cells, in slot order.
+    pub fn blocks(&self) -> impl Iterator<Item = ([i32; 3], &Cells)> {
+        self.local.iter().copied().zip(self.cells.iter()).take(self.len)
     }
 
     /// Blocks in use.

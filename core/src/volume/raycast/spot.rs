@@ -1,0 +1,133 @@
+//! A lattice point of a block in one word, so that a step, the block it leads to and a voxel are a few integer operations.
+
+/// A lattice point or cell of a block: `x + 32 y + 1024 z` with 8 added to each coordinate, from -1 (7) to 8 (16).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Spot {
+    at: u32,
+}
+
+/// Bits per coordinate.
+const FIELD: u32 = 5;
+/// One step along each axis.
+const UNITS: [u32; 3] = [1, 1 << FIELD, 1 << (2 * FIELD)];
+/// The bits set for coordinates from 0 to 7.
+const INSIDE: u32 = 8 * (1 | 1 << FIELD | 1 << (2 * FIELD));
+/// The bits set for a coordinate of 8: in the next block.
+const BEYOND: u32 = 2 * INSIDE;
+/// Steps from one voxel to the next along each axis.
+const VOXEL_STRIDES: [usize; 3] = [1, 8, 64];
+
+/// How a cell's walls across one axis are laid out.
+#[derive(Debug)]
+pub(super) struct Wall {
+    /// The other axes.
+    pub u: usize,
+    /// The other axes.
+    pub v: usize,
+    /// From the lower wall to the upper.
+    pub turn: u32,
+    /// From a wall's first corner to its last.
+    pub far: u32,
+    /// From voxel to voxel along `u`.
+    pub stride_u: usize,
+    /// From voxel to voxel along `v`.
+    pub stride_v: usize,
+}
+
+/// By axis.
+pub(super) static WALLS: [Wall; 3] = [wall(0, 1, 2), wall(1, 0, 2), wall(2, 0, 1)];
+
+#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
+const fn wall(axis: usize, u: usize, v: usize) -> Wall {
+    Wall { u, v, turn: UNITS[axis], far: UNITS[u] + UNITS[v], stride_u: VOXEL_STRIDES[u], stride_v: VOXEL_STRIDES[v] }
+}
+
+impl Wall {
+    /// One step along `v`.
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    pub fn turn_v(&self) -> u32 {
+        UNITS[self.v]
+    }
+}
+
+impl Spot {
+    /// From a cell's first corner to its last.
+    pub const FAR: u32 = UNITS[0] + UNITS[1] + UNITS[2];
+
+    /// A cell in its block.
+    #[inline(always)]
+    pub fn new(cell: [i32; 3]) -> Self {
+        Self { at: Self::steps(cell.map(|c| c as u32 & 7)) + INSIDE }
+    }
+
+    /// Steps along the axes as one number for [`Self::turned`].
+    #[inline(always)]
+    pub fn steps([x, y, z]: [u32; 3]) -> u32 {
+        x | y << FIELD | z << (2 * FIELD)
+    }
+
+    /// One step along an axis, upwards if `ahead` is 1, downwards if 0.
+    #[inline(always)]
+    pub fn turn(axis: usize, ahead: i32) -> u32 {
+        ((2 * ahead - 1) as u32) << (FIELD * axis as u32)
+    }
+
+    #[inline(always)]
+    pub fn turned(self, turn: u32) -> Self {
+        Self { at: self.at.wrapping_add(turn) }
+    }
+
+    /// Whether the last step led out of the block.
+    #[inline(always)]
+    pub fn is_outside(self) -> bool {
+        self.at & INSIDE != INSIDE
+    }
+
+    /// The coordinate along an axis, from -1 to 8.
+    #[inline(always)]
+    pub fn coordinate(self, axis: usize) -> i32 {
+        (self.at >> (FIELD * axis as u32) & 0x1F) as i32 - 8
+    }
+
+    /// The layer, below 8, and the bit of a cell in it.
+    #[inline(always)]
+    pub fn bit(self) -> (usize, u32) {
+        ((self.at >> (2 * FIELD) & 7) as usize, (self.at & 7) | (self.at >> (FIELD - 3) & 0x38))
+    }
+
+    /// The voxel in its block, below 512.
+    #[inline(always)]
+    pub fn voxel(self) -> usize {
+        ((self.at & 7) | (self.at >> (FIELD - 3) & 0x38) | (self.at >> (2 * FIELD - 6) & 0x1C0)) as usize
+    }
+
+    /// Which of the blocks around a block's last corner this point is in: 1 the next in x, 2 in y, 4 in z.
+    #[inline(always)]
+    pub fn block(self) -> usize {
+        ((self.at >> 4 & 1) | (self.at >> (FIELD + 3) & 2) | (self.at >> (2 * FIELD + 2) & 4)) as usize
+    }
+
+    #[inline(always)]
+    pub fn is_in_own_block(self) -> bool {
+        self.at & BEYOND == 0
+    }
+
+    /// Whether the point some steps on lies in the same block.
+    #[inline(always)]
+    pub fn shares_block(self, turn: u32) -> bool {
+        (self.at ^ (self.at + turn)) & BEYOND == 0
+    }
+
+    /// The corners of the cell.
+    #[inline(always)]
+    pub fn corners(self) -> [Self; 8] {
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|corner: u32| self.turned(Self::steps([corner & 1, corner >> 1 & 1, corner >> 2])))
+    }
+
+    /// The voxels of the corners, if they lie in one block.
+    #[inline(always)]
+    pub fn corner_voxels(self) -> [usize; 8] {
+        let first = self.voxel();
+        [0, 1, 8, 9, 64, 65, 72, 73].map(|stride| first + stride)
+    }
+}
