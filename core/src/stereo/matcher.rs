@@ -328,7 +328,12 @@ fn split_planes(gradients: &mut [u32], pixels: usize) -> [&mut [u8]; 4] {
 /// The gradients of both images.
 fn gradients(region: &[u32], width: usize, height: usize) -> [Gradients<'_>; 2] {
     let mut planes = bytemuck::cast_slice::<u32, u8>(region).chunks_exact(width * height);
-    [(); 2].map(|()| Gradients { du: planes.next().unwrap_or(&[]), dv: planes.next().unwrap_or(&[]), width, height })
+    [(); 2].map(|()| Gradients {
+        du: planes.next().unwrap_or(&[]),
+        dv: planes.next().unwrap_or(&[]),
+        width,
+        height,
+    })
 }
 
 /// Three arrays as one of triples.

@@ -80,7 +80,11 @@ impl Plane {
         let (bu, bv, bd) = (d(b.u, a.u), d(b.v, a.v), d(b.disparity, a.disparity));
         let (cu, cv, cd) = (d(c.u, a.u), d(c.v, a.v), d(c.disparity, a.disparity));
         let slope = |numerator: i64| (numerator * ONE).checked_div(bu * cv - bv * cu);
-        Some(Self { origin: a, slope_u: slope(bd * cv - bv * cd)?, slope_v: slope(bu * cd - bd * cu)? })
+        Some(Self {
+            origin: a,
+            slope_u: slope(bd * cv - bv * cd)?,
+            slope_v: slope(bu * cd - bd * cu)?,
+        })
     }
 
     /// Fills a run of row `v` from column `left`.
@@ -161,6 +165,11 @@ impl PlaneCost {
         for (i, cost) in about_plane.iter_mut().enumerate() {
             *cost = elsewhere - held(preference(i.abs_diff(radius))).min(elsewhere);
         }
-        Self { about_plane, about_steep: [elsewhere; 2 * MAX_PLANE_RADIUS + 1], elsewhere, radius }
+        Self {
+            about_plane,
+            about_steep: [elsewhere; 2 * MAX_PLANE_RADIUS + 1],
+            elsewhere,
+            radius,
+        }
     }
 }

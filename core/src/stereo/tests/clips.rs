@@ -9,7 +9,11 @@ fn data() -> PathBuf {
 
 pub(super) fn grey(path: &str) -> Option<Grey> {
     let image = image::open(data().join(path)).ok()?.into_luma8();
-    Some(Grey { width: image.width() as usize, height: image.height() as usize, pixels: image.into_raw() })
+    Some(Grey {
+        width: image.width() as usize,
+        height: image.height() as usize,
+        pixels: image.into_raw(),
+    })
 }
 
 fn deep(path: &str) -> Option<Vec<u16>> {

@@ -25,7 +25,11 @@ impl Executor for TwoThreads {
 
 fn noise(width: usize, height: usize, seed: u64) -> Grey {
     let mut random = Random::new(seed);
-    Grey { width, height, pixels: (0..width * height).map(|_| random.below(256) as u8).collect() }
+    Grey {
+        width,
+        height,
+        pixels: (0..width * height).map(|_| random.below(256) as u8).collect(),
+    }
 }
 
 fn flat(width: usize, height: usize, grey: u8) -> Grey {
@@ -105,12 +109,44 @@ fn extremes() -> Vec<StereoConfig> {
     vec![
         base,
         StereoConfig { disparity_max: 10, gap_width: 4_096, gap_discontinuity: u16::MAX, ..base },
-        StereoConfig { support_ratio: 1.0, plausible_min: 0, redundant_distance: 0, consistency_threshold: u16::MAX, ..base },
-        StereoConfig { plausible_threshold: u16::MAX, plausible_window: 16, redundant_threshold: u16::MAX, redundant_distance: 64, ..base },
+        StereoConfig {
+            support_ratio: 1.0,
+            plausible_min: 0,
+            redundant_distance: 0,
+            consistency_threshold: u16::MAX,
+            ..base
+        },
+        StereoConfig {
+            plausible_threshold: u16::MAX,
+            plausible_window: 16,
+            redundant_threshold: u16::MAX,
+            redundant_distance: 64,
+            ..base
+        },
         StereoConfig { candidate_step: 64, plausible_min: 1, grid_size: 256, ..base },
-        StereoConfig { grid_size: 10, beta: 1e-30, gamma: 1e-30, sigma: 1e-30, plane_radius_sigmas: 16.0, ..base },
-        StereoConfig { beta: 1e30, gamma: 1e30, sigma: 16.0, plane_radius_sigmas: 1.0, plane_slope_max: 1e3, ..base },
-        StereoConfig { plane_slope_max: 0.0, sigma: 1e30, plane_radius_sigmas: 0.0, speckle_similarity: u16::MAX, ..base },
+        StereoConfig {
+            grid_size: 10,
+            beta: 1e-30,
+            gamma: 1e-30,
+            sigma: 1e-30,
+            plane_radius_sigmas: 16.0,
+            ..base
+        },
+        StereoConfig {
+            beta: 1e30,
+            gamma: 1e30,
+            sigma: 16.0,
+            plane_radius_sigmas: 1.0,
+            plane_slope_max: 1e3,
+            ..base
+        },
+        StereoConfig {
+            plane_slope_max: 0.0,
+            sigma: 1e30,
+            plane_radius_sigmas: 0.0,
+            speckle_similarity: u16::MAX,
+            ..base
+        },
         StereoConfig { speckle_size: u32::MAX, ..base },
         StereoConfig { speckle_size: 0, gap_width: 0, adaptive_mean: false, ..base },
     ]
