@@ -14,11 +14,14 @@ pub enum DatasetError {
     /// The layout is none that is known.
     #[error(
         "{path} has no layout that is known here. Known are KITTI odometry (sequences/NN/image_0), KITTI tracking \
-         (training/image_02/NNNN) and a folder with left/, right/ and calib.txt; --dataset says which one is meant"
+         (training/image_02/NNNN) and a folder with left/, right/ and calib.txt; --dataset says which one is meant{}",
+        hint(below)
     )]
     Layout {
         /// Folder looked at.
         path: PathBuf,
+        /// Folders in it that have a known layout.
+        below: Vec<PathBuf>,
     },
     /// A part of the layout is missing.
     #[error("{path} is missing. {action}")]
@@ -142,6 +145,12 @@ pub enum DatasetError {
         /// Least side left, px.
         least: usize,
     },
+}
+
+/// Where to look instead.
+fn hint(below: &[PathBuf]) -> String {
+    let shown: Vec<String> = below.iter().map(|path| path.display().to_string()).collect();
+    if shown.is_empty() { String::new() } else { format!(". Below it, these look like data sets: {}", shown.join(", ")) }
 }
 
 /// Attaches the path to a failed read.

@@ -60,7 +60,7 @@ pub fn open_odometry(path: &Path, sequence: Option<&str>, images: Images) -> Res
 
 /// Opens a sequence of the tracking benchmark. `path` is its root, its `training` or `testing` folder.
 pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, DatasetError> {
-    let split = tracking_split(path).ok_or_else(|| DatasetError::Layout { path: path.to_path_buf() })?;
+    let split = tracking_split(path).ok_or_else(|| DatasetError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
     let names = tracking_sequences(&split)?;
     let name = chosen(path, sequence, &names)?;
     let action = "The tracking benchmark keeps left images in image_02/NNNN, right ones in image_03/NNNN: fetch what is missing";
@@ -150,7 +150,7 @@ fn chosen(root: &Path, wanted: Option<&str>, names: &[String]) -> Result<String,
             Err(DatasetError::Sequence { sequence: wanted.to_owned(), root: root.to_path_buf(), known })
         }
         (None, [only]) => Ok(only.clone()),
-        (None, []) => Err(DatasetError::Layout { path: root.to_path_buf() }),
+        (None, []) => Err(DatasetError::Layout { path: root.to_path_buf(), below: Vec::new() }),
         (None, _) => Err(DatasetError::Choice { root: root.to_path_buf(), known }),
     }
 }

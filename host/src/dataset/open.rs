@@ -3,6 +3,9 @@
 use super::{Dataset, DatasetError, Images, folder, kitti};
 use std::path::Path;
 
+/// Data sets named at most where a folder is none itself but holds some.
+const HINTS: usize = 8;
+
 /// The layouts that are known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
@@ -29,14 +32,21 @@ impl Kind {
         if !path.exists() {
             return Err(DatasetError::Absent { path: path.to_path_buf() });
         }
+        Self::of(path).ok_or_else(|| {
+            let entries = path.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
+            let mut below: Vec<_> = entries.filter(|folder| Self::of(folder).is_some()).take(HINTS).collect();
+            below.sort();
+            DatasetError::Layout { path: path.to_path_buf(), below }
+        })
+    }
+
+    fn of(path: &Path) -> Option<Self> {
         if kitti::odometry_root(path).is_some() || kitti::is_odometry_sequence(path) {
-            Ok(Self::KittiOdometry)
+            Some(Self::KittiOdometry)
         } else if kitti::tracking_split(path).is_some() {
-            Ok(Self::KittiTracking)
-        } else if folder::is_stereo_folder(path) {
-            Ok(Self::Folder)
+            Some(Self::KittiTracking)
         } else {
-            Err(DatasetError::Layout { path: path.to_path_buf() })
+            folder::is_stereo_folder(path).then_some(Self::Folder)
         }
     }
 }

@@ -197,6 +197,9 @@ fn what_is_not_there_or_not_a_data_set_is_said() {
     assert!(refusal(&root.path().join("nowhere"), None).contains("there is no data set at"));
     assert!(refusal(root.path(), Some("09")).contains("no sequence 09") && refusal(root.path(), Some("09")).contains("It holds 06"));
     assert!(refusal(&root.path().join("sequences/06"), Some("09")).contains("only 06"));
+    let above = TempDir::new().unwrap();
+    fs::create_dir_all(above.path().join("mine/left")).unwrap();
+    assert!(refusal(above.path(), None).ends_with("mine"), "a data set one level below is named");
     let empty = TempDir::new().unwrap();
     assert!(refusal(empty.path(), None).contains("--dataset says which one is meant"));
     fs::create_dir_all(empty.path().join("left")).unwrap();

@@ -3,16 +3,18 @@
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-/// Widest picture, px: wider ones are thinned out, so that the report stays small.
-const WIDEST_PX: usize = 640;
+/// Widest picture of a frame, px: wider ones are thinned out, so that the report stays small.
+pub const SMALL_PX: usize = 640;
+/// Widest picture of the whole map, px.
+pub const LARGE_PX: usize = 1_920;
 /// Pixels without a surface or a disparity.
 const EMPTY: [u8; 3] = [24, 26, 30];
 /// Where light comes from, in camera axes (x right, y down, z forward), length 1: behind the camera's left shoulder.
 const TO_LIGHT: [f32; 3] = [-0.36, -0.60, -0.714];
 
 /// A picture under construction: the sampled pixels, row by row.
-fn picture(width: usize, height: usize, pixel: impl Fn(usize, usize) -> [u8; 3]) -> Vec<u8> {
-    let step = width.div_ceil(WIDEST_PX).max(1);
+fn picture(widest_px: usize, width: usize, height: usize, pixel: impl Fn(usize, usize) -> [u8; 3]) -> Vec<u8> {
+    let step = width.div_ceil(widest_px).max(1);
     let (columns, rows) = (width.div_ceil(step), height.div_ceil(step));
     let pixels: Vec<u8> = (0..rows).flat_map(|v| (0..columns).map(move |u| (u, v))).flat_map(|(u, v)| pixel(u * step, v * step)).collect();
     let mut png = Vec::new();
@@ -26,14 +28,14 @@ fn picture(width: usize, height: usize, pixel: impl Fn(usize, usize) -> [u8; 3])
 
 /// The left image, in colour where there is one.
 pub fn input(grey: &View<'_, u8>, colour: Option<&View<'_, [u8; 3]>>) -> Vec<u8> {
-    picture(grey.width(), grey.height(), |u, v| {
+    picture(SMALL_PX, grey.width(), grey.height(), |u, v| {
         colour.and_then(|colour| colour.get(u, v)).or_else(|| grey.get(u, v).map(|grey| [grey; 3])).unwrap_or(EMPTY)
     })
 }
 
 /// Disparity as colours from blue (far) to red (near); `near_px` is red.
 pub fn disparity(disparity_q8: &View<'_, u16>, near_px: f32) -> Vec<u8> {
-    picture(disparity_q8.width(), disparity_q8.height(), |u, v| match disparity_q8.get(u, v) {
+    picture(SMALL_PX, disparity_q8.width(), disparity_q8.height(), |u, v| match disparity_q8.get(u, v) {
         Some(q8) if q8 > 0 => turbo(f32::from(q8) / f32::from(DISPARITY_ONE_PX) / near_px),
         _ => EMPTY,
     })
@@ -41,12 +43,13 @@ pub fn disparity(disparity_q8: &View<'_, u16>, near_px: f32) -> Vec<u8> {
 
 /// The map: its colours, or clay grey where it has none, lit from behind the camera.
 pub fn map(
+    widest_px: usize,
     depth_m: &View<'_, f32>,
     normal: &View<'_, [i8; 3]>,
     colour: &View<'_, [u8; 3]>,
     to_camera: impl Fn([f32; 3]) -> [f32; 3],
 ) -> Vec<u8> {
-    picture(depth_m.width(), depth_m.height(), |u, v| {
+    picture(widest_px, depth_m.width(), depth_m.height(), |u, v| {
         let (Some(depth), Some(normal), Some(colour)) = (depth_m.get(u, v), normal.get(u, v), colour.get(u, v)) else { return EMPTY };
         if depth <= 0.0 {
             return EMPTY;

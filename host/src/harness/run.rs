@@ -316,7 +316,7 @@ impl Course<'_, '_> {
                 frame,
                 input_png: pictures::input(&grey, input.as_ref()),
                 disparity_png,
-                raycast_png: pictures::map(&depth_m, &normal, &colour, into_camera(t_world_camera)),
+                raycast_png: pictures::map(pictures::SMALL_PX, &depth_m, &normal, &colour, into_camera(t_world_camera)),
             });
         }
         // The raycast's time belongs to the frame it looked from.
@@ -334,7 +334,7 @@ impl Course<'_, '_> {
         let (mapper, threads) = (&mut self.mapper, &self.threads);
         let Ok(seen) = threads.run(|| mapper.raycast(&t_world_camera, threads)) else { return Vec::new() };
         let (Some(depth_m), Some(normal), Some(colour)) = (seen.depth_m(), seen.normal(), seen.colour()) else { return Vec::new() };
-        pictures::map(&depth_m, &normal, &colour, into_camera(&t_world_camera))
+        pictures::map(pictures::LARGE_PX, &depth_m, &normal, &colour, into_camera(&t_world_camera))
     }
 
     fn mesh(&self, folder: &RunFolder) -> Result<Mesh, RunError> {
