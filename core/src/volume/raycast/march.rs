@@ -121,20 +121,14 @@ impl<'a> Marcher<'a, '_> {
             let (layer, bit) = spot.bit();
             if here.cells[layer].crossed >> bit & 1 == 1 && to > from {
                 let step = Step { spot, from, to };
-                let first = if progress.last_depth == from {
-                    // Taken over from the cell before: should the two have guessed differently at a corner never seen, no ray slips through.
-                    progress.last_value
-                } else if entered == NO_AXIS {
-                    self.value_within(here, step)
-                } else {
-                    self.wall_value(here, step, entered, from, 1 - ray.ahead(entered) as u32)
-                };
                 let last = self.wall_value(here, step, axis, to, ray.ahead(axis) as u32);
-                if first > 0.0
-                    && last <= 0.0
-                    && let Some(crossing) = self.crossing(here, step, first, last)
-                {
-                    return Some(crossing);
+                if last <= 0.0 {
+                    let first = self.first_value(here, step, entered, progress);
+                    if first > 0.0
+                        && let Some(crossing) = self.crossing(here, step, first, last)
+                    {
+                        return Some(crossing);
+                    }
                 }
                 (progress.last_value, progress.last_depth) = (last, to);
             }
@@ -203,10 +197,17 @@ impl<'a> Marcher<'a, '_> {
         Some(corners)
     }
 
-    /// The field where the march begins, within a cell; 0, which stops no ray, where nothing tells it.
+    /// The field where the ray enters a cell.
     #[inline(never)]
-    fn value_within(&self, here: &Here<'_>, step: Step) -> f32 {
-        self.guessed_value(here, step, step.from)
+    fn first_value(&self, here: &Here<'_>, step: Step, entered: usize, progress: &Progress) -> f32 {
+        if progress.last_depth == step.from {
+            // Taken over from the cell before: should the two have guessed differently at a corner never seen, no ray slips through.
+            progress.last_value
+        } else if entered == NO_AXIS {
+            self.guessed_value(here, step, step.from)
+        } else {
+            self.wall_value(here, step, entered, step.from, 1 - here.ray.ahead(entered) as u32)
+        }
     }
 
     /// The field where the ray enters or leaves a cell, corners guessed where they were not seen; 0, which stops no ray, where nothing tells it.
