@@ -1,6 +1,6 @@
 //! One cell of the lattice as a ray meets it: the trilinear field between its corners.
 
-use super::eye::{AXES, Depth, Ray, depth_in_m};
+use super::eye::{AXES, Ray};
 use crate::geometry::scalar::{max_f32, min_f32};
 
 /// Most steps towards a root; the first hits it where the field is linear.
@@ -20,34 +20,38 @@ pub(super) struct Corners {
 impl Corners {
     /// Gives unseen corners the value of the plane through the seen ones, its slope along each axis the mean over the edges with both
     /// ends seen. Exact for a plane, hence no bias to either side. `None` when no edge tells the slope along some axis.
-    pub fn complete(mut self) -> Option<Self> {
-        if self.seen == u8::MAX {
-            return Some(self);
-        }
-        let seen = self.seen;
-        let is_seen = |corner: usize| seen >> corner & 1 == 1;
-        let mut slope = [0.0; 3];
-        for (axis, slope) in slope.iter_mut().enumerate() {
+    #[expect(clippy::indexing_slicing, reason = "corners are below 8")]
+    pub fn complete(&self) -> Option<[f32; 8]> {
+        let mut known = [0.0; 8];
+        (0..).zip(&mut known).for_each(|(corner, known)| *known = f32::from(self.seen >> corner & 1));
+        let slope = |low: [usize; 4], step: usize| {
             let (mut sum, mut edges) = (0.0, 0.0);
-            for (corner, low) in self.sdf.iter().enumerate().filter(|(corner, _)| corner >> axis & 1 == 0) {
-                let high = corner | 1 << axis;
-                if let (true, true, Some(high)) = (is_seen(corner), is_seen(high), self.sdf.get(high)) {
-                    sum += high - low;
-                    edges += 1.0;
-                }
+            for low in low {
+                let both = known[low] * known[low + step];
+                sum += both * (self.sdf[low + step] - self.sdf[low]);
+                edges += both;
             }
-            if edges == 0.0 {
-                return None;
-            }
-            *slope = sum / edges;
+            (sum, edges)
+        };
+        let (x, edges_x) = slope([0, 2, 4, 6], 1);
+        let (y, edges_y) = slope([0, 1, 4, 5], 2);
+        let (z, edges_z) = slope([0, 1, 2, 3], 4);
+        if edges_x == 0.0 || edges_y == 0.0 || edges_z == 0.0 {
+            return None;
         }
-        let rise = |corner: usize| (0..).zip(slope).filter(|(axis, _)| corner >> axis & 1 == 1).fold(0.0, |sum, (_, slope)| sum + slope);
-        let known = self.sdf.iter().enumerate().filter(|(corner, _)| is_seen(*corner));
-        let (sum, count) = known.fold((0.0, 0.0), |(sum, count), (corner, sdf)| (sum + (sdf - rise(corner)), count + 1.0));
-        for (corner, sdf) in self.sdf.iter_mut().enumerate().filter(|(corner, _)| !is_seen(*corner)) {
-            *sdf = sum / count + rise(corner);
+        let (x, y, z) = (x / edges_x, y / edges_y, z / edges_z);
+        let rise = [0.0, x, y, x + y, z, x + z, y + z, x + y + z];
+        let (mut sum, mut count) = (0.0, 0.0);
+        for ((known, sdf), rise) in known.iter().zip(self.sdf).zip(rise) {
+            sum += known * (sdf - rise);
+            count += known;
         }
-        Some(self)
+        let base = sum / count;
+        let mut all = self.sdf;
+        for ((sdf, known), rise) in all.iter_mut().zip(known).zip(rise) {
+            *sdf = if known == 0.0 { base + rise } else { *sdf };
+        }
+        Some(all)
     }
 }
 
@@ -95,24 +99,23 @@ pub(super) struct Passage {
     to: [f32; 3],
 }
 
+/// In place of an axis: within a cell, not on a wall.
+pub(super) const NO_AXIS: usize = 3;
+
 impl Passage {
-    /// The way through `cell` between two depths. Coordinates on a wall are exactly 0 or 1.
-    #[inline]
+    /// The way between two depths through a cell that the ray enters and leaves across `axes` ([`NO_AXIS`] where it begins within), given
+    /// where the ray would be at depth 0 from the cell's first corner. Coordinates on these walls are exactly 0 or 1.
+    #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn new(ray: &Ray, cell: [i32; 3], depths: [Depth; 2]) -> Self {
-        let mut ends = [[0.0; 3]; 2];
-        for (end, depth) in ends.iter_mut().zip(depths) {
-            for axis in AXES {
-                end[axis] = if ray.crossing(axis, cell[axis]) == depth {
-                    0.0
-                } else if ray.crossing(axis, cell[axis] + 1) == depth {
-                    1.0
-                } else {
-                    within(ray, axis, cell[axis], depth_in_m(depth))
-                };
-            }
+    pub fn new(ray: &Ray, offset: [f32; 3], depths_m: [f32; 2], axes: [usize; 2]) -> Self {
+        let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
+        for axis in AXES {
+            let ahead = ray.ahead[axis] as f32;
+            let enters = within(offset[axis], ray.slope[axis], depths_m[0]);
+            let leaves = within(offset[axis], ray.slope[axis], depths_m[1]);
+            from[axis] = if axes[0] == axis { 1.0 - ahead } else { enters };
+            to[axis] = if axes[1] == axis { ahead } else { leaves };
         }
-        let [from, to] = ends;
         Self { from, to }
     }
 
@@ -156,12 +159,10 @@ impl Passage {
     }
 }
 
-/// The ray's coordinate in a cell, held within it.
+/// The coordinate in a cell of a ray that begins `offset` from its first corner, held within the cell.
 #[inline(always)]
-#[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-pub(super) fn within(ray: &Ray, axis: usize, cell: i32, depth_m: f32) -> f32 {
-    let offset = ray.origin[axis] - cell as f32;
-    min_f32(max_f32(offset + ray.slope[axis] * depth_m, 0.0), 1.0)
+pub(super) fn within(offset: f32, slope: f32, depth_m: f32) -> f32 {
+    min_f32(max_f32(offset + slope * depth_m, 0.0), 1.0)
 }
 
 /// The trilinear mean of the corners at a point: the field's value, for one look.
@@ -216,7 +217,7 @@ mod tests {
             let sdf = core::array::from_fn(|corner| if seen >> corner & 1 == 1 { plane(corner) } else { 9_999.0 });
             if let Some(corners) = (Corners { sdf, seen }).complete() {
                 told += 1;
-                corners.sdf.iter().zip(whole).for_each(|(sdf, whole)| assert!((sdf - whole).abs() < 1e-3));
+                corners.iter().zip(whole).for_each(|(sdf, whole)| assert!((sdf - whole).abs() < 1e-3));
             }
         }
         assert!(told > 100, "{told} of 256");

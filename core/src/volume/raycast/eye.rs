@@ -118,12 +118,13 @@ impl Eye {
     pub fn ray(&self, u: usize, v: usize) -> Ray {
         let [corner, column, row] = self.rays;
         let (u, v) = (u as f32, v as f32);
-        let mut ray = Ray { origin: self.origin, slope: [0.0; 3], zero: [0; 3], per_plane: [0; 3] };
+        let mut ray = Ray { origin: self.origin, slope: [0.0; 3], zero: [0; 3], per_plane: [0; 3], ahead: [0; 3] };
         for axis in AXES {
             let exact = corner[axis] + row[axis] * v + column[axis] * u;
             let slope = if exact > -LEAST_SLOPE && exact < LEAST_SLOPE { LEAST_SLOPE } else { exact };
             let per_plane = f64::from(1.0 / slope) * DEPTH_ONE_M;
             ray.slope[axis] = slope;
+            ray.ahead[axis] = i32::from(slope > 0.0);
             ray.per_plane[axis] = per_plane as i64;
             ray.zero[axis] = (per_plane * f64::from(-self.origin[axis])) as i64;
         }
@@ -163,6 +164,8 @@ pub(super) struct Ray {
     zero: [Depth; 3],
     /// Depth from plane to plane, negative where the ray runs towards smaller coordinates.
     per_plane: [Depth; 3],
+    /// 1 where the ray runs towards larger coordinates, so that it leaves a cell by the upper wall; else 0.
+    pub ahead: [i32; 3],
 }
 
 impl Ray {
@@ -173,18 +176,19 @@ impl Ray {
         self.zero[axis] + i64::from(plane) * self.per_plane[axis]
     }
 
-    /// 1 where the ray runs towards larger coordinates, so that it leaves a cell by the upper wall; else 0.
-    #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn ahead(&self, axis: usize) -> i32 {
-        i32::from(self.per_plane[axis] > 0)
-    }
-
     /// Depth from plane to plane, positive.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     pub fn stride(&self, axis: usize) -> Depth {
         self.per_plane[axis].abs()
+    }
+
+    /// Where the ray, at depth 0, would be from the first cell of a block, in lattice units.
+    #[inline(always)]
+    pub fn offset(&self, block: [i32; 3]) -> [f32; 3] {
+        let side = BLOCK_SIDE as i32;
+        let [x, y, z] = self.origin;
+        [x - (block[0] * side) as f32, y - (block[1] * side) as f32, z - (block[2] * side) as f32]
     }
 
     /// The cell in which the ray is just after `depth`: all planes crossed up to there are behind it.
@@ -195,7 +199,7 @@ impl Ray {
         let mut cell = [0; 3];
         for axis in AXES {
             let guess = floor_i32(self.origin[axis] + self.slope[axis] * depth_m);
-            let ahead = self.ahead(axis);
+            let ahead = self.ahead[axis];
             let late = i32::from(self.crossing(axis, guess + ahead) <= depth);
             let early = i32::from(self.crossing(axis, guess + 1 - ahead) > depth);
             cell[axis] = guess + (late - early) * (2 * ahead - 1);
@@ -203,11 +207,19 @@ impl Ray {
         cell
     }
 
+    /// The depths at which the ray leaves a cell along each axis.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    pub fn exits(&self, cell: [i32; 3]) -> [Depth; 3] {
+        let exit = |axis: usize| self.crossing(axis, cell[axis] + self.ahead[axis]);
+        [exit(0), exit(1), exit(2)]
+    }
+
     /// Where the ray leaves a block, and across which axis.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     pub fn leaves(&self, block: [i32; 3]) -> (Depth, usize) {
-        let out = |axis: usize| self.crossing(axis, (block[axis] + self.ahead(axis)) * BLOCK_SIDE as i32);
+        let out = |axis: usize| self.crossing(axis, (block[axis] + self.ahead[axis]) * BLOCK_SIDE as i32);
         let (x, y, z) = (out(0), out(1), out(2));
         let first = x.min(y).min(z);
         (first, if x == first { 0 } else { 2 - usize::from(y == first) })

@@ -1,8 +1,8 @@
 //! One ray's way to the surface.
 
 use super::{
-    cell::{Corners, Field, Passage, mean, shares, within},
-    eye::{AXES, Depth, Eye, Ray, depth_from_m, depth_in_m},
+    cell::{Corners, Field, NO_AXIS, Passage, mean, shares, within},
+    eye::{Depth, Eye, Ray, depth_from_m, depth_in_m},
     signs::Cells,
     spot::{Spot, WALLS},
     surface::Surface,
@@ -13,8 +13,6 @@ use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks};
 const MAX_BLOCKS: usize = 6 * super::eye::MAX_REACH_BLOCKS as usize;
 /// Most cells a ray passes in one block.
 const MAX_CELLS: usize = 3 * BLOCK_SIDE;
-/// In place of an axis: within a cell, not on a wall.
-const NO_AXIS: usize = 3;
 
 /// What a ray met.
 #[derive(Clone, Copy, Debug)]
@@ -36,24 +34,42 @@ pub(super) struct Marcher<'a, 's> {
 }
 
 /// A block that a ray is in.
-#[derive(Clone, Copy)]
 struct Here<'a> {
     ray: &'a Ray,
-    cells: &'a Cells,
     /// The slots of the block (0) and of those after it.
     slots: &'a [u32; 8],
     /// Distances of the block.
     sdf: &'a [i16; BLOCK_VOXELS],
-    /// Its first cell.
-    base: [i32; 3],
+    /// Where the ray would be at depth 0, from the block's first cell.
+    offset: [f32; 3],
 }
 
-/// A ray's way through one cell.
+impl Here<'_> {
+    /// Where the ray would be at depth 0, from a cell's first corner.
+    #[inline(always)]
+    fn offset(&self, spot: Spot) -> [f32; 3] {
+        let [x, y, z] = self.offset;
+        [x - spot.coordinate(0) as f32, y - spot.coordinate(1) as f32, z - spot.coordinate(2) as f32]
+    }
+}
+
+/// A ray's way through one crossed cell.
 #[derive(Clone, Copy)]
 struct Step {
     spot: Spot,
+    /// Whether all corners were seen.
+    whole: bool,
     from: Depth,
     to: Depth,
+    /// The axes across which the ray enters, or [`NO_AXIS`], and leaves.
+    axes: [usize; 2],
+}
+
+/// The field where a ray left the last crossed cell, and the depth of that place.
+#[derive(Clone, Copy, Default)]
+struct Trail {
+    value: f32,
+    depth: Depth,
 }
 
 /// Where the surface was met.
@@ -67,90 +83,93 @@ struct Crossing<'a> {
     depth_m: f32,
 }
 
-/// How far a ray has come.
-struct Progress {
-    cell: [i32; 3],
-    depth: Depth,
-    /// The axis across which the ray entered the cell, or [`NO_AXIS`].
-    axis: usize,
-    /// The field where the ray left the last crossed cell, and the depth of that place.
-    last_value: f32,
-    last_depth: Depth,
-}
-
-impl<'a> Marcher<'a, '_> {
+impl Marcher<'_, '_> {
     /// The first place between two depths at which the ray comes from seen free space through the surface.
     #[inline]
+    #[expect(clippy::indexing_slicing, reason = "a layer is below 8, axes are below 3")]
     pub fn cast(&self, u: usize, v: usize, [from_m, to_m]: [f32; 2]) -> Option<Hit> {
-        let ray = self.eye.ray(u, v);
-        let (from, to) = (depth_from_m(from_m), depth_from_m(to_m));
-        let mut progress = Progress { cell: ray.cell_at(from), depth: from, axis: NO_AXIS, last_value: 0.0, last_depth: 0 };
+        let ray = &self.eye.ray(u, v);
+        let (mut from, last) = (depth_from_m(from_m), depth_from_m(to_m));
+        let [turn_x, turn_y, turn_z] = [Spot::turn(0, ray.ahead[0]), Spot::turn(1, ray.ahead[1]), Spot::turn(2, ray.ahead[2])];
+        let [stride_x, stride_y, stride_z] = [ray.stride(0), ray.stride(1), ray.stride(2)];
+        let (mut block, mut spot, [mut next_x, mut next_y, mut next_z]) = begin(ray, from);
+        let mut entered = NO_AXIS;
+        let mut trail = Trail::default();
         for _ in 0..MAX_BLOCKS {
-            let block = progress.cell.map(|c| c >> 3);
-            if let Some(entry) = self.surface.entry(block) {
-                let (cells, slots) = self.surface.block(entry)?;
-                let here = Here { ray: &ray, cells, slots, sdf: self.blocks.sdf(slots[0])?, base: progress.cell.map(|c| c & !7) };
-                if let Some(crossing) = self.through_block(&here, &mut progress) {
-                    return (crossing.depth_m <= to_m).then(|| self.hit(&crossing));
+            let Some(entry) = self.surface.entry(block) else {
+                (from, entered) = ray.leaves(block);
+                if from > last {
+                    return None;
                 }
-            } else {
-                (progress.depth, progress.axis) = ray.leaves(block);
-                progress.cell = ray.cell_at(progress.depth);
+                (block, spot, [next_x, next_y, next_z]) = begin(ray, from);
+                continue;
+            };
+            let (cells, slots) = self.surface.block(entry)?;
+            let here = Here { ray, slots, sdf: self.blocks.sdf(slots[0])?, offset: ray.offset(block) };
+            for _ in 0..MAX_CELLS {
+                let to = next_x.min(next_y).min(next_z);
+                let (by_x, by_y) = (next_x == to, next_y == to);
+                let axis = if by_x { 0 } else { 2 - usize::from(by_y) };
+                let (layer, bit) = spot.bit();
+                let layer = &cells[layer];
+                if layer.crossed >> bit & 1 == 1 && to > from {
+                    let step = Step { spot, whole: layer.whole >> bit & 1 == 1, from, to, axes: [entered, axis] };
+                    if let Some(crossing) = self.through(&here, step, &mut trail) {
+                        return (crossing.depth_m <= to_m).then(|| self.hit(&crossing));
+                    }
+                }
+                next_x += if by_x { stride_x } else { 0 };
+                next_y += if axis == 1 { stride_y } else { 0 };
+                next_z += if axis == 2 { stride_z } else { 0 };
+                spot = spot.turned(if by_x {
+                    turn_x
+                } else if by_y {
+                    turn_y
+                } else {
+                    turn_z
+                });
+                (from, entered) = (to, axis);
+                if spot.is_outside() {
+                    break;
+                }
             }
-            if progress.depth > to {
+            if from > last {
                 return None;
             }
+            let (moved, arrived) = spot.arrived();
+            block = [block[0] + moved[0], block[1] + moved[1], block[2] + moved[2]];
+            spot = arrived;
         }
         None
     }
 
-    /// Walks the cells of a block, to the surface or to where the ray leaves it.
-    #[inline]
-    #[expect(clippy::indexing_slicing, reason = "axes are below 3; a layer is below 8")]
-    fn through_block<'h>(&self, here: &Here<'h>, progress: &mut Progress) -> Option<Crossing<'h>> {
-        let ray = here.ray;
-        let mut spot = Spot::new(progress.cell);
-        let [turn_x, turn_y, turn_z] = AXES.map(|axis| Spot::turn(axis, ray.ahead(axis)));
-        let [stride_x, stride_y, stride_z] = AXES.map(|axis| ray.stride(axis));
-        let [mut next_x, mut next_y, mut next_z] = AXES.map(|axis| ray.crossing(axis, progress.cell[axis] + ray.ahead(axis)));
-        let (mut from, mut entered) = (progress.depth, progress.axis);
-        for _ in 0..MAX_CELLS {
-            let to = next_x.min(next_y).min(next_z);
-            let (by_x, by_y) = (next_x == to, next_y == to);
-            let axis = if by_x { 0 } else { 2 - usize::from(by_y) };
-            let (layer, bit) = spot.bit();
-            if here.cells[layer].crossed >> bit & 1 == 1 && to > from {
-                let step = Step { spot, from, to };
-                let last = self.wall_value(here, step, axis, to, ray.ahead(axis) as u32);
-                if last <= 0.0 {
-                    let first = self.first_value(here, step, entered, progress);
-                    if first > 0.0
-                        && let Some(crossing) = self.crossing(here, step, first, last)
-                    {
-                        return Some(crossing);
-                    }
-                }
-                (progress.last_value, progress.last_depth) = (last, to);
-            }
-            let (add_x, add_y, add_z, turn) = if by_x {
-                (stride_x, 0, 0, turn_x)
-            } else if by_y {
-                (0, stride_y, 0, turn_y)
-            } else {
-                (0, 0, stride_z, turn_z)
-            };
-            next_x += add_x;
-            next_y += add_y;
-            next_z += add_z;
-            spot = spot.turned(turn);
-            (from, entered) = (to, axis);
-            if spot.is_outside() {
-                break;
-            }
+    /// Looks for the surface in a crossed cell: the field must fall from above 0 to 0 or below.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    fn through<'h>(&self, here: &Here<'h>, step: Step, trail: &mut Trail) -> Option<Crossing<'h>> {
+        let axis = step.axes[1];
+        let last = self.wall_value(here, step, axis, step.to, here.ray.ahead[axis] as u32);
+        let before = core::mem::replace(trail, Trail { value: last, depth: step.to });
+        if last > 0.0 {
+            return None;
         }
-        progress.cell = AXES.map(|axis| here.base[axis] + spot.coordinate(axis));
-        (progress.depth, progress.axis) = (from, entered);
-        None
+        let first = self.first_value(here, step, before);
+        if first > 0.0 { self.crossing(here, step, first, last) } else { None }
+    }
+
+    /// The field where the ray enters a cell.
+    #[inline(never)]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+    fn first_value(&self, here: &Here<'_>, step: Step, before: Trail) -> f32 {
+        let axis = step.axes[0];
+        if before.depth == step.from {
+            // Taken over from the cell before: should the two have guessed differently at a corner never seen, no ray slips through.
+            before.value
+        } else if axis == NO_AXIS {
+            self.guessed_value(here, step, step.from)
+        } else {
+            self.wall_value(here, step, axis, step.from, 1 - here.ray.ahead[axis] as u32)
+        }
     }
 
     /// The field on a wall of a cell, lower (0) or upper (1) on an axis, where the ray passes it at `depth`: the mean of its four corners if
@@ -160,21 +179,20 @@ impl<'a> Marcher<'a, '_> {
     fn wall_value(&self, here: &Here<'_>, step: Step, axis: usize, depth: Depth, upper: u32) -> f32 {
         let wall = &WALLS[axis];
         let corner = step.spot.turned(upper * wall.turn);
-        let (layer, bit) = step.spot.bit();
-        let whole = here.cells[layer].whole >> bit & 1 == 1;
-        let [a, b, c, d] = if whole && corner.shares_block(wall.far) {
+        let [a, b, c, d] = if step.whole && corner.shares_block(wall.far) {
             let slot_sdf = if corner.is_in_own_block() { Some(here.sdf) } else { self.blocks.sdf(here.slots[corner.block() & 7]) };
             let Some(sdf) = slot_sdf else { return 0.0 };
             let voxel = corner.voxel();
-            [0, wall.stride_u, wall.stride_v, wall.stride_u + wall.stride_v].map(|stride| f32::from(sdf[(voxel + stride) & 511]))
+            let value = |stride: usize| f32::from(sdf[(voxel + stride) & 511]);
+            [value(0), value(wall.stride_u), value(wall.stride_v), value(wall.stride_u + wall.stride_v)]
         } else {
-            match self.wall_corners(here, corner, axis, whole) {
+            match self.wall_corners(here, corner, axis, step.whole) {
                 Some(corners) => corners,
                 None => return self.guessed_value(here, step, depth),
             }
         };
         let depth_m = depth_in_m(depth);
-        let at = |axis: usize| within(here.ray, axis, here.base[axis] + step.spot.coordinate(axis), depth_m);
+        let at = |axis: usize| within(here.offset[axis] - step.spot.coordinate(axis) as f32, here.ray.slope[axis], depth_m);
         let (at_u, at_v) = (at(wall.u), at(wall.v));
         let (low, high) = (a + (b - a) * at_u, c + (d - c) * at_u);
         low + (high - low) * at_v
@@ -186,7 +204,7 @@ impl<'a> Marcher<'a, '_> {
     fn wall_corners(&self, here: &Here<'_>, corner: Spot, axis: usize, whole: bool) -> Option<[f32; 4]> {
         let wall = &WALLS[axis];
         let mut corners = [0.0; 4];
-        for (value, turn) in corners.iter_mut().zip([0, wall.far - wall.turn_v(), wall.turn_v(), wall.far]) {
+        for (value, turn) in corners.iter_mut().zip([0, wall.far - wall.turn_v, wall.turn_v, wall.far]) {
             let point = corner.turned(turn);
             let slot = here.slots[point.block() & 7];
             if !whole && !self.is_seen(slot, point.voxel()) {
@@ -197,40 +215,21 @@ impl<'a> Marcher<'a, '_> {
         Some(corners)
     }
 
-    /// The field where the ray enters a cell.
-    #[inline(never)]
-    fn first_value(&self, here: &Here<'_>, step: Step, entered: usize, progress: &Progress) -> f32 {
-        if progress.last_depth == step.from {
-            // Taken over from the cell before: should the two have guessed differently at a corner never seen, no ray slips through.
-            progress.last_value
-        } else if entered == NO_AXIS {
-            self.guessed_value(here, step, step.from)
-        } else {
-            self.wall_value(here, step, entered, step.from, 1 - here.ray.ahead(entered) as u32)
-        }
-    }
-
     /// The field where the ray enters or leaves a cell, corners guessed where they were not seen; 0, which stops no ray, where nothing tells it.
     #[inline(never)]
     fn guessed_value(&self, here: &Here<'_>, step: Step, depth: Depth) -> f32 {
-        let Some(corners) = self.corners(here, step.spot) else { return 0.0 };
-        mean(&corners, self.passage(here, step).end(depth == step.to))
-    }
-
-    #[inline]
-    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    fn passage(&self, here: &Here<'_>, step: Step) -> Passage {
-        Passage::new(here.ray, AXES.map(|axis| here.base[axis] + step.spot.coordinate(axis)), [step.from, step.to])
+        let Some(corners) = self.corners(here, step) else { return 0.0 };
+        mean(&corners, passage(here, step).end(depth == step.to))
     }
 
     /// The place in a cell at which the field falls to 0.
     #[inline(never)]
     fn crossing<'h>(&self, here: &Here<'h>, step: Step, first: f32, last: f32) -> Option<Crossing<'h>> {
-        let field = Field::new(&self.corners(here, step.spot)?);
-        let passage = self.passage(here, step);
+        let field = Field::new(&self.corners(here, step)?);
+        let passage = passage(here, step);
         let share = passage.root(&field, first, last);
         let place = passage.at(share);
-        let [from_m, to_m] = [step.from, step.to].map(depth_in_m);
+        let (from_m, to_m) = (depth_in_m(step.from), depth_in_m(step.to));
         let depth_m = from_m + (to_m - from_m) * share;
         Some(Crossing { slots: here.slots, spot: step.spot, gradient: field.gradient(place), place, depth_m })
     }
@@ -242,23 +241,27 @@ impl<'a> Marcher<'a, '_> {
 
     /// Distances at the corners of a cell, guessed where they were not seen.
     #[inline]
-    #[expect(clippy::indexing_slicing, reason = "the masks keep layers and blocks below 8 and voxels below 512")]
-    fn corners(&self, here: &Here<'_>, spot: Spot) -> Option<[f32; 8]> {
-        let (layer, bit) = spot.bit();
-        let whole = here.cells[layer].whole >> bit & 1 == 1;
-        if whole && spot.shares_block(Spot::FAR) {
-            return Some(spot.corner_voxels().map(|voxel| f32::from(here.sdf[voxel & 511])));
+    #[expect(clippy::indexing_slicing, reason = "the mask keeps blocks below 8")]
+    fn corners(&self, here: &Here<'_>, step: Step) -> Option<[f32; 8]> {
+        let in_one_block = step.spot.shares_block(Spot::FAR);
+        if in_one_block && step.whole {
+            return Some(step.spot.corner_values(here.sdf)?.map(f32::from));
         }
-        let mut sdf = [0.0; 8];
-        let mut seen = 0;
-        for (corner, (sdf, point)) in sdf.iter_mut().zip(spot.corners()).enumerate() {
-            let slot = here.slots[point.block() & 7];
-            if let Some(value) = self.blocks.sdf(slot).and_then(|sdfs| sdfs.get(point.voxel())) {
-                *sdf = f32::from(*value);
-                seen |= u8::from(whole || self.is_seen(slot, point.voxel())) << corner;
+        let mut corners = Corners::default();
+        if in_one_block {
+            let weights = step.spot.corner_values(self.blocks.weight(here.slots[0])?)?;
+            corners.sdf = step.spot.corner_values(here.sdf)?.map(f32::from);
+            (0..).zip(weights).for_each(|(corner, weight)| corners.seen |= u8::from(weight >= self.min_weight) << corner);
+        } else {
+            for (corner, (sdf, point)) in corners.sdf.iter_mut().zip(step.spot.corners()).enumerate() {
+                let slot = here.slots[point.block() & 7];
+                if let Some(value) = self.blocks.sdf(slot).and_then(|sdfs| sdfs.get(point.voxel())) {
+                    *sdf = f32::from(*value);
+                    corners.seen |= u8::from(step.whole || self.is_seen(slot, point.voxel())) << corner;
+                }
             }
         }
-        if seen == u8::MAX { Some(sdf) } else { Some(Corners { sdf, seen }.complete()?.sdf) }
+        if step.whole { Some(corners.sdf) } else { corners.complete() }
     }
 
     /// Turns a crossing into what the images keep.
@@ -283,12 +286,17 @@ impl<'a> Marcher<'a, '_> {
         let nearest = spot.turned(Spot::steps(nearest));
         let weight = self.blocks.weight(slots[nearest.block() & 7]).map_or(0, |weights| weights[nearest.voxel() & 511]);
         if spot.shares_block(Spot::FAR) {
-            let Some(planes) = self.blocks.colour(slots[0]) else { return ([0; 3], weight) };
-            spot.corner_voxels().into_iter().zip(shares).for_each(|(voxel, share)| colours.add(planes, voxel, share));
+            let Some([red, green, blue]) = self.blocks.colour(slots[0]) else { return ([0; 3], weight) };
+            if let (Some(red), Some(green), Some(blue)) = (spot.corner_values(red), spot.corner_values(green), spot.corner_values(blue)) {
+                for (((red, green), blue), share) in red.into_iter().zip(green).zip(blue).zip(shares) {
+                    colours.add([red, green, blue], share);
+                }
+            }
         } else {
             for (point, share) in spot.corners().into_iter().zip(shares) {
-                if let Some(planes) = self.blocks.colour(slots[point.block() & 7]) {
-                    colours.add(planes, point.voxel(), share);
+                if let Some([red, green, blue]) = self.blocks.colour(slots[point.block() & 7]) {
+                    let voxel = point.voxel() & 511;
+                    colours.add([red[voxel], green[voxel], blue[voxel]], share);
                 }
             }
         }
@@ -305,11 +313,8 @@ struct Colours {
 
 impl Colours {
     #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "the mask keeps voxels below 512")]
-    fn add(&mut self, planes: &[[u8; BLOCK_VOXELS]; 3], voxel: usize, share: u32) {
-        let [red, green, blue] = planes;
-        let voxel = voxel & 511;
-        let colour = u64::from(red[voxel]) | u64::from(green[voxel]) << 20 | u64::from(blue[voxel]) << 40;
+    fn add(&mut self, [red, green, blue]: [u8; 3], share: u32) {
+        let colour = u64::from(red) | u64::from(green) << 20 | u64::from(blue) << 40;
         self.sum += colour * u64::from(share);
         // All 0 is no colour.
         self.total += if colour == 0 { 0 } else { share };
@@ -320,4 +325,16 @@ impl Colours {
         let half = self.total / 2;
         [0, 20, 40].map(|shift| ((self.sum >> shift) as u32 & 0xF_FFFF) + half).map(|sum| sum.checked_div(self.total).unwrap_or(0) as u8)
     }
+}
+
+/// The block, the cell in it, and the depths at which the cell is left, for a ray just after a depth.
+#[inline]
+fn begin(ray: &Ray, depth: Depth) -> ([i32; 3], Spot, [Depth; 3]) {
+    let cell = ray.cell_at(depth);
+    ([cell[0] >> 3, cell[1] >> 3, cell[2] >> 3], Spot::new(cell), ray.exits(cell))
+}
+
+#[inline(always)]
+fn passage(here: &Here<'_>, step: Step) -> Passage {
+    Passage::new(here.ray, here.offset(step.spot), [depth_in_m(step.from), depth_in_m(step.to)], step.axes)
 }

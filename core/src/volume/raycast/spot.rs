@@ -1,5 +1,7 @@
 //! A lattice point of a block in one word, so that a step, the block it leads to and a voxel are a few integer operations.
 
+use crate::volume::BLOCK_VOXELS;
+
 /// A lattice point or cell of a block: `x + 32 y + 1024 z` with 8 added to each coordinate, from -1 (7) to 8 (16).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Spot {
@@ -26,6 +28,8 @@ pub(super) struct Wall {
     pub v: usize,
     /// From the lower wall to the upper.
     pub turn: u32,
+    /// From a wall's first corner along `v`.
+    pub turn_v: u32,
     /// From a wall's first corner to its last.
     pub far: u32,
     /// From voxel to voxel along `u`.
@@ -39,15 +43,7 @@ pub(super) static WALLS: [Wall; 3] = [wall(0, 1, 2), wall(1, 0, 2), wall(2, 0, 1
 
 #[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
 const fn wall(axis: usize, u: usize, v: usize) -> Wall {
-    Wall { u, v, turn: UNITS[axis], far: UNITS[u] + UNITS[v], stride_u: VOXEL_STRIDES[u], stride_v: VOXEL_STRIDES[v] }
-}
-
-impl Wall {
-    /// One step along `v`.
-    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn turn_v(&self) -> u32 {
-        UNITS[self.v]
-    }
+    Wall { u, v, turn: UNITS[axis], turn_v: UNITS[v], far: UNITS[u] + UNITS[v], stride_u: VOXEL_STRIDES[u], stride_v: VOXEL_STRIDES[v] }
 }
 
 impl Spot {
@@ -124,10 +120,17 @@ impl Spot {
         [0, 1, 2, 3, 4, 5, 6, 7].map(|corner: u32| self.turned(Self::steps([corner & 1, corner >> 1 & 1, corner >> 2])))
     }
 
-    /// The voxels of the corners, if they lie in one block.
+    /// The block a step led to, relative to the one left, and the place in it.
     #[inline(always)]
-    pub fn corner_voxels(self) -> [usize; 8] {
-        let first = self.voxel();
-        [0, 1, 8, 9, 64, 65, 72, 73].map(|stride| first + stride)
+    pub fn arrived(self) -> ([i32; 3], Self) {
+        let block = [self.coordinate(0) >> 3, self.coordinate(1) >> 3, self.coordinate(2) >> 3];
+        (block, Self { at: self.at & (INSIDE - INSIDE / 8) | INSIDE })
+    }
+
+    /// The voxels at the corners of a cell whose corners lie in one block.
+    #[inline(always)]
+    pub fn corner_values<T: Copy>(self, voxels: &[T; BLOCK_VOXELS]) -> Option<[T; 8]> {
+        let window: &[T; 74] = voxels.get(self.voxel()..)?.first_chunk()?;
+        Some([window[0], window[1], window[8], window[9], window[64], window[65], window[72], window[73]])
     }
 }

@@ -9,7 +9,7 @@ use crate::{
         analytic::{Told, cuboid, empty, fill},
     },
 };
-use cell::{Corners, Field, Passage, mean, within};
+use cell::{Corners, Field, NO_AXIS, Passage, mean, within};
 use eye::{AXES, depth_from_m, depth_in_m};
 use nalgebra::{Point3, Vector3};
 use std::{boxed::Box, vec, vec::Vec};
@@ -324,7 +324,7 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
     let mut entered = None;
     let mut last_cell = (0.0, 0);
     while from <= far {
-        let next = AXES.map(|axis| ray.crossing(axis, cell[axis] + ray.ahead(axis)));
+        let next = AXES.map(|axis| ray.crossing(axis, cell[axis] + ray.ahead[axis]));
         let to = *next.iter().min().unwrap();
         let axis = next.iter().position(|&depth| depth == to).unwrap();
         let mut corners = Corners::default();
@@ -340,7 +340,9 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
         // A cell belongs to the block of its first corner: without that there is none.
         let own = BlockCoord::of_lattice(AXES.map(|axis| cell[axis] + 8 * eye.base[axis])).and_then(|coord| volume.find(coord));
         if own.is_some() && to > from && any(|sdf| sdf > 0.0) && any(|sdf| sdf <= 0.0) {
-            let passage = Passage::new(&ray, cell, [from, to]);
+            let block = ray.offset(cell.map(|c| c >> 3));
+            let offset = AXES.map(|axis| block[axis] - (cell[axis] & 7) as f32);
+            let passage = Passage::new(&ray, offset, [from, to].map(depth_in_m), [entered.unwrap_or(NO_AXIS), axis]);
             let guessed = corners.complete();
             let value = |wall: Option<(usize, usize)>, depth| {
                 if let Some((axis, upper)) = wall {
@@ -348,24 +350,24 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
                     let four = [0, 1 << u, 1 << v, 1 << u | 1 << v].map(|corner| corner | upper << axis);
                     if four.iter().all(|&corner| is_seen(corner)) {
                         let [a, b, c, d] = four.map(|corner| corners.sdf[corner]);
-                        let [u, v] = [u, v].map(|axis| within(&ray, axis, cell[axis], depth_in_m(depth)));
+                        let [u, v] = [u, v].map(|axis| within(offset[axis], ray.slope[axis], depth_in_m(depth)));
                         let (low, high) = (a + (b - a) * u, c + (d - c) * u);
                         return low + (high - low) * v;
                     }
                 }
-                guessed.map_or(0.0, |corners| mean(&corners.sdf, passage.end(depth == to)))
+                guessed.map_or(0.0, |corners| mean(&corners, passage.end(depth == to)))
             };
             let first =
-                if last_cell.1 == from { last_cell.0 } else { value(entered.map(|axis| (axis, 1 - ray.ahead(axis) as usize)), from) };
-            let last = value(Some((axis, ray.ahead(axis) as usize)), to);
+                if last_cell.1 == from { last_cell.0 } else { value(entered.map(|axis| (axis, 1 - ray.ahead[axis] as usize)), from) };
+            let last = value(Some((axis, ray.ahead[axis] as usize)), to);
             if let (true, true, Some(corners)) = (first > 0.0, last <= 0.0, guessed) {
-                let share = passage.root(&Field::new(&corners.sdf), first, last);
+                let share = passage.root(&Field::new(&corners), first, last);
                 let [from_m, to_m] = [from, to].map(depth_in_m);
                 return Some(from_m + (to_m - from_m) * share).filter(|&depth_m| depth_m <= config.far_m);
             }
             last_cell = (last, to);
         }
-        cell[axis] += 2 * ray.ahead(axis) - 1;
+        cell[axis] += 2 * ray.ahead[axis] - 1;
         (from, entered) = (to, Some(axis));
     }
     None
