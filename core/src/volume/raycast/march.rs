@@ -4,7 +4,7 @@ use super::{
     cell::{Corners, Field, NO_AXIS, Passage, mean, shares, within},
     eye::{Depth, Eye, Ray, depth_from_m, depth_in_m},
     signs::Cells,
-    spot::{Spot, WALLS},
+    spot::{Spot, WALLS, Wall},
     surface::Surface,
 };
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks};
@@ -172,21 +172,21 @@ impl Marcher<'_, '_> {
         }
     }
 
-    /// The field on a wall of a cell, lower (0) or upper (1) on an axis, where the ray passes it at `depth`: the mean of its four corners if
-    /// all were seen, else that of the cell with its corners guessed.
+    /// The field on a wall of a cell, lower (0) or upper (1) on an axis, where the ray passes it at `depth`: the mean of its four corners. One
+    /// that was not seen completes the parallelogram of the others; with fewer, the cell has to tell.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3, the masks keep blocks below 8 and voxels below 512")]
     fn wall_value(&self, here: &Here<'_>, step: Step, axis: usize, depth: Depth, upper: u32) -> f32 {
         let wall = &WALLS[axis];
         let corner = step.spot.turned(upper * wall.turn);
-        let [a, b, c, d] = if step.whole && corner.shares_block(wall.far) {
+        let [a, b, c, d] = if corner.shares_block(wall.far) && step.whole {
             let slot_sdf = if corner.is_in_own_block() { Some(here.sdf) } else { self.blocks.sdf(here.slots[corner.block() & 7]) };
             let Some(sdf) = slot_sdf else { return 0.0 };
             let voxel = corner.voxel();
             let value = |stride: usize| f32::from(sdf[(voxel + stride) & 511]);
             [value(0), value(wall.stride_u), value(wall.stride_v), value(wall.stride_u + wall.stride_v)]
         } else {
-            match self.wall_corners(here, corner, axis, step.whole) {
+            match self.wall_corners(here, corner, wall, step.whole) {
                 Some(corners) => corners,
                 None => return self.guessed_value(here, step, depth),
             }
@@ -198,21 +198,23 @@ impl Marcher<'_, '_> {
         low + (high - low) * at_v
     }
 
-    /// The corners of a wall that lies in several blocks or may not wholly be seen; `None` when it is not.
+    /// The corners of a wall that lies in several blocks or may not wholly be seen; `None` when two or more are unseen.
     #[inline(never)]
-    #[expect(clippy::indexing_slicing, reason = "axes are below 3, the mask keeps blocks below 8")]
-    fn wall_corners(&self, here: &Here<'_>, corner: Spot, axis: usize, whole: bool) -> Option<[f32; 4]> {
-        let wall = &WALLS[axis];
-        let mut corners = [0.0; 4];
-        for (value, turn) in corners.iter_mut().zip([0, wall.far - wall.turn_v, wall.turn_v, wall.far]) {
-            let point = corner.turned(turn);
-            let slot = here.slots[point.block() & 7];
-            if !whole && !self.is_seen(slot, point.voxel()) {
-                return None;
-            }
-            *value = f32::from(*self.blocks.sdf(slot)?.get(point.voxel())?);
-        }
-        Some(corners)
+    fn wall_corners(&self, here: &Here<'_>, corner: Spot, wall: &Wall, whole: bool) -> Option<[f32; 4]> {
+        let points = [corner, corner.turned(wall.far - wall.turn_v), corner.turned(wall.turn_v), corner.turned(wall.far)];
+        let [a, b, c, d] = points;
+        let [a, b, c, d] = [self.point(here, a, whole), self.point(here, b, whole), self.point(here, c, whole), self.point(here, d, whole)];
+        completed([a, b, c, d])
+    }
+
+    /// The distance at a point, if it was seen.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
+    fn point(&self, here: &Here<'_>, point: Spot, whole: bool) -> Option<f32> {
+        let slot = here.slots[point.block() & 7];
+        let voxel = point.voxel() & 511;
+        let sdf = f32::from(self.blocks.sdf(slot)?[voxel]);
+        (whole || self.blocks.weight(slot)?[voxel] >= self.min_weight).then_some(sdf)
     }
 
     /// The field where the ray enters or leaves a cell, corners guessed where they were not seen; 0, which stops no ray, where nothing tells it.
@@ -337,4 +339,17 @@ fn begin(ray: &Ray, depth: Depth) -> ([i32; 3], Spot, [Depth; 3]) {
 #[inline(always)]
 fn passage(here: &Here<'_>, step: Step) -> Passage {
     Passage::new(here.ray, here.offset(step.spot), [depth_in_m(step.from), depth_in_m(step.to)], step.axes)
+}
+
+/// The corners a, b, c, d of a wall (a and d face each other), one of which may be told by the others.
+#[inline]
+pub(super) fn completed(corners: [Option<f32>; 4]) -> Option<[f32; 4]> {
+    match corners {
+        [Some(a), Some(b), Some(c), Some(d)] => Some([a, b, c, d]),
+        [None, Some(b), Some(c), Some(d)] => Some([b + c - d, b, c, d]),
+        [Some(a), None, Some(c), Some(d)] => Some([a, a + d - c, c, d]),
+        [Some(a), Some(b), None, Some(d)] => Some([a, b, a + d - b, d]),
+        [Some(a), Some(b), Some(c), None] => Some([a, b, c, b + c - a]),
+        _ => None,
+    }
 }

@@ -348,8 +348,7 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
                 if let Some((axis, upper)) = wall {
                     let [u, v] = [[1, 2], [0, 2], [0, 1]][axis];
                     let four = [0, 1 << u, 1 << v, 1 << u | 1 << v].map(|corner| corner | upper << axis);
-                    if four.iter().all(|&corner| is_seen(corner)) {
-                        let [a, b, c, d] = four.map(|corner| corners.sdf[corner]);
+                    if let Some([a, b, c, d]) = march::completed(four.map(|corner| is_seen(corner).then(|| corners.sdf[corner]))) {
                         let [u, v] = [u, v].map(|axis| within(offset[axis], ray.slope[axis], depth_in_m(depth)));
                         let (low, high) = (a + (b - a) * u, c + (d - c) * u);
                         return low + (high - low) * v;
