@@ -24,6 +24,8 @@ pub(super) struct Eye {
     rays: [[f32; 3]; 3],
     /// From lattice units to camera axes: rows for focal length times x, focal length times y, and depth, in m.
     rows: [[f32; 3]; 3],
+    /// Their magnitudes: how far a box reaches.
+    reaches: [[f32; 3]; 3],
     center_px: [f32; 2],
     /// Camera from world.
     pub rotation: [[f32; 3]; 3],
@@ -62,11 +64,13 @@ impl Eye {
         let local = |axis: f64, base: i32| (axis - f64::from(base * side)) as f32;
         let rotation = view.camera_from_world().0;
         let row = |r: usize, scale: f64| [0, 1, 2].map(|c| (rotation.matrix().get((r, c)).copied().unwrap_or_default() * scale) as f32);
+        let rows = [row(0, voxel_m * view.rig.focal_px), row(1, voxel_m * view.rig.focal_px), row(2, voxel_m)];
         Some(Self {
             base,
             origin: [local(camera.x, base[0]), local(camera.y, base[1]), local(camera.z, base[2])],
             rays: view.rays_world().map(|ray| (ray / voxel_m).cast::<f32>().into()),
-            rows: [row(0, voxel_m * view.rig.focal_px), row(1, voxel_m * view.rig.focal_px), row(2, voxel_m)],
+            rows,
+            reaches: rows.map(|row| row.map(f32::abs)),
             center_px: [view.rig.center_u_px as f32, view.rig.center_v_px as f32],
             rotation: [row(0, 1.0), row(1, 1.0), row(2, 1.0)],
             width: view.width,
@@ -84,19 +88,18 @@ impl Eye {
 
     /// The pixels and depths that a box, given by its centre and half its sides in lattice units, may cover within `near_m..=far_m`.
     #[inline]
+    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     pub fn extent(&self, center: [f32; 3], half: [f32; 3], near_m: f32, far_m: f32) -> Option<Extent> {
         let from_eye = [center[0] - self.origin[0], center[1] - self.origin[1], center[2] - self.origin[2]];
-        let reach = |row: [f32; 3]| dot(row.map(f32::abs), half);
-        let [across, down, depth] = self.rows;
-        let (z, z_reach) = (dot(depth, from_eye), reach(depth));
+        let seen = |axis: usize| (dot(self.rows[axis], from_eye), dot(self.reaches[axis], half));
+        let (across, down, (z, z_reach)) = (seen(0), seen(1), seen(2));
         let depth_m = [max_f32(z - z_reach, near_m), min_f32(z + z_reach, far_m)];
         if depth_m[0] > depth_m[1] {
             return None;
         }
         let inverse = depth_m.map(|depth| 1.0 / depth);
         // The box in camera axes; its left rim looks leftmost from the nearest depth when left of the axis, from the farthest when right.
-        let span = |row: [f32; 3], center_px: f32, size: usize| {
-            let (middle, reach) = (dot(row, from_eye), reach(row));
+        let span = |(middle, reach): (f32, f32), center_px: f32, size: usize| {
             let (low, high) = (middle - reach, middle + reach);
             let first = center_px + low * if low < 0.0 { inverse[0] } else { inverse[1] } - SLACK_PX;
             let last = center_px + high * if high > 0.0 { inverse[0] } else { inverse[1] } + SLACK_PX;

@@ -1,10 +1,9 @@
 //! One ray's way to the surface.
 
 use super::{
-    cell::{Corners, Field, NO_AXIS, Passage, mean, shares, within},
+    cell::{Corners, Field, NO_AXIS, Passage, mean, within},
     eye::{Depth, Eye, Ray, depth_from_m, depth_in_m},
-    signs::Cells,
-    spot::{Spot, WALLS, Wall},
+    spot::{CORNER_STRIDES, Spot, WALLS, Wall},
     surface::Surface,
 };
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks};
@@ -107,9 +106,14 @@ impl Marcher<'_, '_> {
             let (cells, slots) = self.surface.block(entry)?;
             let here = Here { ray, slots, sdf: self.blocks.sdf(slots[0])?, offset: ray.offset(block) };
             for _ in 0..MAX_CELLS {
-                let to = next_x.min(next_y).min(next_z);
-                let (by_x, by_y) = (next_x == to, next_y == to);
-                let axis = if by_x { 0 } else { 2 - usize::from(by_y) };
+                // Ties go to the first axis; the cells of no depth between them stop no ray.
+                let (to, axis) = if next_x <= next_y {
+                    if next_x <= next_z { (next_x, 0) } else { (next_z, 2) }
+                } else if next_y <= next_z {
+                    (next_y, 1)
+                } else {
+                    (next_z, 2)
+                };
                 let (layer, bit) = spot.bit();
                 let layer = &cells[layer];
                 if layer.crossed >> bit & 1 == 1 && to > from {
@@ -118,16 +122,11 @@ impl Marcher<'_, '_> {
                         return (crossing.depth_m <= to_m).then(|| self.hit(&crossing));
                     }
                 }
-                next_x += if by_x { stride_x } else { 0 };
-                next_y += if axis == 1 { stride_y } else { 0 };
-                next_z += if axis == 2 { stride_z } else { 0 };
-                spot = spot.turned(if by_x {
-                    turn_x
-                } else if by_y {
-                    turn_y
-                } else {
-                    turn_z
-                });
+                match axis {
+                    0 => (next_x, spot) = (next_x + stride_x, spot.turned(turn_x)),
+                    1 => (next_y, spot) = (next_y + stride_y, spot.turned(turn_y)),
+                    _ => (next_z, spot) = (next_z + stride_z, spot.turned(turn_z)),
+                }
                 (from, entered) = (to, axis);
                 if spot.is_outside() {
                     break;
@@ -281,24 +280,25 @@ impl Marcher<'_, '_> {
     #[inline(never)]
     #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
     fn colour(&self, crossing: &Crossing<'_>) -> ([u8; 3], u8) {
-        let mut colours = Colours::default();
-        let shares = shares(crossing.place).map(|share| (share * 256.0 + 0.5) as i32 as u32);
         let (spot, slots) = (crossing.spot, crossing.slots);
-        let nearest = crossing.place.map(|c| u32::from(c >= 0.5));
-        let nearest = spot.turned(Spot::steps(nearest));
+        let nearest = spot.turned(Spot::steps(crossing.place.map(|c| u32::from(c >= 0.5))));
         let weight = self.blocks.weight(slots[nearest.block() & 7]).map_or(0, |weights| weights[nearest.voxel() & 511]);
+        let mut colours = Colours::default();
+        let counts = counts(crossing.place);
         if spot.shares_block(Spot::FAR) {
-            let Some([red, green, blue]) = self.blocks.colour(slots[0]) else { return ([0; 3], weight) };
-            if let (Some(red), Some(green), Some(blue)) = (spot.corner_values(red), spot.corner_values(green), spot.corner_values(blue)) {
-                for (((red, green), blue), share) in red.into_iter().zip(green).zip(blue).zip(shares) {
-                    colours.add([red, green, blue], share);
+            let window = |plane| Spot::window(spot, plane);
+            if let Some([red, green, blue]) = self.blocks.colour(slots[0])
+                && let (Some(red), Some(green), Some(blue)) = (window(red), window(green), window(blue))
+            {
+                for (corner, stride) in CORNER_STRIDES.into_iter().enumerate() {
+                    colours.add([red[stride], green[stride], blue[stride]], counts[corner]);
                 }
             }
         } else {
-            for (point, share) in spot.corners().into_iter().zip(shares) {
+            for (point, count) in spot.corners().into_iter().zip(counts) {
                 if let Some([red, green, blue]) = self.blocks.colour(slots[point.block() & 7]) {
                     let voxel = point.voxel() & 511;
-                    colours.add([red[voxel], green[voxel], blue[voxel]], share);
+                    colours.add([red[voxel], green[voxel], blue[voxel]], count);
                 }
             }
         }
@@ -306,7 +306,17 @@ impl Marcher<'_, '_> {
     }
 }
 
-/// Red, green and blue summed at once, 20 bits each: eight shares of 256 make sums below 2^16.
+/// What each corner of a cell counts at a place in it, in 256ths.
+#[inline(always)]
+fn counts(place: [f32; 3]) -> [u32; 8] {
+    let [x, y, z] = [(place[0] * 256.0) as i32 as u32, (place[1] * 256.0) as i32 as u32, (place[2] * 256.0) as i32 as u32];
+    let (nx, ny, nz) = (256 - x, 256 - y, 256 - z);
+    let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
+    let count = |area: u32, height: u32| (area * height) >> 16;
+    [count(a, nz), count(b, nz), count(c, nz), count(d, nz), count(a, z), count(b, z), count(c, z), count(d, z)]
+}
+
+/// Red, green and blue summed at once, 20 bits each: counts of 256 in all make sums below 2^16.
 #[derive(Default)]
 struct Colours {
     sum: u64,
@@ -315,17 +325,19 @@ struct Colours {
 
 impl Colours {
     #[inline(always)]
-    fn add(&mut self, [red, green, blue]: [u8; 3], share: u32) {
+    fn add(&mut self, [red, green, blue]: [u8; 3], count: u32) {
         let colour = u64::from(red) | u64::from(green) << 20 | u64::from(blue) << 40;
-        self.sum += colour * u64::from(share);
+        self.sum += colour * u64::from(count);
         // All 0 is no colour.
-        self.total += if colour == 0 { 0 } else { share };
+        self.total += if colour == 0 { 0 } else { count };
     }
 
+    /// The mean; sums are so small that a float's division rounds as an integer's.
     #[inline(always)]
     fn mean(&self) -> [u8; 3] {
-        let half = self.total / 2;
-        [0, 20, 40].map(|shift| ((self.sum >> shift) as u32 & 0xF_FFFF) + half).map(|sum| sum.checked_div(self.total).unwrap_or(0) as u8)
+        let scale = if self.total > 0 { 1.0 / self.total as f32 } else { 0.0 };
+        let channel = |shift: u32| ((self.sum >> shift & 0xF_FFFF) as i32 as f32 * scale + 0.5) as i32 as u8;
+        [channel(0), channel(20), channel(40)]
     }
 }
 

@@ -19,6 +19,9 @@ const BEYOND: u32 = 2 * INSIDE;
 /// Steps from one voxel to the next along each axis.
 const VOXEL_STRIDES: [usize; 3] = [1, 8, 64];
 
+/// Voxels from a cell's first corner to each of them.
+pub(super) const CORNER_STRIDES: [usize; 8] = [0, 1, 8, 9, 64, 65, 72, 73];
+
 /// How a cell's walls across one axis are laid out.
 #[derive(Debug)]
 pub(super) struct Wall {
@@ -127,10 +130,17 @@ impl Spot {
         (block, Self { at: self.at & (INSIDE - INSIDE / 8) | INSIDE })
     }
 
-    /// The voxels at the corners of a cell whose corners lie in one block.
+    /// What of a block begins with the cell's first corner and ends with its last, where all corners lie in the block:
+    /// [`CORNER_STRIDES`] tells them.
+    #[inline(always)]
+    pub fn window<T>(self, voxels: &[T; BLOCK_VOXELS]) -> Option<&[T; 74]> {
+        voxels.get(self.voxel()..)?.first_chunk()
+    }
+
+    /// The corners of a cell all of which lie in the block.
     #[inline(always)]
     pub fn corner_values<T: Copy>(self, voxels: &[T; BLOCK_VOXELS]) -> Option<[T; 8]> {
-        let window: &[T; 74] = voxels.get(self.voxel()..)?.first_chunk()?;
+        let window = self.window(voxels)?;
         Some([window[0], window[1], window[8], window[9], window[64], window[65], window[72], window[73]])
     }
 }
