@@ -118,6 +118,20 @@ impl Volume<'_> {
         report
     }
 
+    /// Takes what `store` kept of the block at `coord` into the map, as when a map on disk is looked at piece by piece. Whether the block
+    /// is in the map now; where nothing was kept of it, or no slot is free, it is not.
+    pub fn load<S: BlockStore>(&mut self, coord: BlockCoord, store: &mut S) -> bool {
+        if self.find(coord).is_some() {
+            return true;
+        }
+        let Some(slot) = self.make(coord) else { return false };
+        let came = self.bring_back(slot, coord, store);
+        if !came {
+            self.free_block(slot);
+        }
+        came
+    }
+
     /// Fills a block that was just made with what the store kept of it.
     pub(super) fn bring_back<S: BlockStore>(&mut self, slot: u32, coord: BlockCoord, store: &mut S) -> bool {
         let at = slot as usize;

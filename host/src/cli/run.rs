@@ -3,10 +3,11 @@
 use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
 use crate::export::{self, FolderError, RunFolder, Summary};
-use crate::harness::{self, Plan, RunRecord};
+use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, RunRecord, Streaming};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
+const MIB: u64 = 1 << 20;
 /// Where run folders go unless `--out` says otherwise.
 const DEFAULT_PARENT: &str = "out";
 
@@ -47,6 +48,21 @@ pub struct RunArgs {
     /// One setting, over those of the file; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Lose the blocks that leave the full pool; otherwise they go to map.blocks in the run folder, come back when seen again, and are in map.ply
+    #[arg(long)]
+    no_stream: bool,
+    /// Let map.blocks grow to so many MiB at most; the disk is the limit otherwise
+    #[arg(long, value_name = "MIB", conflicts_with = "no_stream")]
+    stream_mib: Option<u64>,
+    /// Leave map.blocks in the run folder when the mesh is written
+    #[arg(long, conflicts_with = "no_stream")]
+    keep_blocks: bool,
+    /// Fail at the first frame that harms the map: a guessed pose, a block lost or refused
+    #[arg(long)]
+    strict: bool,
+    /// Fail when the process holds more than so many MiB [default: the slab and 256]
+    #[arg(long, value_name = "MIB")]
+    rss_limit_mib: Option<u64>,
     /// Folder for the results [default: out/<data set>-NNN]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -103,6 +119,12 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         config: settings.config(dataset.rig()),
         config_toml: settings.to_toml(args.path.is_none())?,
         threads,
+        streaming: (!args.no_stream).then_some(Streaming {
+            most_bytes: args.stream_mib.map(|mib| mib.saturating_mul(MIB)),
+            keep_file: args.keep_blocks,
+        }),
+        strict: args.strict,
+        rss_limit_bytes: args.rss_limit_mib.map_or(capacity.bytes() as u64 + HOST_OVERHEAD_BYTES, |mib| mib.saturating_mul(MIB)),
         quiet: args.silent(),
         dataset,
     };
@@ -169,12 +191,25 @@ fn conclude(run: &RunRecord, place: &Path) {
     if refused > 0 {
         line("", format!("{refused} blocks found no room: the map has holes. Choose a larger --profile or a larger volume.voxel_size_m"));
     }
+    if run.shelf.records > 0 {
+        let (records, mib) = (run.shelf.records, run.shelf.bytes as f64 / MIB as f64);
+        line("", format!("{records} blocks written to disk, {} brought back, {mib:.1} MiB", run.blocks_back()));
+    }
     if run.blocks_lost() > 0 {
-        line("", format!("{} blocks unseen for longest left the full pool: a larger --profile keeps them", run.blocks_lost()));
+        line("", format!("{} blocks are lost: {}", run.blocks_lost(), lost_because(run)));
     }
     if run.held_frames() > 0 {
         line("held motion", format!("{} frames had too few matches", run.held_frames()));
     }
     line("digest", format!("{:016x}", run.digest()));
     line("results", place.display().to_string());
+}
+
+/// Why blocks are lost, and what to do.
+fn lost_because(run: &RunRecord) -> String {
+    match &run.shelf_failure {
+        Some(failure) => format!("map.blocks took no more ({failure}). Free the disk"),
+        None if run.streaming => "map.blocks could not be read back whole. Look after the disk".to_owned(),
+        None => "the pool was full. Run without --no-stream, or choose a larger --profile".to_owned(),
+    }
 }

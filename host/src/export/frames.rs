@@ -7,8 +7,8 @@ use std::io::{self, Write};
 /// Writes the table. Empty cells are values the machine cannot give.
 pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
     write!(out, "frame,time_s,digest,input_digest,step_ms,severity,motion,matches,inliers,residual_px,features_dropped,stereo_density")?;
-    write!(out, ",blocks_used,blocks_peak,blocks_visible,blocks_made,blocks_refused,blocks_out,blocks_lost,blocks_back")?;
-    write!(out, ",prune_visited,prune_voxels_reset,prune_blocks_freed,prune_carried_over,rss_bytes")?;
+    write!(out, ",blocks_used,blocks_peak,blocks_visible,blocks_made,blocks_refused,blocks_out,blocks_lost,blocks_empty,blocks_back")?;
+    write!(out, ",prune_visited,prune_voxels_reset,prune_blocks_freed,prune_carried_over,prune_early,history_frames,rss_bytes")?;
     for stage in Stage::ALL {
         write!(out, ",{0}_ms,{0}_cpu_ms", stage.name())?;
     }
@@ -21,8 +21,9 @@ pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
         write!(out, ",{},{},{matches},{inliers},{residual_px:.4}", report.severity().name(), row.motion())?;
         write!(out, ",{},{:.4}", report.dropped_features(), report.stereo.density())?;
         write!(out, ",{},{},{},{}", blocks.used, blocks.peak, blocks.visible, allocation.made)?;
-        write!(out, ",{},{},{},{}", row.blocks_refused(), eviction.kept, eviction.lost, eviction.returned)?;
+        write!(out, ",{},{},{},{},{}", row.blocks_refused(), eviction.kept, eviction.lost, eviction.empty, eviction.returned)?;
         write!(out, ",{},{},{},{}", prune.visited, prune.voxels_reset, prune.blocks_freed, prune.carried_over)?;
+        write!(out, ",{},{}", prune.early, row.history_frames)?;
         write!(out, ",{}", row.rss_bytes.map(|bytes| bytes.to_string()).unwrap_or_default())?;
         for time in &row.stages {
             write!(out, ",{:.4},{:.4}", time.wall_ms, time.cpu_ms)?;

@@ -70,19 +70,32 @@ struct PruneSummary {
     visited: u64,
     voxels_reset: u64,
     blocks_freed: u64,
+    carried_over_most: u32,
+    early: u64,
 }
 
 #[derive(Debug, Serialize)]
 struct EvictSummary {
     out: u64,
     back: u64,
+    /// Left with nothing in them worth keeping.
+    empty: u64,
+    /// Left at the end of the run, onto the disk as well.
+    end: u64,
+    disk_records: u64,
+    disk_bytes: u64,
 }
 
 #[derive(Debug, Serialize)]
 struct HealthSummary {
     blocks_refused: u64,
     blocks_lost: u64,
+    blocks_unreadable: u64,
     matches_dropped: u64,
+    history_frames_most: usize,
+    rss_limit_bytes: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    disk_failure: Option<String>,
     worst_severity: &'static str,
 }
 
@@ -125,14 +138,24 @@ impl Summary {
                 visited: sum(|report| report.prune.visited) + u64::from(run.finish.visited),
                 voxels_reset: sum(|report| report.prune.voxels_reset) + u64::from(run.finish.voxels_reset),
                 blocks_freed: sum(|report| report.prune.blocks_freed) + u64::from(run.finish.blocks_freed),
+                carried_over_most: run.rows.iter().map(|row| row.report.prune.carried_over).max().unwrap_or_default(),
+                early: sum(|report| report.prune.early),
             },
             evict: EvictSummary {
                 out: sum(|report| report.allocation.eviction.kept + report.allocation.eviction.lost),
-                back: sum(|report| report.allocation.eviction.returned),
+                back: run.blocks_back(),
+                empty: sum(|report| report.allocation.eviction.empty),
+                end: u64::from(run.shelf.end.kept),
+                disk_records: run.shelf.records,
+                disk_bytes: run.shelf.bytes,
             },
             health: HealthSummary {
                 blocks_refused: run.blocks_refused(),
                 blocks_lost: run.blocks_lost(),
+                blocks_unreadable: run.shelf.unreadable,
+                history_frames_most: run.rows.iter().map(|row| row.history_frames).max().unwrap_or_default(),
+                rss_limit_bytes: run.rss_limit_bytes,
+                disk_failure: run.shelf_failure.clone(),
                 matches_dropped: sum(Report::dropped_features),
                 worst_severity: run.worst().name(),
             },

@@ -6,6 +6,7 @@ mod reader;
 mod record;
 mod resident;
 mod run;
+mod shelf;
 mod slab;
 mod threads;
 
@@ -13,6 +14,7 @@ pub use progress::Progress;
 pub use reader::{AHEAD, read_ahead};
 pub use record::{FrameRow, Keyframe, RunRecord, StageStatistics};
 pub use resident::resident_bytes;
-pub use run::{Plan, RunError, frame_indices, run};
+pub use run::{HOST_OVERHEAD_BYTES, Plan, RunError, frame_indices, run};
+pub use shelf::{MeshOutput, Shelf, ShelfUse, Streaming};
 pub use slab::HostSlab;
 pub use threads::{StageTime, Threads};

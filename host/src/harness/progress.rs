@@ -37,6 +37,14 @@ impl Progress {
         Self::Bar(bar)
     }
 
+    /// A line that matters, whatever is shown of the progress.
+    pub fn say(&self, line: &str) {
+        match self {
+            Self::Bar(bar) => bar.suspend(|| eprintln!("{line}")),
+            Self::Quiet | Self::Lines { .. } => eprintln!("{line}"),
+        }
+    }
+
     /// Frame `done` (from 1) is mapped; the block pool is `fill` full, in 0 to 1.
     pub fn frame(&self, done: usize, fps: f64, fill: f64, held: bool) {
         let words = format!("{fps:5.1} fps  pool {:3.0} %{}", 100.0 * fill, if held { "  motion held" } else { "" });

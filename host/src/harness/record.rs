@@ -1,6 +1,6 @@
 //! What is remembered of a run: a row per frame, a few pictures, the figures at the end.
 
-use super::StageTime;
+use super::{ShelfUse, StageTime};
 use crate::evaluation::{exact::ExactFigures, trajectory::TrajectoryErrors};
 use crate::export::Mesh;
 use dynvox_core::egomotion::MotionStatus;
@@ -18,6 +18,8 @@ pub struct FrameRow {
     pub time_s: f64,
     /// What the core reports.
     pub report: Report,
+    /// Frames in the pruning window's history.
+    pub history_frames: usize,
     /// Wall time of the whole step, ms.
     pub step_ms: f64,
     /// Resident memory of the process, where the machine tells.
@@ -47,6 +49,20 @@ impl FrameRow {
     /// Matches the estimate was made of, inliers among them, and their root mean square error in px.
     pub fn matches(&self) -> (u32, u32, f64) {
         self.report.egomotion.map_or((0, 0, 0.0), |motion| (motion.matches, motion.inliers, motion.residual_rms_px))
+    }
+
+    /// What harmed the map in this frame, in words.
+    pub fn cause(&self) -> String {
+        let (allocation, motion) = (&self.report.allocation, self.motion());
+        let guessed = (!self.report.fused).then(|| format!("its pose had to be guessed ({}), so it was not fused", motion.replace('_', " ")));
+        let counts = [
+            (allocation.refused, "requests for blocks found no room in the pool"),
+            (allocation.beyond, "points lie beyond the map's coordinates"),
+            (allocation.unlisted, "visible blocks found no room in the list"),
+            (allocation.eviction.lost, "blocks left the full pool and were not kept"),
+        ];
+        let counted = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+        guessed.into_iter().chain(counted).collect::<Vec<_>>().join("; ")
     }
 
     /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the list of visible ones.
@@ -119,8 +135,16 @@ pub struct RunRecord {
     pub slab_bytes: usize,
     /// Most bytes resident, where the machine tells.
     pub rss_peak_bytes: Option<u64>,
-    /// Blocks of the map in the end.
+    /// Blocks of the map in memory in the end.
     pub blocks: usize,
+    /// Whether blocks that left the pool were kept on disk.
+    pub streaming: bool,
+    /// What was kept.
+    pub shelf: ShelfUse,
+    /// Why nothing more was kept, if the disk failed.
+    pub shelf_failure: Option<String>,
+    /// Resident memory the process was allowed.
+    pub rss_limit_bytes: u64,
     /// What draining the window pruned in the end.
     pub finish: PruneReport,
     /// The mesh written.
@@ -152,14 +176,21 @@ impl RunRecord {
         self.rows.iter().map(|row| u64::from(row.blocks_refused())).sum()
     }
 
-    /// Blocks that left the full pool for good, over all frames.
+    /// Blocks that left the full pool for good, and such that could not be read back, in all.
     pub fn blocks_lost(&self) -> u64 {
-        self.rows.iter().map(|row| u64::from(row.report.allocation.eviction.lost)).sum()
+        let lost = self.rows.iter().map(|row| u64::from(row.report.allocation.eviction.lost)).sum::<u64>();
+        lost + u64::from(self.shelf.end.lost) + self.shelf.unreadable
+    }
+
+    /// Blocks that came back, over all frames.
+    pub fn blocks_back(&self) -> u64 {
+        self.rows.iter().map(|row| u64::from(row.report.allocation.eviction.returned)).sum()
     }
 
     /// The worst thing that happened.
     pub fn worst(&self) -> Severity {
-        self.rows.iter().map(|row| row.report.severity()).max().unwrap_or_default()
+        let end = if self.blocks_lost() > 0 { Severity::MapAffected } else { Severity::Info };
+        self.rows.iter().map(|row| row.report.severity()).fold(end, Severity::max)
     }
 
     /// Digest after the last frame.

@@ -1,14 +1,16 @@
 //! One run: frames in, map, trajectory and figures out.
 
+use super::shelf::{MeshOutput, Shelf, Streaming};
 use super::{FrameRow, HostSlab, Keyframe, Progress, RunRecord, Threads, pictures, read_ahead, resident_bytes};
 use crate::dataset::{Dataset, DatasetError, ExactFrame, StereoImages};
 use crate::evaluation::exact::ExactErrors;
-use crate::export::{FolderError, Mesh, PlyWriter, RunFolder};
+use crate::export::{FolderError, RunFolder};
+use crate::store::StoreError;
 use dynvox_core::geometry::{Transform, exp};
 use dynvox_core::image::StereoFrame;
-use dynvox_core::memory::SlabError;
-use dynvox_core::volume::Triangle;
-use dynvox_core::{Capacity, Config, Mapper, NewError, Stage, StepError};
+use dynvox_core::memory::{Region, SlabError};
+use dynvox_core::volume::PruneReport;
+use dynvox_core::{Capacity, Config, Mapper, NewError, Severity, Stage, StepError};
 use std::time::{Duration, Instant};
 
 /// Frames shown in the report.
@@ -22,6 +24,10 @@ const NEAR_SHARE: f32 = 0.08;
 const OVERVIEW_PLACE_M: [f64; 3] = [0.0, -7.0, -15.0];
 /// How far it looks down, rad.
 const OVERVIEW_PITCH_RAD: f64 = 0.33;
+
+/// Bytes the host may hold beside the slab unless a run says otherwise: decoded images, the synthetic street, a row per frame, pictures for
+/// the report, the block file's places.
+pub const HOST_OVERHEAD_BYTES: u64 = 256 << 20;
 
 /// What to run.
 pub struct Plan {
@@ -39,6 +45,12 @@ pub struct Plan {
     pub config_toml: String,
     /// Threads at work.
     pub threads: usize,
+    /// How blocks that leave the pool are kept; they are lost when absent.
+    pub streaming: Option<Streaming>,
+    /// Whether the run fails at the first frame that harms the map.
+    pub strict: bool,
+    /// Resident memory above which the run fails.
+    pub rss_limit_bytes: u64,
     /// Whether to show no progress.
     pub quiet: bool,
 }
@@ -106,6 +118,30 @@ pub enum RunError {
         /// What the core says.
         reason: String,
     },
+    /// The block file.
+    #[error("blocks that leave the pool cannot be kept: {0}. Free the disk, or run with --no-stream")]
+    Store(#[from] StoreError),
+    /// A strict run's map was harmed.
+    #[error("frame {frame} harms the map: {cause}. Without --strict the run goes on and counts it")]
+    Strict {
+        /// Number of the frame.
+        frame: usize,
+        /// What happened.
+        cause: String,
+    },
+    /// The process holds more memory than it may.
+    #[error(
+        "at frame {frame} the process holds {rss_bytes} bytes, more than the {limit_bytes} it may. Allow more with --rss-limit-mib, or choose a \
+         smaller --profile"
+    )]
+    Resident {
+        /// Number of the frame.
+        frame: usize,
+        /// Resident bytes.
+        rss_bytes: u64,
+        /// The ceiling.
+        limit_bytes: u64,
+    },
     /// The threads cannot be started.
     #[error("{count} threads cannot be started: {source}. Give fewer --threads")]
     Threads {
@@ -128,24 +164,13 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
     check(plan)?;
     let slab_bytes = plan.capacity.bytes();
     let mut slab = HostSlab::map(slab_bytes).ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
-    let mapper = Mapper::new(&plan.capacity, &plan.config, slab.bytes_mut()).map_err(|error| refused(plan, error))?;
-    let threads = Threads::new(plan.threads).map_err(|source| RunError::Threads { count: plan.threads, source })?;
-    let mut course = Course {
-        plan,
-        mapper,
-        threads,
-        rows: Vec::new(),
-        keyframes: Vec::new(),
-        exact: ExactErrors::default(),
-        aside: Duration::ZERO,
-    };
-    course.frames()?;
-    let mapping_seconds = (begin.elapsed() - course.aside).as_secs_f64();
-    let finish = course.mapper.finish();
-    let overview_png = course.overview();
-    let mesh = course.mesh(folder)?;
+    let (drive, output) = drive(plan, slab.bytes_mut(), folder)?;
+    // The mapper is gone: its slab serves to read the map piece by piece.
+    let keep_file = plan.streaming.is_some_and(|streaming| streaming.keep_file);
+    let (mesh, shelf) = output.finish(slab.bytes_mut(), (&plan.capacity, &plan.config), keep_file, folder)?;
+    let Drive { rows, keyframes, exact, overview_png, regions, blocks, finish, shelf_failure, mapping } = drive;
     let truth = plan.dataset.truth().map(|truth| from_first(truth, &plan.indices));
-    let poses: Vec<Transform> = course.rows.iter().map(|row| row.report.t_world_camera).collect();
+    let poses: Vec<Transform> = rows.iter().map(|row| row.report.t_world_camera).collect();
     Ok(RunRecord {
         name: plan.dataset.name().to_owned(),
         notes: plan.dataset.notes().to_vec(),
@@ -157,19 +182,61 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
         config_toml: plan.config_toml.clone(),
         errors: truth.as_ref().and_then(|truth| crate::evaluation::trajectory::errors(truth, &poses)),
         truth,
-        exact: course.exact.figures(),
-        regions: course.mapper.footprint().regions().to_vec(),
+        exact: exact.figures(),
+        regions,
         slab_bytes,
         rss_peak_bytes: resident_bytes().map(|(_, peak)| peak),
-        blocks: course.mapper.background().pool().len(),
+        blocks,
+        streaming: plan.streaming.is_some(),
+        shelf,
+        shelf_failure,
+        rss_limit_bytes: plan.rss_limit_bytes,
         finish,
         mesh,
         seconds: begin.elapsed().as_secs_f64(),
-        mapping_seconds,
-        rows: course.rows,
-        keyframes: course.keyframes,
+        mapping_seconds: mapping.as_secs_f64(),
+        rows,
+        keyframes,
         overview_png,
     })
+}
+
+/// What a drive leaves besides the mesh.
+struct Drive {
+    rows: Vec<FrameRow>,
+    keyframes: Vec<Keyframe>,
+    exact: ExactErrors,
+    overview_png: Vec<u8>,
+    regions: Vec<Region>,
+    blocks: usize,
+    finish: PruneReport,
+    shelf_failure: Option<String>,
+    /// Time that went into mapping.
+    mapping: Duration,
+}
+
+/// Maps the planned frames in `slab`.
+fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, MeshOutput), RunError> {
+    let begin = Instant::now();
+    let mut course = Course {
+        plan,
+        mapper: Mapper::new(&plan.capacity, &plan.config, slab).map_err(|error| refused(plan, error))?,
+        threads: Threads::new(plan.threads).map_err(|source| RunError::Threads { count: plan.threads, source })?,
+        shelf: Shelf::begin(plan.streaming, folder, &plan.config)?,
+        rows: Vec::new(),
+        keyframes: Vec::new(),
+        exact: ExactErrors::default(),
+        aside: Duration::ZERO,
+    };
+    course.frames()?;
+    let mapping = begin.elapsed() - course.aside;
+    let finish = course.mapper.finish();
+    let overview_png = course.overview();
+    let Course { mut mapper, shelf, rows, keyframes, exact, .. } = course;
+    let (regions, blocks) = (mapper.footprint().regions().to_vec(), mapper.background().pool().len());
+    let shelf_failure = shelf.failure();
+    let output = MeshOutput::begin(&mut mapper, shelf, folder)?;
+    Ok((Drive { rows, keyframes, exact, overview_png, regions, blocks, finish, shelf_failure, mapping }, output))
 }
 
 /// Refuses what cannot run before any memory is taken.
@@ -242,6 +309,7 @@ struct Course<'p, 's> {
     plan: &'p Plan,
     mapper: Mapper<'s>,
     threads: Threads,
+    shelf: Shelf,
     rows: Vec<FrameRow>,
     keyframes: Vec<Keyframe>,
     exact: ExactErrors,
@@ -258,12 +326,22 @@ impl Course<'_, '_> {
         read_ahead(self.plan.dataset.as_ref(), &self.plan.indices, |decoded| {
             for (at, (index, images)) in decoded.iter().enumerate() {
                 let images = images?;
+                let was_kept = self.shelf.failure().is_none();
                 let row = self.step(index, &images)?;
+                self.watch(&row)?;
+                if let Some(failure) = self.shelf.failure().filter(|_| was_kept) {
+                    progress.say(&format!("warning: frame {index}: map.blocks takes no more ({failure}). Blocks that leave the pool are lost from here on"));
+                }
                 let seconds = (begin.elapsed() - self.aside).as_secs_f64();
                 let blocks = row.report.blocks;
                 progress.frame(at + 1, (at + 1) as f64 / seconds, f64::from(blocks.used) / f64::from(blocks.capacity), row.held());
                 let aside = Instant::now();
                 let t_world_camera = row.report.t_world_camera;
+                if at == 0 {
+                    // Room for all rows now, so that what grows during the drive is a leak.
+                    self.rows.resize(frames, row.clone());
+                    self.rows.clear();
+                }
                 self.rows.push(row);
                 let exact = images.exact.as_ref().filter(|_| is_compared(at));
                 if is_keyframe(at) || exact.is_some() {
@@ -288,12 +366,13 @@ impl Course<'_, '_> {
         };
         self.threads.take_times();
         let begin = Instant::now();
-        let (mapper, threads) = (&mut self.mapper, &self.threads);
-        let report = threads.run(|| mapper.step(&frame, threads)).map_err(|error| refused(step_reason(error)))?;
+        let (mapper, threads, shelf) = (&mut self.mapper, &self.threads, &mut self.shelf);
+        let report = threads.run(|| mapper.step_with(&frame, threads, shelf)).map_err(|error| refused(step_reason(error)))?;
         Ok(FrameRow {
             frame: index,
             time_s: self.plan.dataset.time_s(index),
             report,
+            history_frames: self.mapper.background().history().len(),
             step_ms: begin.elapsed().as_secs_f64() * 1e3,
             rss_bytes: resident_bytes().map(|(now, _)| now),
             stages: self.threads.take_times(),
@@ -337,13 +416,16 @@ impl Course<'_, '_> {
         pictures::map(pictures::LARGE_PX, &depth_m, &normal, &colour, into_camera(&t_world_camera))
     }
 
-    fn mesh(&self, folder: &RunFolder) -> Result<Mesh, RunError> {
-        let path = folder.file("map.ply");
-        let written = PlyWriter::begin(&path).and_then(|mut ply| {
-            self.mapper.triangles(&mut |Triangle { vertices }| ply.triangle(vertices.map(|vertex| (vertex.position_m, vertex.colour))));
-            ply.finish()
-        });
-        Ok(written.map_err(|source| FolderError::Write { path, source })?)
+    /// Ends the run where it may not go on.
+    fn watch(&self, row: &FrameRow) -> Result<(), RunError> {
+        if self.plan.strict && row.report.severity() >= Severity::MapAffected {
+            return Err(RunError::Strict { frame: row.frame, cause: row.cause() });
+        }
+        let limit_bytes = self.plan.rss_limit_bytes;
+        match row.rss_bytes {
+            Some(rss_bytes) if rss_bytes > limit_bytes => Err(RunError::Resident { frame: row.frame, rss_bytes, limit_bytes }),
+            _ => Ok(()),
+        }
     }
 }
 

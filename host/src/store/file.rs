@@ -1,10 +1,12 @@
-//! An append-only file of blocks with an index in memory.
+//! An append-only file of blocks.
 //!
-//! A block kept again gets a new record; the newest counts. A file left behind by a crash is read through once: every whole record is
+//! A block kept again gets a new record; the newest counts, and the ones before stay where they are: a drive that goes to and fro writes a
+//! record for each time a block leaves. A file left behind by a crash is read through once: every whole record is
 //! taken, and what follows the last whole one is cut off and reported. A write that fails (a full disk) ends the keeping, not the run.
 //!
-//! Memory: 24 bytes or so per block kept, for the index, and two buffers of a record.
+//! Memory: that of [`super::places`], two buffers of a record and a window of [`WINDOW`] bytes.
 
+use super::places::{Places, Tile, tile_of};
 use super::record::{self, HEADER, Header, LONGEST};
 use dynvox_core::volume::{BlockCoord, BlockStore, LeavingBlock, ReturningBlock};
 use hashbrown::HashMap;
@@ -15,9 +17,11 @@ use std::{
 };
 
 /// First bytes of a store; the last digit is the version.
-const MAGIC: [u8; 8] = *b"dynvoxB1";
+const MAGIC: [u8; 8] = *b"dynvoxB2";
 /// Magic, then voxel size and truncation (`f32`, little endian).
 const PREAMBLE: usize = 16;
+/// Bytes read at once on the way back along a tile's records.
+const WINDOW: usize = 1 << 16;
 
 /// Why a store cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -58,8 +62,8 @@ pub enum StoreError {
 /// What was found in a store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Opened {
-    /// Blocks in it.
-    pub blocks: usize,
+    /// Records in it, superseded ones included.
+    pub records: u64,
     /// Bytes of a torn or damaged tail that were cut off.
     pub cut_bytes: u64,
 }
@@ -68,9 +72,11 @@ pub struct Opened {
 #[derive(Debug)]
 pub struct BlockFile<F> {
     file: F,
-    /// Where the record of each block begins.
-    index: HashMap<BlockCoord, u64>,
+    places: Places,
+    records: u64,
     end: u64,
+    /// Bytes the file may grow to.
+    most: u64,
     /// Why keeping ended.
     failure: Option<io::Error>,
     /// Records that were kept and cannot be read back.
@@ -97,7 +103,7 @@ impl BlockFile<File> {
             }
             store.file.set_len(0).map_err(at)?;
             store.file.seek(SeekFrom::Start(0)).and_then(|_| store.file.write_all(&preamble)).map_err(at)?;
-            return Ok((store, Opened { blocks: 0, cut_bytes: len }));
+            return Ok((store, Opened { records: 0, cut_bytes: len }));
         }
         let found = store.head(PREAMBLE as u64).map_err(at)?;
         if found[..8] != MAGIC {
@@ -115,7 +121,7 @@ impl BlockFile<File> {
         }
         store.scan().map_err(at)?;
         store.file.set_len(store.end).map_err(at)?;
-        let opened = Opened { blocks: store.index.len(), cut_bytes: len - store.end };
+        let opened = Opened { records: store.records, cut_bytes: len - store.end };
         Ok((store, opened))
     }
 }
@@ -126,8 +132,10 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         let (record, scratch) = (Vec::with_capacity(HEADER + LONGEST), Vec::with_capacity(LONGEST));
         Self {
             file,
-            index: HashMap::new(),
+            places: Places::default(),
+            records: 0,
             end: PREAMBLE as u64,
+            most: u64::MAX,
             failure: None,
             unreadable: 0,
             record,
@@ -135,14 +143,14 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         }
     }
 
-    /// Blocks in the store.
-    pub fn len(&self) -> usize {
-        self.index.len()
+    /// Lets the file grow to `most` bytes and no further, as if the disk were full then.
+    pub fn limit(&mut self, most: u64) {
+        self.most = most;
     }
 
-    /// Whether nothing is kept.
-    pub fn is_empty(&self) -> bool {
-        self.index.is_empty()
+    /// Records in the store: more than blocks where one was kept again.
+    pub fn records(&self) -> u64 {
+        self.records
     }
 
     /// Bytes of the file, superseded records included.
@@ -161,15 +169,62 @@ impl<F: Read + Write + Seek> BlockFile<F> {
     }
 
     /// Whether a block is kept.
-    pub fn holds(&self, coord: BlockCoord) -> bool {
-        self.index.contains_key(&coord)
+    pub fn holds(&mut self, coord: BlockCoord) -> bool {
+        self.place(coord).is_some()
     }
 
-    /// The places of all blocks kept, ascending.
-    pub fn coords(&self) -> Vec<BlockCoord> {
-        let mut coords: Vec<_> = self.index.keys().copied().collect();
+    /// The tiles in which blocks are kept, ascending.
+    pub fn tiles(&self) -> Vec<Tile> {
+        self.places.tiles()
+    }
+
+    /// The blocks kept in a tile, ascending.
+    pub fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord> {
+        self.read_up(tile);
+        let mut coords: Vec<_> = self.places.records(tile).into_iter().flatten().map(|(coord, _)| *coord).collect();
         coords.sort_unstable();
         coords
+    }
+
+    /// Where the newest record of a block begins.
+    fn place(&mut self, coord: BlockCoord) -> Option<u64> {
+        let tile = tile_of(coord);
+        self.read_up(tile);
+        self.places.records(tile)?.get(&coord).copied()
+    }
+
+    /// Reads up where the records of a tile begin, unless it is known or there are none.
+    fn read_up(&mut self, tile: Tile) {
+        let Some(newest) = self.places.newest(tile) else { return };
+        if self.places.records(tile).is_some() {
+            return;
+        }
+        let mut records = HashMap::new();
+        // What lies behind a record that cannot be read is out of reach.
+        self.unreadable += u64::from(self.walk(tile, newest, &mut records).is_err());
+        self.places.open(tile, records);
+    }
+
+    /// Follows a tile's records from the newest back.
+    fn walk(&mut self, tile: Tile, newest: u64, records: &mut HashMap<BlockCoord, u64>) -> io::Result<()> {
+        let (mut window, mut first) = (Vec::new(), 0);
+        let mut at = newest;
+        while at != 0 {
+            let end = at + HEADER as u64;
+            if at < first || end > first + window.len() as u64 {
+                first = end.saturating_sub(WINDOW as u64);
+                window.resize((end - first) as usize, 0);
+                self.file.seek(SeekFrom::Start(first))?;
+                self.file.read_exact(&mut window)?;
+            }
+            let header = window.get((at - first) as usize..).and_then(|bytes| bytes.first_chunk()).and_then(Header::read);
+            // Each record lies before the one that names it, so the way ends.
+            let header = header.filter(|header| tile_of(header.coord) == tile && header.previous < at);
+            let header = header.ok_or(io::ErrorKind::InvalidData)?;
+            records.entry(header.coord).or_insert(at);
+            at = header.previous;
+        }
+        Ok(())
     }
 
     /// The first `len` bytes.
@@ -196,7 +251,8 @@ impl<F: Read + Write + Seek> BlockFile<F> {
             if payload.len() < read.len || !read.fits(&header, &payload) {
                 return Ok(());
             }
-            self.index.insert(read.coord, self.end);
+            self.places.enter(read.coord, self.end);
+            self.records += 1;
             self.end += (HEADER + read.len) as u64;
         }
     }
@@ -213,6 +269,9 @@ impl<F: Read + Write + Seek> BlockFile<F> {
     }
 
     fn append(&mut self) -> io::Result<()> {
+        if self.end + self.record.len() as u64 > self.most {
+            return Err(io::ErrorKind::QuotaExceeded.into());
+        }
         self.file.seek(SeekFrom::Start(self.end))?;
         self.file.write_all(&self.record)
     }
@@ -223,10 +282,12 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
         if self.failure.is_some() {
             return false;
         }
-        record::write(&block, &mut self.scratch, &mut self.record);
+        let previous = self.places.newest(tile_of(block.coord)).unwrap_or(0);
+        record::write(&block, previous, &mut self.scratch, &mut self.record);
         match self.append() {
             Ok(()) => {
-                self.index.insert(block.coord, self.end);
+                self.places.enter(block.coord, self.end);
+                self.records += 1;
                 self.end += self.record.len() as u64;
                 true
             }
@@ -239,7 +300,7 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
 
     fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
         // The record stays: should the run end before the block leaves again, what was kept is still there.
-        let Some(at) = self.index.get(&block.coord).copied() else { return false };
+        let Some(at) = self.place(block.coord) else { return false };
         let came = self.fetch(block.coord, at).unwrap_or(false) && record::read(&self.record, block, &mut self.scratch);
         self.unreadable += u64::from(!came);
         came

@@ -1,8 +1,11 @@
 //! Blocks on disk: where the map goes when it leaves memory, and where it comes back from.
 
 mod file;
+pub mod mesh;
+mod places;
 mod record;
 #[cfg(test)]
 mod tests;
 
 pub use file::{BlockFile, Opened, StoreError};
+pub use places::Tile;

@@ -1,13 +1,13 @@
 //! One block as bytes: a header with a checksum, then the voxels, compressed.
 //!
-//! Header, 16 bytes, little endian: x, y, z (`i16`), flags (`u16`, bit 0: colour), length of the payload (`u32`), CRC-32 of the first 12
-//! bytes and the payload. Payload: LZ4 of 512 distances (`i16`), 512 weights, and with colour three planes of 512 bytes.
+//! Header, 24 bytes, little endian: x, y, z (`i16`), flags (`u16`, bit 0: colour), where the last record of the same tile begins (`u64`, 0
+//! none), length of the payload (`u32`), CRC-32 of the first 20 bytes and the payload. Payload: LZ4 of 512 distances (`i16`), 512 weights, and with colour three planes of 512 bytes.
 
 use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, LeavingBlock, ReturningBlock};
 
 /// Bytes of a record's header.
-pub(super) const HEADER: usize = 16;
-const CHECKED: usize = 12;
+pub(super) const HEADER: usize = 24;
+const CHECKED: usize = 20;
 const PLAIN: usize = BLOCK_VOXELS * 3;
 const COLOURED: usize = BLOCK_VOXELS * 6;
 /// No payload is longer: LZ4's worst case for a coloured block.
@@ -18,6 +18,8 @@ const HAS_COLOUR: u16 = 1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub coord: BlockCoord,
+    /// Where the last record of the same tile begins; 0 none.
+    pub previous: u64,
     pub len: usize,
     flags: u16,
     checksum: u32,
@@ -31,8 +33,9 @@ impl Header {
         let header = Self {
             coord: BlockCoord { x: half(0), y: half(2), z: half(4) },
             flags: half(6) as u16,
-            len: word(8) as usize,
-            checksum: word(12),
+            previous: u64::from(word(8)) | u64::from(word(12)) << 32,
+            len: word(16) as usize,
+            checksum: word(CHECKED),
         };
         (header.len <= LONGEST && header.flags <= HAS_COLOUR).then_some(header)
     }
@@ -50,8 +53,8 @@ fn checksum(header: &[u8; HEADER], payload: &[u8]) -> u32 {
     crc.finalize()
 }
 
-/// Writes a block into `record`, header and all. `scratch` is working space.
-pub(super) fn write(block: &LeavingBlock<'_>, scratch: &mut Vec<u8>, record: &mut Vec<u8>) {
+/// Writes a block into `record`, header and all, as the one after `previous` in its tile. `scratch` is working space.
+pub(super) fn write(block: &LeavingBlock<'_>, previous: u64, scratch: &mut Vec<u8>, record: &mut Vec<u8>) {
     scratch.clear();
     scratch.extend(block.sdf.iter().flat_map(|sdf| sdf.to_le_bytes()));
     scratch.extend_from_slice(block.weight);
@@ -65,7 +68,8 @@ pub(super) fn write(block: &LeavingBlock<'_>, scratch: &mut Vec<u8>, record: &mu
     for (at, value) in [block.coord.x, block.coord.y, block.coord.z, flags as i16].into_iter().enumerate() {
         header[2 * at..2 * at + 2].copy_from_slice(&value.to_le_bytes());
     }
-    header[8..12].copy_from_slice(&(len as u32).to_le_bytes());
+    header[8..16].copy_from_slice(&previous.to_le_bytes());
+    header[16..CHECKED].copy_from_slice(&(len as u32).to_le_bytes());
     let sum = checksum(&header, &record[HEADER..]);
     header[CHECKED..].copy_from_slice(&sum.to_le_bytes());
     record[..HEADER].copy_from_slice(&header);

@@ -43,9 +43,17 @@ pub struct Triangle {
 impl Volume<'_> {
     /// Hands every triangle of the map to `sink` and returns how many there were.
     pub fn triangles(&self, config: &MeshConfig, sink: &mut impl FnMut(Triangle)) -> u64 {
+        self.triangles_of(config, |_| true, sink)
+    }
+
+    /// As [`Volume::triangles`], of the blocks that `wanted` picks alone; the others only lend their points. So a map can be drawn piece by
+    /// piece: a block's triangles need the blocks after it on each axis, and no more.
+    pub fn triangles_of(&self, config: &MeshConfig, wanted: impl Fn(BlockCoord) -> bool, sink: &mut impl FnMut(Triangle)) -> u64 {
         let mut count = 0;
         for slot in 0..self.pool.high_water() as u32 {
-            if let (Some(_), Some(coord)) = (self.pool.handle(slot), self.blocks.coord(slot)) {
+            if let (Some(_), Some(coord)) = (self.pool.handle(slot), self.blocks.coord(slot))
+                && wanted(coord)
+            {
                 let patch = Patch::load(self, slot, coord, config.min_weight);
                 patch.cells(|cell, inside| count += patch.polygonise(cell, inside, sink));
             }

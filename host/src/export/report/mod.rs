@@ -154,6 +154,7 @@ fn memory(run: &RunRecord) -> String {
         &[
             series(run, "resident memory of the process", COLOURS[4], |row| row.rss_bytes.map_or(f64::NAN, |bytes| bytes as f64 / MIB)),
             series(run, "slab", COLOURS[5], |_| run.slab_bytes as f64 / MIB),
+            series(run, "ceiling: the run fails above", COLOURS[2], |_| run.rss_limit_bytes as f64 / MIB),
         ],
         "MiB",
         0.0,
@@ -224,15 +225,47 @@ fn health(run: &RunRecord) -> String {
         100.0,
     );
     let refused = run.blocks_refused();
-    let words = match (refused, run.blocks_lost()) {
-        (0, 0) => "Every block asked for found room.".to_owned(),
-        (0, lost) => {
-            format!("<b>The pool was full: {} blocks unseen for longest left it for good.</b> A larger profile keeps them.", grouped(lost))
-        }
+    let mut words = match (refused, run.blocks_lost()) {
+        (0, 0) => "Every block asked for found room, and none was lost.".to_owned(),
+        (0, lost) => format!("<b>{} blocks are lost.</b>", grouped(lost)),
         (refused, _) => format!("<b>The pool was full: {} blocks found no room.</b> A larger profile maps them.", grouped(refused)),
     };
+    if let Some(failure) = &run.shelf_failure {
+        let _ = write!(words, " <b>map.blocks took no more ({}): what left the pool from there on is lost.</b>", escaped(failure));
+    }
     format!(
-        "<section><h2>Health</h2><p class=\"soft small\">{words}</p><div class=\"two\"><div>{matches}</div><div>{density}</div></div></section>"
+        "<section><h2>Health</h2><p class=\"soft small\">{words}</p>{}<div class=\"two\"><div>{matches}</div><div>{density}</div></div></section>",
+        counters(run)
+    )
+}
+
+/// Everything that is counted, over all frames.
+fn counters(run: &RunRecord) -> String {
+    let sum = |of: fn(&FrameRow) -> u32| run.rows.iter().map(|row| u64::from(of(row))).sum::<u64>();
+    let most = |of: fn(&FrameRow) -> u64| run.rows.iter().map(of).max().unwrap_or_default();
+    let rows = [
+        ("blocks used at most", u64::from(run.blocks_peak())),
+        ("blocks refused", run.blocks_refused()),
+        ("blocks that left the pool and were kept", sum(|row| row.report.allocation.eviction.kept)),
+        ("blocks that left with nothing in them", sum(|row| row.report.allocation.eviction.empty)),
+        ("blocks brought back", run.blocks_back()),
+        ("blocks lost", run.blocks_lost()),
+        ("blocks written at the end", u64::from(run.shelf.end.kept)),
+        ("records on disk, replaced ones included", run.shelf.records),
+        ("bytes on disk", run.shelf.bytes),
+        ("frames in the pruning window at most", most(|row| row.history_frames as u64)),
+        ("blocks visited by pruning", sum(|row| row.report.prune.visited) + u64::from(run.finish.visited)),
+        ("voxels reset", sum(|row| row.report.prune.voxels_reset) + u64::from(run.finish.voxels_reset)),
+        ("blocks freed by pruning", sum(|row| row.report.prune.blocks_freed) + u64::from(run.finish.blocks_freed)),
+        ("pruning visits carried over at most", most(|row| u64::from(row.report.prune.carried_over))),
+        ("frames pruned early", sum(|row| row.report.prune.early)),
+        ("features and matches dropped", sum(|row| row.report.dropped_features())),
+        ("frames with a guessed motion", run.held_frames() as u64),
+    ];
+    let rows: String = rows.iter().map(|(name, value)| format!("<tr><td>{name}<td class=n>{}</tr>", grouped(*value))).collect();
+    format!(
+        "<details><summary class=\"small\">Everything counted; worst: {}</summary><div class=\"scroll\"><table>{rows}</table></div></details>",
+        run.worst().name()
     )
 }
 
