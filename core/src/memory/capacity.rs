@@ -48,7 +48,7 @@ impl Capacity {
     pub const ONBOARD: Self = Self {
         image_width: 1_280,
         image_height: 384,
-        features: 16_000,
+        features: 24_000,
         matches: 10_000,
         blocks: 68_000,
         visible_blocks: 24_000,
