@@ -18,6 +18,7 @@ pub mod egomotion;
 pub mod executor;
 pub mod geometry;
 pub mod image;
+pub mod instances;
 pub mod mapper;
 pub mod memory;
 pub mod random;

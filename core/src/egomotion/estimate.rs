@@ -92,7 +92,7 @@ impl<'s> Estimator<'s> {
     }
 
     /// Positions, in the order handed in, of the matches the last estimate explains.
-    pub fn inliers(&self) -> impl Iterator<Item = u32> {
+    pub fn inliers(&self) -> impl Iterator<Item = u32> + Clone {
         self.inliers.iter().take(self.inlier_len).filter_map(|&index| self.points.source(index as usize))
     }
 

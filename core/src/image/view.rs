@@ -28,6 +28,13 @@ impl<'a, T> View<'a, T> {
         (data.len() >= span(width, height, stride)?).then_some(Self { data, width, height, stride })
     }
 
+    /// The part of `width` x `height` pixels from (`left`, `top`) on; `None` when it is empty or does not lie within.
+    pub fn part(&self, left: usize, top: usize, width: usize, height: usize) -> Option<Self> {
+        let within = left.checked_add(width)? <= self.width && top.checked_add(height)? <= self.height;
+        let first = top.checked_mul(self.stride)?.checked_add(left)?;
+        if within { Self::with_stride(self.data.get(first..)?, width, height, self.stride) } else { None }
+    }
+
     /// Width, px.
     pub fn width(&self) -> usize {
         self.width

@@ -17,6 +17,18 @@ pub struct Capacity {
     pub visible_blocks: usize,
     /// Frames the visible history spans. A longer `prune_lag` is cut to this, and each frame pruned early is counted.
     pub history_frames: usize,
+    /// Detections taken in one frame, at most [`crate::instances::MAX_DETECTIONS`]. Of more the lowest scores are refused and counted.
+    pub detections: usize,
+    /// Words of 64 pixels for the masks of one frame. Further masks are refused and counted.
+    pub mask_words: usize,
+    /// Things tracked. When all are taken the one unseen for longest goes; one seen lately stays and the new one is refused and counted.
+    pub tracks: usize,
+    /// Objects reconstructed at once, at most [`crate::instances::MAX_OBJECTS`]. The one fused longest ago is handed over for another.
+    pub objects: usize,
+    /// Voxel blocks of one object. Further ones are refused and counted.
+    pub object_blocks: usize,
+    /// Pixels of crops that wait for their object's motion. The oldest crops go first, and are counted.
+    pub crop_pixels: usize,
     /// Whether voxels have colour: 3,072 bytes a block with, 1,536 without.
     pub colour: bool,
 }
@@ -31,6 +43,12 @@ impl Capacity {
         blocks: 2_500,
         visible_blocks: 2_000,
         history_frames: 64,
+        detections: 16,
+        mask_words: 4_096,
+        tracks: 16,
+        objects: 2,
+        object_blocks: 150,
+        crop_pixels: 30_000,
         colour: false,
     };
     /// Below 64 MiB: KITTI at half size.
@@ -42,6 +60,12 @@ impl Capacity {
         blocks: 30_000,
         visible_blocks: 12_000,
         history_frames: 64,
+        detections: 32,
+        mask_words: 16_384,
+        tracks: 32,
+        objects: 4,
+        object_blocks: 700,
+        crop_pixels: 150_000,
         colour: false,
     };
     /// Below 256 MiB: KITTI at full size, in colour.
@@ -53,6 +77,12 @@ impl Capacity {
         blocks: 68_000,
         visible_blocks: 24_000,
         history_frames: 200,
+        detections: 64,
+        mask_words: 65_536,
+        tracks: 64,
+        objects: 8,
+        object_blocks: 1_200,
+        crop_pixels: 800_000,
         colour: true,
     };
     /// Below 2 GiB: a drive of some hundred metres at full size, in colour.
@@ -64,6 +94,12 @@ impl Capacity {
         blocks: 550_000,
         visible_blocks: 60_000,
         history_frames: 200,
+        detections: 64,
+        mask_words: 262_144,
+        tracks: 64,
+        objects: 16,
+        object_blocks: 4_000,
+        crop_pixels: 4_000_000,
         colour: true,
     };
 

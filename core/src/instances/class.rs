@@ -1,0 +1,196 @@
+//! What a detector may call a thing, whatever data set taught it, and what follows from the name.
+
+/// A kind of thing. One neutral list; names of PASCAL VOC, COCO, Cityscapes and KITTI map to it by [`Class::from_name`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Class {
+    /// Nothing that moves by itself, or nothing known.
+    #[default]
+    Other,
+    /// Passenger car.
+    Car,
+    /// Bus or coach.
+    Bus,
+    /// Lorry, trailer or caravan.
+    Truck,
+    /// Van.
+    Van,
+    /// Train or tram.
+    Train,
+    /// Somebody on foot or sitting.
+    Person,
+    /// Somebody on a bicycle or motorcycle.
+    Rider,
+    /// Bicycle.
+    Bicycle,
+    /// Motorcycle or moped.
+    Motorcycle,
+    /// Any animal.
+    Animal,
+}
+
+/// What the mapper does with a class.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Treatment {
+    /// Rigid and possibly moving: tracked and reconstructed in a volume of its own.
+    Reconstruct,
+    /// Possibly moving, but not rigid or not to be modelled: kept out of the static map, tracked, not reconstructed.
+    KeepOut,
+    /// Part of the static world.
+    Ignore,
+}
+
+/// All names known, lower case. VOC, COCO, Cityscapes, KITTI labels, MOTS.
+const NAMES: [(&str, Class); 43] = [
+    ("car", Class::Car),
+    ("bus", Class::Bus),
+    ("truck", Class::Truck),
+    ("lorry", Class::Truck),
+    ("trailer", Class::Truck),
+    ("caravan", Class::Truck),
+    ("van", Class::Van),
+    ("train", Class::Train),
+    ("tram", Class::Train),
+    ("on rails", Class::Train),
+    ("person", Class::Person),
+    ("pedestrian", Class::Person),
+    ("person_sitting", Class::Person),
+    ("rider", Class::Rider),
+    ("cyclist", Class::Rider),
+    ("bicycle", Class::Bicycle),
+    ("motorcycle", Class::Motorcycle),
+    ("motorbike", Class::Motorcycle),
+    ("bird", Class::Animal),
+    ("cat", Class::Animal),
+    ("dog", Class::Animal),
+    ("horse", Class::Animal),
+    ("sheep", Class::Animal),
+    ("cow", Class::Animal),
+    ("elephant", Class::Animal),
+    ("bear", Class::Animal),
+    ("zebra", Class::Animal),
+    ("giraffe", Class::Animal),
+    ("animal", Class::Animal),
+    ("aeroplane", Class::Other),
+    ("airplane", Class::Other),
+    ("boat", Class::Other),
+    ("bench", Class::Other),
+    ("building", Class::Other),
+    ("traffic light", Class::Other),
+    ("fire hydrant", Class::Other),
+    ("stop sign", Class::Other),
+    ("parking meter", Class::Other),
+    ("potted plant", Class::Other),
+    ("pottedplant", Class::Other),
+    ("misc", Class::Other),
+    ("dontcare", Class::Other),
+    ("background", Class::Other),
+];
+
+impl Class {
+    /// All classes, in the order of their codes.
+    pub const ALL: [Self; 11] = [
+        Self::Other,
+        Self::Car,
+        Self::Bus,
+        Self::Truck,
+        Self::Van,
+        Self::Train,
+        Self::Person,
+        Self::Rider,
+        Self::Bicycle,
+        Self::Motorcycle,
+        Self::Animal,
+    ];
+
+    /// The class a data set means by a name, whatever its case; `None` for a name nobody knows.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let name = name.trim();
+        NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|&(_, class)| class)
+    }
+
+    /// The class of a code, as tables keep it; [`Class::Other`] for a code there is none for.
+    pub fn from_code(code: u32) -> Self {
+        Self::ALL.get(code as usize).copied().unwrap_or_default()
+    }
+
+    /// The code: its place in [`Class::ALL`].
+    pub const fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// Name in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Other => "other",
+            Self::Car => "car",
+            Self::Bus => "bus",
+            Self::Truck => "truck",
+            Self::Van => "van",
+            Self::Train => "train",
+            Self::Person => "person",
+            Self::Rider => "rider",
+            Self::Bicycle => "bicycle",
+            Self::Motorcycle => "motorcycle",
+            Self::Animal => "animal",
+        }
+    }
+
+    /// What is done with it.
+    pub const fn treatment(self) -> Treatment {
+        match self {
+            Self::Car | Self::Bus | Self::Truck | Self::Van => Treatment::Reconstruct,
+            Self::Train | Self::Person | Self::Rider | Self::Bicycle | Self::Motorcycle | Self::Animal => Treatment::KeepOut,
+            Self::Other => Treatment::Ignore,
+        }
+    }
+
+    /// Whether a detector may call one thing by both names from frame to frame: four-wheelers flicker among each other, and so do
+    /// people and what they ride.
+    pub fn agrees_with(self, other: Self) -> bool {
+        let group = |class: Self| match class {
+            Self::Car | Self::Bus | Self::Truck | Self::Van => 1,
+            Self::Person | Self::Rider => 2,
+            Self::Bicycle | Self::Motorcycle => 3,
+            _ => 0,
+        };
+        self == other || (group(self) == group(other) && group(self) != 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_data_sets_words_for_a_thing_mean_the_thing() {
+        for (name, class) in [
+            ("car", Class::Car),
+            ("Van", Class::Van),
+            ("Pedestrian", Class::Person),
+            ("Cyclist", Class::Rider),
+            ("motorbike", Class::Motorcycle),
+            ("motorcycle", Class::Motorcycle),
+            ("zebra", Class::Animal),
+            ("DontCare", Class::Other),
+        ] {
+            assert_eq!(Class::from_name(name), Some(class), "{name}");
+        }
+        assert_eq!(Class::from_name("flying saucer"), None);
+        assert!(Class::ALL.iter().all(|&class| Class::from_code(class.code()) == class));
+        assert_eq!(Class::from_code(1000), Class::Other);
+    }
+
+    #[test]
+    fn only_four_wheelers_are_reconstructed_and_they_flicker_only_among_themselves() {
+        for class in Class::ALL {
+            let four_wheels = matches!(class, Class::Car | Class::Bus | Class::Truck | Class::Van);
+            assert_eq!(class.treatment() == Treatment::Reconstruct, four_wheels, "{class:?}");
+            assert_eq!(class.agrees_with(Class::Car), four_wheels, "{class:?}");
+            assert!(class.agrees_with(class));
+        }
+        assert_eq!(Class::Person.treatment(), Treatment::KeepOut);
+        assert_eq!(Class::Other.treatment(), Treatment::Ignore);
+        assert!(!Class::Train.agrees_with(Class::Animal));
+    }
+}

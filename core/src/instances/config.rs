@@ -1,0 +1,294 @@
+//! Settings of the instances. Speeds are in metres per second of real time: other frame rates need no other thresholds.
+
+use crate::{
+    config::{Problems, require},
+    egomotion::EgomotionConfig,
+    volume::{VolumeConfig, WhenFull},
+};
+
+/// Image width to which areas in px refer.
+const REFERENCE_WIDTH: u64 = 1242;
+
+/// How a detection is compared with a track.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum Overlap {
+    /// Intersection over union of the masks.
+    #[default]
+    Mask,
+    /// The same of the boxes (the original).
+    Box,
+}
+
+/// What is made of detections. Defaults are the original's published ones unless said otherwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct InstancesConfig {
+    /// Whether things that might move are kept apart. Without, everything goes into one map (the paper's robust odometry baseline).
+    pub dynamic: bool,
+    /// Time between two frames, s; above 0; 0.1.
+    pub frame_interval_s: f32,
+    /// Scores below are ignored; 0 to 1; 0.
+    pub score_min: f32,
+    /// A detection's box must be larger than this, px at an image width of 1242, at other widths in proportion to the width squared; 2025.
+    pub area_min_px: u32,
+    /// Scale of the mask under which nothing enters the static map, 1/1000; 1000 to 4000; 1200.
+    pub delete_permille: u16,
+    /// Boxes below this many times the least area, 1/1000, are scaled twice; 1375.
+    pub small_permille: u16,
+    /// What is compared in finding a detection's track. The original: boxes.
+    pub overlap: Overlap,
+    /// Overlap times the geometric mean of both scores times the discount for frames missed must be above this; 0 to 1; 0.1.
+    pub association_min: f32,
+    /// Frames after which a track not seen again is forgotten; 1 to 10000; 50.
+    pub forget_frames: u16,
+    /// Share of the image beyond which a thing of unknown state is kept out of the camera's egomotion; 0 to 1; 0.05. The original: 1.
+    pub large_share: f32,
+    /// How motions are estimated.
+    pub motion: MotionConfig,
+    /// What counts as moving.
+    pub state: StateConfig,
+    /// The objects' own volumes.
+    pub volume: ObjectVolumeConfig,
+}
+
+impl Default for InstancesConfig {
+    fn default() -> Self {
+        Self {
+            dynamic: true,
+            frame_interval_s: 0.1,
+            score_min: 0.0,
+            area_min_px: 2025,
+            delete_permille: 1200,
+            small_permille: 1375,
+            overlap: Overlap::Mask,
+            association_min: 0.1,
+            forget_frames: 50,
+            large_share: 0.05,
+            motion: MotionConfig::default(),
+            state: StateConfig::default(),
+            volume: ObjectVolumeConfig::default(),
+        }
+    }
+}
+
+impl InstancesConfig {
+    /// Whether a box of `area_px` in an image of that width is a detection: strictly larger than the least area.
+    pub(super) fn large_enough(&self, area_px: i64, width: usize) -> bool {
+        area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > self.least(width)
+    }
+
+    /// Least area times the reference width squared.
+    fn least(&self, width: usize) -> u64 {
+        u64::from(self.area_min_px) * (width as u64) * (width as u64)
+    }
+
+    /// How much the delete mask of a box is scaled, 1/1000.
+    pub(super) fn delete_permille(&self, area_px: i64, width: usize) -> u32 {
+        let small = area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000 < self.least(width) * u64::from(self.small_permille);
+        let once = u32::from(self.delete_permille);
+        if small { once * once / 1000 } else { once }
+    }
+
+    /// Notes what is wrong with the settings.
+    pub fn validate(&self, problems: &mut Problems) {
+        let positive = |value: f32| value.is_finite() && value > 0.0;
+        let share = |value: f32| (0.0..=1.0).contains(&value);
+        require(problems, positive(self.frame_interval_s), "instances.frame_interval_s", "must be above 0");
+        require(problems, share(self.score_min), "instances.score_min", "must be from 0 to 1");
+        require(problems, self.area_min_px <= 1 << 20, "instances.area_min_px", "must be at most 1048576");
+        require(problems, (1000..=4000).contains(&self.delete_permille), "instances.delete_permille", "must be in 1000..=4000");
+        require(problems, share(self.association_min), "instances.association_min", "must be from 0 to 1");
+        require(problems, (1..=10_000).contains(&self.forget_frames), "instances.forget_frames", "must be in 1..=10000");
+        require(problems, share(self.large_share), "instances.large_share", "must be from 0 to 1");
+        self.motion.validate(problems);
+        self.state.validate(problems);
+        self.volume.validate(problems);
+    }
+}
+
+/// How an object's motion is estimated and filtered. The original: no filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct MotionConfig {
+    /// Fewest matches, and fewest inliers are half of it; 6 to 1000; 18.
+    pub matches_min: u16,
+    /// Most hypotheses; 1 to 10000; 200 (the original: 500).
+    pub samples: u16,
+    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2.
+    pub inlier_px: f32,
+    /// Error of a match coordinate at the least, px; above 0.
+    pub noise_px: f32,
+    /// Matches of one object err alike: no more than so many count as independent; 3 to 1000.
+    pub independent_matches: u16,
+    /// How fast an object may be turning when it is first seen, one sigma, rad/s; above 0.
+    pub turn_rad_s: f32,
+    /// How fast it may be when first seen, one sigma, m/s; above 0.
+    pub speed_m_s: f32,
+    /// Change of speed within a second, one sigma, m/s; above 0.
+    pub acceleration_m_s2: f32,
+    /// Change of turning within a second, one sigma, rad/s; above 0.
+    pub turn_acceleration_rad_s2: f32,
+    /// Error of the camera's own rotation per frame, one sigma, rad: at a distance it looks like speed; at least 0.
+    pub camera_rad: f32,
+}
+
+impl Default for MotionConfig {
+    fn default() -> Self {
+        Self {
+            matches_min: 18,
+            samples: 200,
+            inlier_px: 2.0,
+            noise_px: 0.3,
+            independent_matches: 30,
+            turn_rad_s: 0.2,
+            speed_m_s: 20.0,
+            acceleration_m_s2: 4.0,
+            turn_acceleration_rad_s2: 0.3,
+            camera_rad: 0.0004,
+        }
+    }
+}
+
+impl MotionConfig {
+    /// The camera's estimator, set for objects.
+    pub(super) fn estimator(&self) -> EgomotionConfig {
+        EgomotionConfig {
+            samples: self.samples,
+            inlier_px: self.inlier_px,
+            refined_inlier_px: self.inlier_px,
+            matches_min: self.matches_min / 2,
+            side_knee: 10.0,
+            ..EgomotionConfig::default()
+        }
+    }
+
+    fn validate(&self, problems: &mut Problems) {
+        let positive = |value: f32| value.is_finite() && value > 0.0;
+        require(problems, (6..=1000).contains(&self.matches_min), "instances.motion.matches_min", "must be in 6..=1000");
+        require(problems, (1..=10_000).contains(&self.samples), "instances.motion.samples", "must be in 1..=10000");
+        require(problems, positive(self.inlier_px), "instances.motion.inlier_px", "must be above 0");
+        require(problems, positive(self.noise_px), "instances.motion.noise_px", "must be above 0");
+        require(problems, (3..=1000).contains(&self.independent_matches), "instances.motion.independent_matches", "must be in 3..=1000");
+        require(problems, positive(self.turn_rad_s), "instances.motion.turn_rad_s", "must be above 0");
+        require(problems, positive(self.speed_m_s), "instances.motion.speed_m_s", "must be above 0");
+        require(problems, positive(self.acceleration_m_s2), "instances.motion.acceleration_m_s2", "must be above 0");
+        require(problems, positive(self.turn_acceleration_rad_s2), "instances.motion.turn_acceleration_rad_s2", "must be above 0");
+        require(problems, self.camera_rad.is_finite() && self.camera_rad >= 0.0, "instances.motion.camera_rad", "must be at least 0");
+    }
+}
+
+/// When an object counts as moving or standing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct StateConfig {
+    /// Surely faster: moving, m/s; at least `static_m_s`. The published code: 5.5 (0.55 m a frame), its experiments: 2.
+    pub dynamic_m_s: f32,
+    /// Perhaps slower than this and surely slower than `dynamic_m_s`: standing, m/s; above 0. The published code: 0.3.
+    pub static_m_s: f32,
+    /// How many sigmas are "surely"; at least 0. The published code: 0.
+    pub sigmas: f32,
+    /// Frames in a row that must say so before an uncertain object gets a state; 1 to 100. The published code: 1.
+    pub confirm_frames: u8,
+    /// Frames in a row that must say so before a moving object counts as standing, or the other way round; 1 to 100. The published code
+    /// knows no such change.
+    pub change_frames: u8,
+    /// Frames without a motion over which a standing object stays one; 0 to 255; 5.
+    pub static_frames: u8,
+    /// Frames without a motion over which a moving object goes on as before; 0 to 255; 1.
+    pub dynamic_frames: u8,
+}
+
+impl Default for StateConfig {
+    fn default() -> Self {
+        Self {
+            dynamic_m_s: 0.8,
+            static_m_s: 0.3,
+            sigmas: 2.5,
+            confirm_frames: 2,
+            change_frames: 2,
+            static_frames: 5,
+            dynamic_frames: 1,
+        }
+    }
+}
+
+impl StateConfig {
+    fn validate(&self, problems: &mut Problems) {
+        let positive = |value: f32| value.is_finite() && value > 0.0;
+        require(problems, positive(self.static_m_s), "instances.state.static_m_s", "must be above 0");
+        let above = positive(self.dynamic_m_s) && self.dynamic_m_s >= self.static_m_s;
+        require(problems, above, "instances.state.dynamic_m_s", "must be at least instances.state.static_m_s");
+        require(problems, self.sigmas.is_finite() && self.sigmas >= 0.0, "instances.state.sigmas", "must be at least 0");
+        require(problems, (1..=100).contains(&self.confirm_frames), "instances.state.confirm_frames", "must be in 1..=100");
+        require(problems, (1..=100).contains(&self.change_frames), "instances.state.change_frames", "must be in 1..=100");
+    }
+}
+
+/// The objects' volumes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct ObjectVolumeConfig {
+    /// Distance between lattice points, m; 0.001 to 10; the original: 0.035.
+    pub voxel_size_m: f32,
+    /// Truncation, m; 2 to 64 voxels; the original: 1.0.
+    pub truncation_m: f32,
+    /// Farthest depth fused, m; above the map's `near_m`; 20.
+    pub far_m: f32,
+    /// How far from the object's median depth a pixel may lie, m: what shows through windows and at the rim stays out; above 0.
+    pub extent_m: f32,
+    /// Weight at which the average stops forgetting less, 1 to 255; 50.
+    pub max_weight: u8,
+    /// Voxels seen at most this often go when the object is pruned; 0 is off; 1.
+    pub prune_weight: u8,
+    /// Fused frames from one pruning of the whole object to the next; 1 to 255. With 1 a voxel must weigh more than `prune_weight` in its
+    /// first frame to stay.
+    pub prune_frames: u8,
+}
+
+impl Default for ObjectVolumeConfig {
+    fn default() -> Self {
+        Self {
+            voxel_size_m: 0.05,
+            truncation_m: 0.3,
+            far_m: 20.0,
+            extent_m: 5.0,
+            max_weight: 50,
+            prune_weight: 1,
+            prune_frames: 4,
+        }
+    }
+}
+
+impl ObjectVolumeConfig {
+    /// As the volume takes it: objects refuse blocks beyond their bound, for what leaves one could not come back.
+    pub(super) fn volume(&self) -> VolumeConfig {
+        VolumeConfig {
+            voxel_size_m: self.voxel_size_m,
+            truncation_m: self.truncation_m,
+            far_m: self.far_m,
+            max_weight: self.max_weight,
+            when_full: WhenFull::Refuse,
+            prune_weight: 0,
+            ..VolumeConfig::default()
+        }
+    }
+
+    fn validate(&self, problems: &mut Problems) {
+        let positive = |value: f32| value.is_finite() && value > 0.0;
+        let voxel = positive(self.voxel_size_m) && (0.001..=10.0).contains(&self.voxel_size_m);
+        require(problems, voxel, "instances.volume.voxel_size_m", "must be from 0.001 to 10 m");
+        let truncation = positive(self.truncation_m) && (2.0..=64.0).contains(&(self.truncation_m / self.voxel_size_m));
+        require(problems, truncation, "instances.volume.truncation_m", "must be from 2 to 64 voxels");
+        require(problems, positive(self.far_m), "instances.volume.far_m", "must be above 0");
+        require(problems, positive(self.extent_m), "instances.volume.extent_m", "must be above 0");
+        require(problems, self.max_weight >= 1, "instances.volume.max_weight", "must be from 1 to 255");
+        require(
+            problems,
+            self.prune_weight < self.max_weight,
+            "instances.volume.prune_weight",
+            "must be below instances.volume.max_weight",
+        );
+        require(problems, self.prune_frames >= 1, "instances.volume.prune_frames", "must be at least 1");
+    }
+}

@@ -1,0 +1,264 @@
+//! Detections as they come in, and those of them that are taken.
+//!
+//! A detection is refused, and counted, when its score is not a number in 0..=1, its box is empty or beside the image, or its mask is
+//! shorter than its box or empty. Of more than `capacity.detections` the lowest scores are refused. One that is too small, or of a class that
+//! does not move, is left to the static map. Where masks overlap the higher score is on top: the other loses the pixels.
+//!
+//! The order in the caller's list does not matter: detections are taken by score, then class, box and mask; two alike in all of these are
+//! alike. Time: linear in the pixels of the masks.
+
+use super::{Class, InstancesConfig, MaskPlace, MaskStore, PixelBox, Treatment, mask::ScaledMask};
+use crate::{
+    digest::Digest,
+    memory::{Capacity, Carver, SlabError, region_bytes},
+};
+use bytemuck::{Pod, Zeroable};
+use heapless::Vec;
+
+/// Most detections a capacity can ask for.
+pub const MAX_DETECTIONS: usize = 64;
+
+/// Largest side of a box, px.
+const MAX_SIDE: u32 = 1 << 15;
+
+/// Something a detector saw in the left image.
+#[derive(Clone, Copy, Debug)]
+pub struct Detection<'a> {
+    /// What it is said to be.
+    pub class: Class,
+    /// How sure the detector is; 0 to 1.
+    pub score: f32,
+    /// First column of the box, px; may lie beside the image.
+    pub left: i32,
+    /// First row of the box, px; may lie beside the image.
+    pub top: i32,
+    /// Columns of the box, px.
+    pub width: u32,
+    /// Rows of the box, px.
+    pub height: u32,
+    /// The mask, row by row within the box; a pixel belongs to it unless it is 0.
+    pub mask: &'a [u8],
+}
+
+/// What became of a frame's detections. Each detection is counted once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DetectionCount {
+    /// Handed in.
+    pub given: u32,
+    /// Taken.
+    pub taken: u32,
+    /// Score not a number in 0..=1.
+    pub bad_score: u32,
+    /// Box empty, absurdly large or wholly beside the image.
+    pub bad_box: u32,
+    /// Mask shorter than its box, or without a pixel in the image.
+    pub bad_mask: u32,
+    /// Of a class that is left to the static map.
+    pub ignored: u32,
+    /// Box not larger than the least area.
+    pub too_small: u32,
+    /// Too many: lowest scores.
+    pub beyond: u32,
+    /// No room for the mask.
+    pub no_room: u32,
+    /// Nothing left under masks of higher score.
+    pub covered: u32,
+}
+
+impl DetectionCount {
+    /// Detections that could not be used although they should have been.
+    pub fn refused(&self) -> u32 {
+        self.bad_score + self.bad_box + self.bad_mask + self.beyond + self.no_room
+    }
+}
+
+/// A detection that was taken.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Taken {
+    pub place: MaskPlace,
+    pub score: f32,
+    pub class: u32,
+    /// How much its delete mask is scaled, in 1/1000.
+    pub delete_permille: u32,
+    /// Position in the track table plus 1; 0 none.
+    pub track: u32,
+}
+
+impl Taken {
+    pub fn class(&self) -> Class {
+        Class::from_code(self.class)
+    }
+
+    /// The mask under which nothing enters the static map.
+    pub fn delete<'m, 's>(&self, store: &'m MaskStore<'s>) -> ScaledMask<'m, 's> {
+        ScaledMask::new(store, self.place, self.delete_permille)
+    }
+}
+
+/// A detection on its way in: what its order depends on, and where it stands in the caller's list.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    score_bits: u32,
+    class: Class,
+    whole: PixelBox,
+    digest: u64,
+    index: u32,
+}
+
+impl Candidate {
+    /// Best first: by score downwards, then by everything else that tells two apart.
+    fn key(&self) -> (u32, Class, PixelBox, u64, u32) {
+        (u32::MAX - self.score_bits, self.class, self.whole, self.digest, self.index)
+    }
+}
+
+/// The detections of a frame.
+#[derive(Debug)]
+pub(super) struct Detections<'s> {
+    taken: &'s mut [Taken],
+    len: usize,
+}
+
+impl<'s> Detections<'s> {
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        region_bytes::<Taken>(capacity.detections)
+    }
+
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+        Ok(Self { taken: carver.cut("instances.detection", capacity.detections)?, len: 0 })
+    }
+
+    pub fn all(&self) -> &[Taken] {
+        self.taken.get(..self.len).unwrap_or(&[])
+    }
+
+    pub fn all_mut(&mut self) -> &mut [Taken] {
+        self.taken.get_mut(..self.len).unwrap_or(&mut [])
+    }
+
+    /// Takes a frame's detections in, best first, their masks into `store`.
+    pub fn admit(
+        &mut self,
+        config: &InstancesConfig,
+        given: &[Detection<'_>],
+        [width, height]: [usize; 2],
+        store: &mut MaskStore<'_>,
+    ) -> DetectionCount {
+        self.len = 0;
+        let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
+        let mut count = DetectionCount { given: given.len() as u32, ..DetectionCount::default() };
+        for candidate in &choose(config, given, &image, self.taken.len(), &mut count) {
+            let Some(detection) = given.get(candidate.index as usize) else { continue };
+            let pixels = candidate.whole.intersection(&image);
+            let Some(place) = store.take(pixels) else {
+                count.no_room += 1;
+                continue;
+            };
+            pack(detection, &candidate.whole, &place, store);
+            let bare = store.area(&place) == 0;
+            self.all().iter().for_each(|above| store.subtract(&place, &above.place));
+            if store.area(&place) == 0 {
+                store.undo(place);
+                *(if bare { &mut count.bad_mask } else { &mut count.covered }) += 1;
+                continue;
+            }
+            if let Some(slot) = self.taken.get_mut(self.len) {
+                *slot = Taken {
+                    place,
+                    score: f32::from_bits(candidate.score_bits),
+                    class: candidate.class.code(),
+                    delete_permille: config.delete_permille(pixels.area(), width),
+                    track: 0,
+                };
+                self.len += 1;
+                count.taken += 1;
+            }
+        }
+        count
+    }
+}
+
+/// The best `most` of the detections that can be used, best first.
+fn choose(
+    config: &InstancesConfig,
+    given: &[Detection<'_>],
+    image: &PixelBox,
+    most: usize,
+    count: &mut DetectionCount,
+) -> Vec<Candidate, MAX_DETECTIONS> {
+    let mut best = Vec::<Candidate, MAX_DETECTIONS>::new();
+    let most = most.min(MAX_DETECTIONS);
+    for (index, detection) in (0..).zip(given) {
+        let Some(mut candidate) = check(config, detection, index, image, count) else { continue };
+        let full = best.len() >= most;
+        // The digest is dear: it is made only for what may stay.
+        if full && best.last().is_none_or(|worst| worst.score_bits > candidate.score_bits) {
+            count.beyond += 1;
+            continue;
+        }
+        let mut digest = Digest::default();
+        detection.mask.get(..candidate.whole.area() as usize).into_iter().for_each(|mask| digest.bytes(mask));
+        candidate.digest = digest.finish();
+        let at = best.iter().position(|other| candidate.key() < other.key()).unwrap_or(best.len());
+        if full {
+            count.beyond += 1;
+            best.pop();
+        }
+        if at <= best.len() {
+            let _ = best.insert(at, candidate);
+        } else {
+            let _ = best.push(candidate);
+        }
+    }
+    best
+}
+
+/// Whether a detection can be used, and what its order depends on.
+fn check(
+    config: &InstancesConfig,
+    detection: &Detection<'_>,
+    index: u32,
+    image: &PixelBox,
+    count: &mut DetectionCount,
+) -> Option<Candidate> {
+    let &Detection { class, score, left, top, width, height, mask } = detection;
+    // False for NaN.
+    if !(0.0..=1.0).contains(&score) {
+        count.bad_score += 1;
+        return None;
+    }
+    let near = |at: i32| at.unsigned_abs() <= MAX_SIDE;
+    let whole = PixelBox { left, top, width: width as i32, height: height as i32 };
+    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE || !near(left) || !near(top) {
+        count.bad_box += 1;
+        return None;
+    }
+    let pixels = whole.intersection(image);
+    if pixels.area() == 0 {
+        count.bad_box += 1;
+        return None;
+    }
+    if (mask.len() as u64) < u64::from(width) * u64::from(height) {
+        count.bad_mask += 1;
+        return None;
+    }
+    if class.treatment() == Treatment::Ignore || score < config.score_min {
+        count.ignored += 1;
+        return None;
+    }
+    if !config.large_enough(pixels.area(), image.width as usize) {
+        count.too_small += 1;
+        return None;
+    }
+    // Adding 0 turns -0 into 0: the bits of scores are then in the scores' order.
+    Some(Candidate { score_bits: (score + 0.0).to_bits(), class, whole, digest: 0, index })
+}
+
+/// Enters a caller's mask into the store.
+fn pack(detection: &Detection<'_>, whole: &PixelBox, place: &MaskPlace, store: &mut MaskStore<'_>) {
+    let rows = detection.mask.chunks_exact(detection.width.max(1) as usize).take(detection.height as usize);
+    for (v, row) in (whole.top..).zip(rows) {
+        store.enter_row(place, v, whole.left, row);
+    }
+}

@@ -1,0 +1,89 @@
+//! What a frame's instances came to, as plain values.
+
+use super::{Class, DetectionCount, PixelBox, State, TrackCount};
+use crate::geometry::Transform;
+
+/// A track as it stands after a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackReport {
+    /// Its number, from 1, never used again.
+    pub id: u32,
+    /// What it is, by majority of its sightings.
+    pub class: Class,
+    /// Whether it moves.
+    pub state: State,
+    /// Score of its last detection.
+    pub score: f32,
+    /// Whether it was seen in this frame.
+    pub seen: bool,
+    /// First frame it was seen in.
+    pub first_frame: u32,
+    /// Last frame it was seen in.
+    pub last_frame: u32,
+    /// Frames it was seen in.
+    pub sightings: u32,
+    /// Box in the left image, where it was last seen.
+    pub pixels: PixelBox,
+    /// Speed over ground and its error, one sigma, m/s; `None` while no motion was ever measured. Of a static object it is what was
+    /// measured, although its motion is taken to be none.
+    pub speed_m_s: Option<[f32; 2]>,
+    /// Whether the motion was measured in this frame; if not it is the last one's.
+    pub measured: bool,
+    /// Middle of its matches in the world, before this frame's motion, m.
+    pub center_world_m: [f64; 3],
+    /// Motion over ground within this frame, as [`super::Instances`] says; identity for a static object.
+    pub motion_world: Transform,
+    /// Its frame to the world; `None` while its poses do not connect.
+    pub t_world_object: Option<Transform>,
+    /// Matches on it in this frame.
+    pub matches: u32,
+    /// Of these, explained by its motion.
+    pub inliers: u32,
+    /// Blocks of its volume.
+    pub blocks: u32,
+}
+
+/// What became of volumes in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ObjectCount {
+    /// Objects with a volume.
+    pub objects: u32,
+    /// Objects fused in this frame.
+    pub fused: u32,
+    /// Earlier crops fused because a motion became known.
+    pub caught_up: u32,
+    /// Volumes begun.
+    pub begun: u32,
+    /// Volumes handed over.
+    pub retired: u32,
+    /// Objects for which there was no volume.
+    pub refused: u32,
+    /// Blocks refused because an object's volume was full, and such beyond its bounds.
+    pub blocks_refused: u32,
+    /// Crops that had to go although they still waited.
+    pub crops_dropped: u32,
+    /// Blocks in use over all objects.
+    pub blocks: u32,
+}
+
+/// One frame's instances.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct InstancesReport {
+    /// What became of the detections.
+    pub detections: DetectionCount,
+    /// What became of the tracks.
+    pub tracks: TrackCount,
+    /// What became of the volumes.
+    pub objects: ObjectCount,
+    /// Matches kept out of the camera's own motion.
+    pub matches_withheld: u32,
+    /// Pixels whose depth was kept out of the static map.
+    pub pixels_cleared: u32,
+}
+
+impl InstancesReport {
+    /// Whether anything that should have been used was not.
+    pub fn refused(&self) -> u32 {
+        self.detections.refused() + self.tracks.refused + self.objects.refused + self.objects.blocks_refused
+    }
+}
