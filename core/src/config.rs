@@ -3,6 +3,7 @@
 use crate::{
     egomotion::EgomotionConfig,
     geometry::{RigProblem, StereoRig},
+    instances::InstancesConfig,
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
     volume::{MeshConfig, RaycastConfig, VolumeConfig},
@@ -42,6 +43,8 @@ pub struct Config {
     pub scene_flow: SceneFlowConfig,
     /// The camera's motion.
     pub egomotion: EgomotionConfig,
+    /// What moves or could.
+    pub instances: InstancesConfig,
     /// The map.
     pub volume: VolumeConfig,
     /// Views of the map.
@@ -58,6 +61,7 @@ impl Config {
             stereo: StereoConfig::default(),
             scene_flow: SceneFlowConfig::default(),
             egomotion: EgomotionConfig::default(),
+            instances: InstancesConfig::default(),
             volume: VolumeConfig::default(),
             raycast: RaycastConfig::default(),
             mesh: MeshConfig::default(),
@@ -74,6 +78,7 @@ impl Config {
         self.stereo.validate(&mut problems);
         self.scene_flow.validate(&mut problems);
         self.egomotion.validate(&mut problems);
+        self.instances.validate(&mut problems);
         self.volume.validate(&mut problems);
         self.raycast.validate(&mut problems);
         self.mesh.validate(&mut problems);

@@ -10,6 +10,8 @@ pub enum Stage {
     SceneFlow,
     /// Camera motion from the matches.
     Egomotion,
+    /// What moves or could: detections, tracks, motions, volumes of objects.
+    Instances,
     /// Blocks made and marked visible.
     Allocate,
     /// Depth and colour averaged into voxels.
@@ -22,7 +24,7 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in pipeline order.
-    pub const ALL: [Self; 7] = [Self::Stereo, Self::SceneFlow, Self::Egomotion, Self::Allocate, Self::Fuse, Self::Prune, Self::Raycast];
+    pub const ALL: [Self; 8] = [Self::Stereo, Self::SceneFlow, Self::Egomotion, Self::Instances, Self::Allocate, Self::Fuse, Self::Prune, Self::Raycast];
 
     /// Name in tables and files.
     pub const fn name(self) -> &'static str {
@@ -30,6 +32,7 @@ impl Stage {
             Self::Stereo => "stereo",
             Self::SceneFlow => "scene_flow",
             Self::Egomotion => "egomotion",
+            Self::Instances => "instances",
             Self::Allocate => "allocate",
             Self::Fuse => "fuse",
             Self::Prune => "prune",

@@ -5,7 +5,7 @@
 //! Environments* (ICRA 2018).
 //!
 //! Data flows one way: [`memory`], [`image`] and [`geometry`] are the ground; [`stereo`] and [`scene_flow`] stand on them;
-//! [`egomotion`] on `scene_flow`; [`volume`] on the ground alone; [`mapper`] is the roof and the only one that knows them all.
+//! [`egomotion`] on `scene_flow`; [`volume`] on the ground alone; [`instances`] on both; [`mapper`] is the roof and the only one that knows them all.
 #![no_std]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
 
@@ -16,6 +16,7 @@ pub mod config;
 pub mod digest;
 pub mod egomotion;
 pub mod executor;
+pub mod frame;
 pub mod geometry;
 pub mod image;
 pub mod instances;
@@ -29,7 +30,7 @@ pub mod volume;
 
 pub use config::Config;
 pub use executor::{Executor, Serial, Stage};
-pub use image::StereoFrame;
+pub use frame::StereoFrame;
 pub use mapper::{Mapper, NewError, StepError};
 pub use memory::{Capacity, Footprint, Slab};
 pub use report::{Report, Severity};

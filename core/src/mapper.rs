@@ -4,9 +4,11 @@ use crate::{
     Capacity, Executor, Footprint, Stage,
     config::{Config, Problem},
     digest::Digest,
-    egomotion::{Egomotion, Estimator},
+    egomotion::{Egomotion, Estimator, MotionEstimate},
     geometry::{Transform, depth_from_disparity},
-    image::{StereoFrame, View, ViewMut},
+    frame::StereoFrame,
+    image::{View, ViewMut},
+    instances::{CameraMotion, Detection, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, TrackReport},
     memory::{Carver, SlabError, region_bytes},
     report::{BlockCount, Report},
     scene_flow::{FlowMatcher, FlowStatus},
@@ -69,6 +71,7 @@ pub struct Mapper<'s> {
     scene_flow: FlowMatcher<'s>,
     estimator: Estimator<'s>,
     camera: Egomotion,
+    instances: Instances<'s>,
     depth_m: &'s mut [f32],
     background: Volume<'s>,
     raycaster: Raycaster<'s>,
@@ -84,6 +87,7 @@ impl Capacity {
         StereoMatcher::bytes(self)
             + FlowMatcher::bytes(self)
             + Estimator::bytes(self)
+            + Instances::bytes(self)
             + region_bytes::<f32>(self.pixels())
             + Volume::bytes(self)
             + Raycaster::bytes(self)
@@ -113,6 +117,7 @@ impl<'s> Mapper<'s> {
             scene_flow: FlowMatcher::carve(capacity, &mut carver)?,
             estimator: Estimator::carve(capacity, &mut carver)?,
             camera: Egomotion::default(),
+            instances: Instances::carve(capacity, &config.instances, &mut carver)?,
             depth_m: carver.cut("depth_m", capacity.pixels())?,
             background: Volume::carve(capacity, &config.volume, &mut carver)?,
             raycaster: Raycaster::carve(capacity, &config.raycast, &mut carver)?,
@@ -127,44 +132,58 @@ impl<'s> Mapper<'s> {
     /// Takes one frame: depth, motion, map. Never allocates, never panics; what could not be done is counted in the report. Blocks that
     /// must leave a full pool are lost, and counted.
     pub fn step<E: Executor>(&mut self, frame: &StereoFrame<'_>, executor: &E) -> Result<Report, StepError> {
-        self.step_with(frame, executor, &mut NoStore)
+        self.step_with(frame, executor, &mut NoStore, &mut NoSink)
     }
 
-    /// As [`Mapper::step`], with a store that keeps the blocks that must leave and brings them back when they are seen again.
-    pub fn step_with<E: Executor, S: BlockStore>(
+    /// As [`Mapper::step`], with a store that keeps the blocks that must leave and brings them back when they are seen again, and a sink
+    /// for objects that leave.
+    pub fn step_with<E: Executor, S: BlockStore, O: ObjectSink>(
         &mut self,
         frame: &StereoFrame<'_>,
         executor: &E,
         store: &mut S,
+        objects: &mut O,
     ) -> Result<Report, StepError> {
         let [width, height] = self.admit(frame)?;
-        let (config, left, right) = (&self.config, frame.left, frame.right);
+        let (config, left, right) = (self.config, frame.left, frame.right);
 
         // (A) Depth from the pair, and (C.1) sparse scene flow over this pair and the last: neither needs the other.
         let (stereo, scene_flow) = executor.join(
             || executor.stage(Stage::Stereo, || self.stereo.compute(&config.stereo, left, right, executor)),
             || executor.stage(Stage::SceneFlow, || self.scene_flow.push(&config.scene_flow, left, right, executor)),
         );
-        // (C.2) The camera's own motion. The first frame's camera is the world.
-        let matches = self.scene_flow.bucketed();
-        let egomotion = executor.stage(Stage::Egomotion, || {
-            (scene_flow.status == FlowStatus::Matched)
-                .then(|| self.camera.step(&config.egomotion, &config.rig, matches, &mut self.estimator))
+        // (B) What a detector saw, joined to what is tracked, with the matches on it.
+        executor.stage(Stage::Instances, || {
+            self.instances.admit(self.frame, frame.detections, [width, height]);
+            self.instances.claim(self.scene_flow.refined());
         });
-        let t_world_camera = *self.camera.t_world_camera();
-        // (E) What the camera sees goes into the map, unless its pose is a guess.
+        // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
+        let egomotion =
+            executor.stage(Stage::Egomotion, || (scene_flow.status == FlowStatus::Matched).then(|| self.move_camera([width, height])));
         let fused = self.camera.held_frames() == 0;
-        let view = Viewpoint { rig: config.rig, width, height, t_world_camera };
+        let moved = egomotion.filter(|_| fused).map(|_| *self.camera.t_current_previous());
+        let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous: moved };
+        // (D) The objects' motions.
+        executor.stage(Stage::Instances, || {
+            self.instances.follow(&config.rig, self.scene_flow.refined(), &camera, &mut self.estimator);
+        });
+        // (E) What the camera sees goes into the map, but for what might move, which has maps of its own; unless the pose is a guess.
+        let view = Viewpoint { rig: config.rig, width, height, t_world_camera: camera.t_world_camera };
         let allocation = if fused { self.fuse(frame, &view, executor, store) } else { AllocationReport::default() };
+        executor.stage(Stage::Instances, || {
+            let (picture, disparity) = (Picture { grey: left, colour: frame.colour }, self.stereo.disparity_q8());
+            self.instances.reconstruct(&self.config.rig, &picture, disparity, &camera, fused, executor, objects);
+        });
         // (F) Noise last seen a fixed lag ago goes.
         let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
 
         let report = Report {
             frame: self.frame,
-            t_world_camera,
+            t_world_camera: camera.t_world_camera,
             stereo,
             scene_flow,
             egomotion,
+            instances: *self.instances.report(),
             fused,
             allocation,
             prune,
@@ -199,6 +218,20 @@ impl<'s> Mapper<'s> {
         Ok(size)
     }
 
+    /// Moves the camera by the matches that lie on nothing that moves.
+    fn move_camera(&mut self, size: [usize; 2]) -> MotionEstimate {
+        let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
+        let (estimate, withheld) = {
+            let guides = self.instances.guides_camera(size);
+            let guiding = selection.iter().filter(|&&index| guides(index));
+            let withheld = selection.len() - guiding.clone().count();
+            let matches = guiding.filter_map(|&index| refined.get(index as usize));
+            (self.camera.step(&self.config.egomotion, &self.config.rig, matches, &mut self.estimator), withheld)
+        };
+        self.instances.note_withheld(withheld as u32);
+        estimate
+    }
+
     /// Turns the disparity into depth, makes blocks around it and averages it in.
     fn fuse<E: Executor, S: BlockStore>(
         &mut self,
@@ -210,6 +243,7 @@ impl<'s> Mapper<'s> {
         let Some(mut depth_m) = ViewMut::new(self.depth_m, view.width, view.height) else { return AllocationReport::default() };
         let volume = &self.config.volume;
         depth_from_disparity(&view.rig, volume.near_m, volume.far_m, self.stereo.disparity_q8(), &mut depth_m);
+        self.instances.clear(&mut depth_m);
         let seen = Observation {
             depth_m: depth_m.as_view(),
             grey: frame.left,
@@ -221,9 +255,25 @@ impl<'s> Mapper<'s> {
         allocation
     }
 
-    /// Ends a drive: prunes what is still in the window.
+    /// Ends a drive: prunes what is still in the window. Objects are lost; see [`Mapper::finish_with`].
     pub fn finish(&mut self) -> PruneReport {
+        self.finish_with(&mut NoSink)
+    }
+
+    /// As [`Mapper::finish`], with a sink for the objects there still are.
+    pub fn finish_with<O: ObjectSink>(&mut self, objects: &mut O) -> PruneReport {
+        self.instances.finish(objects);
         self.background.finish()
+    }
+
+    /// What is tracked, as it stands after the last frame, by age.
+    pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
+        self.instances.tracks()
+    }
+
+    /// The objects reconstructed now, each with its own map.
+    pub fn objects(&self) -> impl Iterator<Item = (&ObjectSummary, &Object<'s>)> {
+        self.instances.objects()
     }
 
     /// Lets every block of the static map leave into `store`, so that the store holds the whole map.
@@ -241,13 +291,14 @@ impl<'s> Mapper<'s> {
         }
     }
 
-    /// Digest of all that frames to come depend on in the result: the pose and the map.
+    /// Digest of all that frames to come depend on in the result: the pose, the map, tracks and objects.
     fn digest(&self) -> u64 {
         let pose = self.camera.t_world_camera();
         let mut digest = Digest::default();
         digest.u64(u64::from(self.frame));
         pose.rotation.coords.iter().chain(pose.translation.vector.iter()).for_each(|&value| digest.f64(value));
         digest.u64(self.background.digest());
+        digest.u64(self.instances.digest());
         digest.finish()
     }
 
@@ -278,16 +329,18 @@ impl<'s> Mapper<'s> {
     pub fn footprint(&self) -> Footprint {
         let mut footprint = self.footprint.clone();
         self.background.note_use(&mut footprint);
+        self.instances.note_use(&mut footprint);
         self.raycaster.note_use(&mut footprint);
         footprint
     }
 }
 
-/// Digest of the images, row by row.
+/// Digest of the images, row by row, and of the detections, whatever their order.
 fn input_digest(frame: &StereoFrame<'_>) -> u64 {
     let mut digest = Digest::default();
     frame.left.rows().chain(frame.right.rows()).for_each(|row| digest.bytes(row));
     frame.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
     frame.class.iter().flat_map(View::rows).for_each(|row| digest.bytes(row));
+    digest.u64(frame.detections.iter().map(Detection::digest).fold(0, u64::wrapping_add));
     digest.finish()
 }

@@ -3,6 +3,7 @@
 use crate::{
     egomotion::MotionEstimate,
     geometry::Transform,
+    instances::InstancesReport,
     scene_flow::FlowReport,
     stereo::StereoReport,
     volume::{AllocationReport, PruneReport},
@@ -57,6 +58,8 @@ pub struct Report {
     pub scene_flow: FlowReport,
     /// The camera's motion; none was looked for in the first frame.
     pub egomotion: Option<MotionEstimate>,
+    /// What moves or could; [`crate::Mapper::tracks`] has the tracks one by one.
+    pub instances: InstancesReport,
     /// Whether the frame was fused. One whose pose had to be guessed is not: it would smear the map.
     pub fused: bool,
     /// Blocks made and refused.

@@ -52,6 +52,7 @@ impl Clip {
             right: View::new(&frame.right_grey, width, height).expect("a whole image"),
             colour: None,
             class: None,
+            detections: &[],
         })
     }
 

@@ -40,6 +40,18 @@ pub struct Detection<'a> {
     pub mask: &'a [u8],
 }
 
+impl Detection<'_> {
+    /// Digest of all that it says.
+    pub fn digest(&self) -> u64 {
+        let mut digest = Digest::default();
+        digest.u64(u64::from(self.score.to_bits()) << 32 | u64::from(self.class.code()));
+        digest.u64(u64::from(self.left as u32) << 32 | u64::from(self.top as u32));
+        digest.u64(u64::from(self.width) << 32 | u64::from(self.height));
+        digest.bytes(self.mask);
+        digest.finish()
+    }
+}
+
 /// What became of a frame's detections. Each detection is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DetectionCount {

@@ -74,7 +74,7 @@ impl Capacity {
         image_height: 384,
         features: 24_000,
         matches: 10_000,
-        blocks: 68_000,
+        blocks: 53_000,
         visible_blocks: 24_000,
         history_frames: 200,
         detections: 64,

@@ -1,0 +1,18 @@
+//! What the mapper takes, frame by frame.
+
+use crate::{image::View, instances::Detection};
+
+/// One stereo frame as the core takes it: rectified, equal sizes, 8 bit.
+#[derive(Clone, Copy, Debug)]
+pub struct StereoFrame<'a> {
+    /// Left grey image.
+    pub left: View<'a, u8>,
+    /// Right grey image.
+    pub right: View<'a, u8>,
+    /// Left image in colour, for fusion; grey is fused where it is absent.
+    pub colour: Option<View<'a, [u8; 3]>>,
+    /// Semantic class of each left pixel, an index into `VolumeConfig::class_weight`; all weights are 1 where it is absent.
+    pub class: Option<View<'a, u8>>,
+    /// What a detector saw in the left image, in any order; empty where there is none.
+    pub detections: &'a [Detection<'a>],
+}
