@@ -155,7 +155,7 @@ impl<'s> Mapper<'s> {
         // (B) What a detector saw, joined to what is tracked, with the matches on it.
         executor.stage(Stage::Instances, || {
             self.instances.admit(self.frame, frame.detections, [width, height]);
-            self.instances.claim(self.scene_flow.refined());
+            self.instances.claim(self.scene_flow.refined(), self.scene_flow.sparse());
         });
         // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
         let egomotion =
@@ -165,7 +165,7 @@ impl<'s> Mapper<'s> {
         let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous: moved };
         // (D) The objects' motions.
         executor.stage(Stage::Instances, || {
-            self.instances.follow(&config.rig, self.scene_flow.refined(), &camera, &mut self.estimator);
+            self.instances.follow(&config.rig, self.scene_flow.refined(), self.scene_flow.sparse(), &camera, &mut self.estimator);
         });
         // (E) What the camera sees goes into the map, but for what might move, which has maps of its own; unless the pose is a guess.
         let view = Viewpoint { rig: config.rig, width, height, t_world_camera: camera.t_world_camera };
@@ -265,6 +265,9 @@ impl<'s> Mapper<'s> {
         self.instances.finish(objects);
         self.background.finish()
     }
+
+    /// TEMP
+    pub fn flow(&self) -> &FlowMatcher<'s> { &self.scene_flow }
 
     /// What is tracked, as it stands after the last frame, by age.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {

@@ -111,8 +111,12 @@ impl InstancesConfig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct MotionConfig {
-    /// Fewest matches, and fewest inliers are half of it; 6 to 1000; 18.
+    /// Fewest matches a first motion is made of; 6 to 1000; 18.
     pub matches_min: u16,
+    /// Fewest matches once there is a motion to go by; 6 to 1000; 9 (the original: 18 always).
+    pub matches_again: u16,
+    /// Refined matches from which on sparse ones are not looked at; at most 10000; 60 (the original: sparse ones only).
+    pub matches_enough: u16,
     /// Most hypotheses; 1 to 10000; 200 (the original: 500).
     pub samples: u16,
     /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2.
@@ -137,6 +141,8 @@ impl Default for MotionConfig {
     fn default() -> Self {
         Self {
             matches_min: 18,
+            matches_again: 9,
+            matches_enough: 60,
             samples: 200,
             inlier_px: 2.0,
             noise_px: 0.3,
@@ -157,7 +163,7 @@ impl MotionConfig {
             samples: self.samples,
             inlier_px: self.inlier_px,
             refined_inlier_px: self.inlier_px,
-            matches_min: self.matches_min / 2,
+            matches_min: 6,
             side_knee: 10.0,
             ..EgomotionConfig::default()
         }
@@ -166,6 +172,8 @@ impl MotionConfig {
     fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         require(problems, (6..=1000).contains(&self.matches_min), "instances.motion.matches_min", "must be in 6..=1000");
+        require(problems, (6..=1000).contains(&self.matches_again), "instances.motion.matches_again", "must be in 6..=1000");
+        require(problems, self.matches_enough <= 10_000, "instances.motion.matches_enough", "must be at most 10000");
         require(problems, (1..=10_000).contains(&self.samples), "instances.motion.samples", "must be in 1..=10000");
         require(problems, positive(self.inlier_px), "instances.motion.inlier_px", "must be above 0");
         require(problems, positive(self.noise_px), "instances.motion.noise_px", "must be above 0");

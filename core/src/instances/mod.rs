@@ -25,8 +25,10 @@
 //!
 //! # Which matches
 //!
-//! Those refined below the pixel whose current left keypoint lies under the delete mask (and under no other's copy mask) and whose previous
-//! one lay in the track's previous mask. At least `matches_min`. The estimator sorts out the outliers, beginning at the motion so far,
+//! Those whose current left keypoint lies under the delete mask (and under no other's copy mask) and whose previous one lay in the track's
+//! previous mask: the matches refined below the pixel and, where these are fewer than `matches_enough`, sparse ones of other features:
+//! they are found also where few neighbours move alike. At least `matches_min` the first time, at least `matches_again` once there is a
+//! motion to go by. The estimator sorts out the outliers, beginning at the motion so far,
 //! with draws of its own for each track and frame; the filter ([`MotionConfig`]) takes the rest in.
 //!
 //! # Memory
@@ -103,8 +105,9 @@ pub struct Instances<'s> {
     now: usize,
     detections: Detections<'s>,
     tracks: Tracks<'s>,
-    /// For each match the position of the detection it lies on, plus 1.
+    /// For each refined match the position of the detection it lies on, plus 1; and for each sparse one.
     owner: &'s mut [u8],
+    sparse_owner: &'s mut [u8],
     crops: Crops<'s>,
     objects: Objects<'s>,
     frame: u32,
@@ -117,6 +120,7 @@ impl<'s> Instances<'s> {
         2 * region_bytes::<u64>(capacity.mask_words)
             + Detections::bytes(capacity)
             + Tracks::bytes(capacity)
+            + region_bytes::<u8>(capacity.matches)
             + region_bytes::<u8>(capacity.matches)
             + Crops::bytes(capacity)
             + Objects::bytes(capacity)
@@ -134,6 +138,7 @@ impl<'s> Instances<'s> {
             detections: Detections::carve(capacity, carver)?,
             tracks: Tracks::carve(capacity, carver)?,
             owner: carver.cut("instances.owner", capacity.matches)?,
+            sparse_owner: carver.cut("instances.sparse_owner", capacity.matches)?,
             crops: Crops::carve(capacity, carver)?,
             objects: Objects::carve(capacity, &config.volume, carver)?,
             frame: 0,
@@ -161,10 +166,11 @@ impl<'s> Instances<'s> {
     }
 
     /// Finds out which detection each match lies on: under its copy mask or else, for the best, under its delete mask.
-    pub fn claim(&mut self, matches: &[Match]) {
+    pub fn claim(&mut self, refined: &[Match], sparse: &[Match]) {
         let masks = if self.now == 0 { &self.masks[0] } else { &self.masks[1] };
         let detections = self.detections.all();
-        for (owner, m) in self.owner.iter_mut().zip(matches) {
+        let owners = self.owner.iter_mut().zip(refined).chain(self.sparse_owner.iter_mut().zip(sparse));
+        for (owner, m) in owners {
             let (u, v) = pixel(m.current_left);
             let lies = |mut under: &mut dyn FnMut(&detection::Taken) -> bool| detections.iter().position(&mut under);
             let copy = lies(&mut |detection| masks.contains(&detection.place, u, v));
@@ -203,7 +209,7 @@ impl<'s> Instances<'s> {
     }
 
     /// Each track's motion, state and pose in this frame, from the matches handed to [`Instances::claim`].
-    pub fn follow(&mut self, rig: &StereoRig, matches: &[Match], camera: &CameraMotion, estimator: &mut Estimator<'_>) {
+    pub fn follow(&mut self, rig: &StereoRig, refined: &[Match], sparse: &[Match], camera: &CameraMotion, estimator: &mut Estimator<'_>) {
         let [a, b] = &self.masks;
         let before = if self.now == 0 { b } else { a };
         let known = |track: &Track| track.judgement.state() != State::Uncertain;
@@ -218,7 +224,15 @@ impl<'s> Instances<'s> {
                     let (u, v) = pixel(m.previous_left);
                     u32::from(owner) == track.detection && before.contains(&place, u, v)
                 };
-                let own = matches.iter().zip(&*self.owner).filter(mine).map(|(m, _)| m);
+                let own = refined.iter().zip(&*self.owner).filter(mine).map(|(m, _)| m);
+                let enough = own.clone().count() >= usize::from(self.config.motion.matches_enough);
+                // Sparse matches of the same features say nothing new.
+                for (m, owner) in sparse.iter().zip(self.sparse_owner.iter_mut()).filter(|(_, owner)| u32::from(**owner) == track.detection) {
+                    if enough || own.clone().any(|other| near(m.current_left, other.current_left)) {
+                        *owner = 0;
+                    }
+                }
+                let own = own.chain(sparse.iter().zip(&*self.sparse_owner).filter(mine).map(|(m, _)| m));
                 let ground = Ground { rig, t_world_camera: &camera.t_world_camera, t_current_previous, interval_s };
                 let seed = SEED ^ u64::from(track.id) << 32 ^ u64::from(self.frame);
                 let seen = measure(&self.config.motion, &ground, own, &mut track.filter, seed, estimator);
@@ -478,7 +492,8 @@ fn measure<'m>(
 ) -> Measured {
     let points = matches.clone().count() as u32;
     let mut measured = Measured { matches: points, inliers: 0, measured: false };
-    if points < u32::from(config.matches_min) {
+    let needed = if filter.is_known() { config.matches_again } else { config.matches_min };
+    if points < u32::from(needed) {
         return measured;
     }
     // Where the motion so far would take the object, seen from the camera.
@@ -567,6 +582,12 @@ fn place(track: &mut Track, t_world_camera: &Transform, was_known: bool, interva
     } else {
         track.chain = 0;
     }
+}
+
+/// Whether two keypoints are one.
+fn near(a: [f32; 2], b: [f32; 2]) -> bool {
+    let [u, v] = [a[0] - b[0], a[1] - b[1]];
+    u * u + v * v < 2.0
 }
 
 /// The pixel a keypoint lies in; one far beside every image for what is not a number.
