@@ -147,10 +147,10 @@ impl Default for MotionConfig {
             inlier_px: 2.0,
             noise_px: 0.3,
             independent_matches: 30,
-            turn_rad_s: 0.2,
+            turn_rad_s: 0.1,
             speed_m_s: 20.0,
-            acceleration_m_s2: 4.0,
-            turn_acceleration_rad_s2: 0.3,
+            acceleration_m_s2: 3.0,
+            turn_acceleration_rad_s2: 0.1,
             camera_rad: 0.0004,
         }
     }
@@ -192,10 +192,12 @@ impl MotionConfig {
 pub struct StateConfig {
     /// Surely faster: moving, m/s; at least `static_m_s`. The published code: 5.5 (0.55 m a frame), its experiments: 2.
     pub dynamic_m_s: f32,
-    /// Perhaps slower than this and surely slower than `dynamic_m_s`: standing, m/s; above 0. The published code: 0.3.
+    /// Perhaps slower than this and likely slower than `dynamic_m_s`: standing, m/s; above 0. The published code: 0.3.
     pub static_m_s: f32,
     /// How many sigmas are "surely"; at least 0. The published code: 0.
     pub sigmas: f32,
+    /// How many sigmas are "likely"; at least 0. The published code: 0.
+    pub static_sigmas: f32,
     /// Frames in a row that must say so before an uncertain object gets a state; 1 to 100. The published code: 1.
     pub confirm_frames: u8,
     /// Frames in a row that must say so before a moving object counts as standing, or the other way round; 1 to 100. The published code
@@ -210,9 +212,10 @@ pub struct StateConfig {
 impl Default for StateConfig {
     fn default() -> Self {
         Self {
-            dynamic_m_s: 0.8,
+            dynamic_m_s: 0.6,
             static_m_s: 0.3,
             sigmas: 2.5,
+            static_sigmas: 1.0,
             confirm_frames: 2,
             change_frames: 2,
             static_frames: 5,
@@ -228,6 +231,8 @@ impl StateConfig {
         let above = positive(self.dynamic_m_s) && self.dynamic_m_s >= self.static_m_s;
         require(problems, above, "instances.state.dynamic_m_s", "must be at least instances.state.static_m_s");
         require(problems, self.sigmas.is_finite() && self.sigmas >= 0.0, "instances.state.sigmas", "must be at least 0");
+        let likely = self.static_sigmas.is_finite() && self.static_sigmas >= 0.0;
+        require(problems, likely, "instances.state.static_sigmas", "must be at least 0");
         require(problems, (1..=100).contains(&self.confirm_frames), "instances.state.confirm_frames", "must be in 1..=100");
         require(problems, (1..=100).contains(&self.change_frames), "instances.state.change_frames", "must be in 1..=100");
     }

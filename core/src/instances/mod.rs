@@ -84,6 +84,12 @@ use track::{Masks, Track, Tracks};
 /// Seed of the objects' draws.
 const SEED: u64 = 0x006F_626A_6563_7473;
 
+/// Owner of a match that may lie on either of two things.
+const AMBIGUOUS: u8 = u8::MAX;
+
+/// Half the width of what a feature is told by, px.
+const FEATURE_PX: i32 = 5;
+
 /// Smallest disparity a point is triangulated from, px.
 const DISPARITY_MIN_PX: f64 = 0.1;
 
@@ -175,7 +181,11 @@ impl<'s> Instances<'s> {
             let lies = |mut under: &mut dyn FnMut(&detection::Taken) -> bool| detections.iter().position(&mut under);
             let copy = lies(&mut |detection| masks.contains(&detection.place, u, v));
             let found = copy.or_else(|| lies(&mut |detection| detection.delete(masks).contains(u, v)));
-            *owner = found.map_or(0, |at| at as u8 + 1);
+            *owner = match found {
+                Some(at) if between(detections, masks, at, u, v) => AMBIGUOUS,
+                Some(at) => at as u8 + 1,
+                None => 0,
+            };
         }
     }
 
@@ -193,8 +203,9 @@ impl<'s> Instances<'s> {
             };
             withheld |= u64::from(out) << bit;
         }
-        move |index| match self.owner.get(index as usize).and_then(|owner| owner.checked_sub(1)) {
-            Some(detection) => withheld >> detection & 1 == 0,
+        move |index| match self.owner.get(index as usize) {
+            Some(&AMBIGUOUS) => withheld == 0,
+            Some(&owner) => owner == 0 || withheld >> (owner - 1) & 1 == 0,
             None => true,
         }
     }
@@ -582,6 +593,17 @@ fn place(track: &mut Track, t_world_camera: &Transform, was_known: bool, interva
     } else {
         track.chain = 0;
     }
+}
+
+/// Whether a pixel of detection `at` lies beside the copy mask of another: what is seen there may belong to either, for a feature is
+/// several pixels wide, and the silhouette of a thing in front moves with that thing.
+fn between(detections: &[detection::Taken], masks: &MaskStore<'_>, at: usize, u: i32, v: i32) -> bool {
+    let around = PixelBox { left: u - FEATURE_PX, top: v - FEATURE_PX, width: 2 * FEATURE_PX + 1, height: 2 * FEATURE_PX + 1 };
+    let rim = [-FEATURE_PX, 0, FEATURE_PX];
+    detections.iter().enumerate().filter(|&(other, _)| other != at).any(|(_, other)| {
+        around.intersection(&other.place.pixels).area() > 0
+            && rim.iter().any(|dv| rim.iter().any(|du| masks.contains(&other.place, u + du, v + dv)))
+    })
 }
 
 /// Whether two keypoints are one.

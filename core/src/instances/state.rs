@@ -1,8 +1,8 @@
 //! Uncertain, static, dynamic: what is known about whether a thing moves.
 //!
 //! A frame's motion has a speed and an error of it (one sigma). It speaks for *dynamic* when the speed less `sigmas` times the error is
-//! above `dynamic_m_s`; for *static* when the speed less the error is below `static_m_s` and the speed with the error below `dynamic_m_s`;
-//! otherwise for neither. So a far parked car whose motion is noise stays uncertain rather than being called moving. With `sigmas` 0 and
+//! above `dynamic_m_s`; for *static* when that is below `static_m_s` and the speed with `static_sigmas` times the error below
+//! `dynamic_m_s`; otherwise for neither. So a far parked car whose motion is noise stays uncertain rather than being called moving. With `sigmas` 0 and
 //! `confirm_frames` 1 this is the published rule (Section III-D).
 //!
 //! ```text
@@ -61,8 +61,8 @@ pub struct Evidence {
 impl Evidence {
     /// The state it speaks for; `Uncertain` when it speaks for neither, or is not a number.
     fn vote(&self, config: &StateConfig) -> State {
-        let margin = config.sigmas * self.sigma_m_s;
-        let (least, most) = (self.speed_m_s - margin, self.speed_m_s + margin);
+        let least = self.speed_m_s - config.sigmas * self.sigma_m_s;
+        let most = self.speed_m_s + config.static_sigmas * self.sigma_m_s;
         if least > config.dynamic_m_s {
             State::Dynamic
         } else if least < config.static_m_s && most < config.dynamic_m_s {
@@ -129,6 +129,7 @@ mod tests {
         dynamic_m_s: 5.5,
         static_m_s: 0.3,
         sigmas: 0.0,
+        static_sigmas: 0.0,
         confirm_frames: 1,
         change_frames: 2,
         static_frames: 5,
@@ -191,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_noisy_motion_proves_nothing() {
-        let config = StateConfig { sigmas: 2.0, ..PUBLISHED };
+        let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, ..PUBLISHED };
         let vote = |speed_m_s, sigma_m_s| Evidence { speed_m_s, sigma_m_s }.vote(&config);
         assert_eq!([vote(8.0, 1.0), vote(8.0, 1.5)], [Dynamic, Uncertain]);
         // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give or take 2 nothing can be told.
