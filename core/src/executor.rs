@@ -24,7 +24,8 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in pipeline order.
-    pub const ALL: [Self; 8] = [Self::Stereo, Self::SceneFlow, Self::Egomotion, Self::Instances, Self::Allocate, Self::Fuse, Self::Prune, Self::Raycast];
+    pub const ALL: [Self; 8] =
+        [Self::Stereo, Self::SceneFlow, Self::Egomotion, Self::Instances, Self::Allocate, Self::Fuse, Self::Prune, Self::Raycast];
 
     /// Name in tables and files.
     pub const fn name(self) -> &'static str {

@@ -5,8 +5,8 @@ use crate::{
     config::{Config, Problem},
     digest::Digest,
     egomotion::{Egomotion, Estimator, MotionEstimate},
-    geometry::{Transform, depth_from_disparity},
     frame::StereoFrame,
+    geometry::{Transform, depth_from_disparity},
     image::{View, ViewMut},
     instances::{CameraMotion, Detection, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, TrackReport},
     memory::{Carver, SlabError, region_bytes},
@@ -267,7 +267,9 @@ impl<'s> Mapper<'s> {
     }
 
     /// TEMP
-    pub fn flow(&self) -> &FlowMatcher<'s> { &self.scene_flow }
+    pub fn flow(&self) -> &FlowMatcher<'s> {
+        &self.scene_flow
+    }
 
     /// What is tracked, as it stands after the last frame, by age.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {

@@ -133,6 +133,12 @@ pub struct MotionConfig {
     pub acceleration_m_s2: f32,
     /// Change of turning within a second, one sigma, rad/s; above 0.
     pub turn_acceleration_rad_s2: f32,
+    /// By how much disparities may be too small throughout, px; at least 0. With a camera in motion a thing that stands then seems to move,
+    /// by twice this share of its disparity of the speed it passes by.
+    pub bias_px: f32,
+    /// The same, by what rectification leaves of the lenses' errors, at the left and right edge of the picture, px; at least 0. Grows with
+    /// the fourth power of the distance from the middle. KITTI's colour cameras: 3, as parked cars 30 m away show.
+    pub lens_px: f32,
     /// Error of the camera's own rotation per frame, one sigma, rad: at a distance it looks like speed; at least 0.
     pub camera_rad: f32,
 }
@@ -151,6 +157,8 @@ impl Default for MotionConfig {
             speed_m_s: 20.0,
             acceleration_m_s2: 3.0,
             turn_acceleration_rad_s2: 0.1,
+            bias_px: 0.25,
+            lens_px: 3.0,
             camera_rad: 0.0004,
         }
     }
@@ -182,6 +190,8 @@ impl MotionConfig {
         require(problems, positive(self.speed_m_s), "instances.motion.speed_m_s", "must be above 0");
         require(problems, positive(self.acceleration_m_s2), "instances.motion.acceleration_m_s2", "must be above 0");
         require(problems, positive(self.turn_acceleration_rad_s2), "instances.motion.turn_acceleration_rad_s2", "must be above 0");
+        require(problems, self.bias_px.is_finite() && self.bias_px >= 0.0, "instances.motion.bias_px", "must be at least 0");
+        require(problems, self.lens_px.is_finite() && self.lens_px >= 0.0, "instances.motion.lens_px", "must be at least 0");
         require(problems, self.camera_rad.is_finite() && self.camera_rad >= 0.0, "instances.motion.camera_rad", "must be at least 0");
     }
 }
@@ -216,7 +226,7 @@ impl Default for StateConfig {
             static_m_s: 0.3,
             sigmas: 2.5,
             static_sigmas: 1.0,
-            confirm_frames: 2,
+            confirm_frames: 3,
             change_frames: 2,
             static_frames: 5,
             dynamic_frames: 1,

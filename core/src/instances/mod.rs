@@ -238,7 +238,8 @@ impl<'s> Instances<'s> {
                 let own = refined.iter().zip(&*self.owner).filter(mine).map(|(m, _)| m);
                 let enough = own.clone().count() >= usize::from(self.config.motion.matches_enough);
                 // Sparse matches of the same features say nothing new.
-                for (m, owner) in sparse.iter().zip(self.sparse_owner.iter_mut()).filter(|(_, owner)| u32::from(**owner) == track.detection) {
+                for (m, owner) in sparse.iter().zip(self.sparse_owner.iter_mut()).filter(|(_, owner)| u32::from(**owner) == track.detection)
+                {
                     if enough || own.clone().any(|other| near(m.current_left, other.current_left)) {
                         *owner = 0;
                     }
@@ -249,8 +250,7 @@ impl<'s> Instances<'s> {
                 let seen = measure(&self.config.motion, &ground, own, &mut track.filter, seed, estimator);
                 (track.matches, track.inliers, track.measured) = (seen.matches, seen.inliers, u32::from(seen.measured));
             }
-            let distance_m = (camera.t_world_camera.inverse() * track.filter.center_world()).z;
-            judge(&self.config, track, distance_m);
+            judge(&self.config, rig, camera, track);
             if track.measured == 0 && track.filter.is_known() {
                 track.filter.coast(interval_s);
             }
@@ -561,12 +561,23 @@ fn sighting(m: &Match, ground: &Ground<'_>) -> Option<Sighting> {
 }
 
 /// Takes a frame's motion, or its lack, into a track's state.
-fn judge(config: &InstancesConfig, track: &mut Track, distance_m: f64) {
-    let [speed, sigma] = track.filter.speed();
-    let far = f64::from(config.motion.camera_rad) * distance_m / f64::from(config.frame_interval_s);
-    track.sigma_m_s = libm::sqrt(sigma * sigma + far * far) as f32;
-    let evidence = Evidence { speed_m_s: speed as f32, sigma_m_s: track.sigma_m_s };
-    track.judgement.advance(&config.state, (track.measured == 1).then_some(evidence));
+fn judge(config: &InstancesConfig, rig: &StereoRig, camera: &CameraMotion, track: &mut Track) {
+    let evidence = camera.t_current_previous.filter(|_| track.measured == 1).map(|t_current_previous| {
+        let interval_s = f64::from(config.frame_interval_s);
+        let [speed, sigma] = track.filter.speed();
+        let camera_world = camera.t_world_camera.inverse();
+        let standing = camera_world * track.filter.center_world();
+        let now = standing + camera_world.rotation * track.filter.velocity() * interval_s;
+        let passing = (now - t_current_previous.inverse() * standing).norm() / interval_s;
+        let turned = f64::from(config.motion.camera_rad) * standing.z / interval_s;
+        track.sigma_m_s = libm::sqrt(sigma * sigma + turned * turned) as f32;
+        // Depth goes with the inverse of disparity, its change with the inverse square.
+        let side = rig.focal_px * standing.x / (standing.z * rig.center_u_px);
+        let error_px = f64::from(config.motion.bias_px) + f64::from(config.motion.lens_px) * side * side * side * side;
+        let bias = passing * 2.0 * error_px * standing.z / rig.focal_baseline_px_m();
+        Evidence { speed_m_s: speed as f32, sigma_m_s: track.sigma_m_s, bias_m_s: bias as f32 }
+    });
+    track.judgement.advance(&config.state, evidence);
 }
 
 /// Motion over ground in this frame: none for an object that stands.
@@ -598,7 +609,12 @@ fn place(track: &mut Track, t_world_camera: &Transform, was_known: bool, interva
 /// Whether a pixel of detection `at` lies beside the copy mask of another: what is seen there may belong to either, for a feature is
 /// several pixels wide, and the silhouette of a thing in front moves with that thing.
 fn between(detections: &[detection::Taken], masks: &MaskStore<'_>, at: usize, u: i32, v: i32) -> bool {
-    let around = PixelBox { left: u - FEATURE_PX, top: v - FEATURE_PX, width: 2 * FEATURE_PX + 1, height: 2 * FEATURE_PX + 1 };
+    let around = PixelBox {
+        left: u - FEATURE_PX,
+        top: v - FEATURE_PX,
+        width: 2 * FEATURE_PX + 1,
+        height: 2 * FEATURE_PX + 1,
+    };
     let rim = [-FEATURE_PX, 0, FEATURE_PX];
     detections.iter().enumerate().filter(|&(other, _)| other != at).any(|(_, other)| {
         around.intersection(&other.place.pixels).area() > 0

@@ -1,7 +1,7 @@
 //! Uncertain, static, dynamic: what is known about whether a thing moves.
 //!
-//! A frame's motion has a speed and an error of it (one sigma). It speaks for *dynamic* when the speed less `sigmas` times the error is
-//! above `dynamic_m_s`; for *static* when that is below `static_m_s` and the speed with `static_sigmas` times the error below
+//! A frame's motion has a speed, an error of it (one sigma) and a bias the cameras may add. It speaks for *dynamic* when the speed less the
+//! bias and `sigmas` times the error is above `dynamic_m_s`; for *static* when that is below `static_m_s` and the speed with `static_sigmas` times the error below
 //! `dynamic_m_s`; otherwise for neither. So a far parked car whose motion is noise stays uncertain rather than being called moving. With `sigmas` 0 and
 //! `confirm_frames` 1 this is the published rule (Section III-D).
 //!
@@ -56,12 +56,14 @@ pub struct Evidence {
     pub speed_m_s: f32,
     /// Its error, one sigma, m/s.
     pub sigma_m_s: f32,
+    /// By how much the cameras' own errors may make it too high, m/s: of a thing that stands they can make one that moves.
+    pub bias_m_s: f32,
 }
 
 impl Evidence {
     /// The state it speaks for; `Uncertain` when it speaks for neither, or is not a number.
     fn vote(&self, config: &StateConfig) -> State {
-        let least = self.speed_m_s - config.sigmas * self.sigma_m_s;
+        let least = self.speed_m_s - self.bias_m_s - config.sigmas * self.sigma_m_s;
         let most = self.speed_m_s + config.static_sigmas * self.sigma_m_s;
         if least > config.dynamic_m_s {
             State::Dynamic
@@ -137,7 +139,7 @@ mod tests {
     };
 
     fn seen(metres_per_frame: f32) -> Option<Evidence> {
-        Some(Evidence { speed_m_s: metres_per_frame * 10.0, sigma_m_s: 0.0 })
+        Some(Evidence { speed_m_s: metres_per_frame * 10.0, sigma_m_s: 0.0, bias_m_s: 0.0 })
     }
 
     fn states(config: &StateConfig, frames: &[Option<Evidence>]) -> std::vec::Vec<State> {
@@ -193,10 +195,12 @@ mod tests {
     #[test]
     fn a_noisy_motion_proves_nothing() {
         let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, ..PUBLISHED };
-        let vote = |speed_m_s, sigma_m_s| Evidence { speed_m_s, sigma_m_s }.vote(&config);
+        let vote = |speed_m_s, sigma_m_s| Evidence { speed_m_s, sigma_m_s, bias_m_s: 0.0 }.vote(&config);
         assert_eq!([vote(8.0, 1.0), vote(8.0, 1.5)], [Dynamic, Uncertain]);
         // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give or take 2 nothing can be told.
         assert_eq!([vote(2.0, 1.5), vote(2.0, 2.0), vote(2.0, 0.5)], [Static, Uncertain, Uncertain]);
+        let biased = |bias_m_s| Evidence { speed_m_s: 8.0, sigma_m_s: 0.0, bias_m_s }.vote(&config);
+        assert_eq!([biased(2.0), biased(3.0)], [Dynamic, Uncertain], "nor does one the lens could make");
         assert_eq!([vote(f32::NAN, 0.0), vote(0.0, f32::INFINITY)], [Uncertain, Uncertain]);
     }
 }
