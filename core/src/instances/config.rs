@@ -119,7 +119,7 @@ pub struct MotionConfig {
     pub matches_enough: u16,
     /// Most hypotheses; 1 to 10000; 200 (the original: 500).
     pub samples: u16,
-    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2.
+    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2. In the end three quarters of it.
     pub inlier_px: f32,
     /// Error of a match coordinate at the least, px; above 0.
     pub noise_px: f32,
@@ -170,7 +170,7 @@ impl MotionConfig {
         EgomotionConfig {
             samples: self.samples,
             inlier_px: self.inlier_px,
-            refined_inlier_px: self.inlier_px,
+            refined_inlier_px: 0.75 * self.inlier_px,
             matches_min: 6,
             side_knee: 10.0,
             ..EgomotionConfig::default()

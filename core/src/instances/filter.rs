@@ -148,10 +148,11 @@ impl Filter {
             return taken;
         }
         let Some(information) = Cholesky::new(Matrix6::from(self.covariance)).map(|factor| factor.inverse()) else { return false };
-        if count < 3.0 {
+        let center = sum / count;
+        // False for NaN as well.
+        if !(count >= 3.0 && center.iter().all(|x| x.is_finite())) {
             return false;
         }
-        let center = sum / count;
         let independent = f64::from(config.independent_matches);
         let weight = (if count > independent { independent / count } else { 1.0 }) / (noise_px * noise_px);
         let world_camera = t_world_camera.rotation.to_rotation_matrix();

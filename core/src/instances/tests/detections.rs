@@ -1,0 +1,137 @@
+//! What is let in.
+
+use super::*;
+
+fn pixels(left: i32, top: i32, width: i32, height: i32) -> PixelBox {
+    PixelBox { left, top, width, height }
+}
+
+fn admitted(config: &InstancesConfig, size: [usize; 2], detections: &[Detection<'_>]) -> (DetectionCount, Vec<f32>, u64) {
+    let capacity = Capacity { image_width: 1242, image_height: 375, mask_words: 20_000, ..CAPACITY };
+    with(&capacity, config, |instances, _| {
+        instances.admit(0, detections, size);
+        let scores = instances.detections.all().iter().map(|taken| taken.score).collect();
+        (instances.report.detections, scores, instances.digest())
+    })
+}
+
+#[test]
+fn a_box_must_be_strictly_larger_than_45_by_45_at_kittis_width_and_in_proportion_at_others() {
+    let mask = vec![1; 3000];
+    let taken = |width, height, image: usize| {
+        let car = detection(Class::Car, 0.9, &pixels(10, 10, width, height), &mask);
+        admitted(&InstancesConfig::default(), [image, 200], &[car]).0.taken
+    };
+    // 2024, 2025 and 2026 px.
+    assert_eq!([taken(46, 44, 1242), taken(45, 45, 1242), taken(1013, 2, 1242)], [0, 0, 1]);
+    // Half the width, a quarter of the area: 506.25 px.
+    assert_eq!([taken(23, 22, 621), taken(39, 13, 621)], [0, 1]);
+}
+
+#[test]
+fn nonsense_is_refused_by_name_and_counted_once() {
+    let mask = vec![1; 10_000];
+    let good = pixels(10, 10, 60, 60);
+    let with_score = |score| detection(Class::Car, score, &good, &mask);
+    let at = |left, top, width, height| Detection { left, top, width, height, ..with_score(0.5) };
+    let empty = vec![0; 3600];
+    let all = [
+        with_score(f32::NAN),
+        with_score(-0.1),
+        with_score(1.5),
+        with_score(f32::INFINITY),
+        at(10, 10, 0, 60),
+        at(10, 10, 60, 0),
+        at(400, 10, 60, 60),
+        at(-60, 10, 60, 60),
+        at(i32::MIN, i32::MAX, 60, 60),
+        at(10, 10, u32::MAX, u32::MAX),
+        Detection { mask: &mask[..3599], ..with_score(0.5) },
+        Detection { mask: &empty, ..with_score(0.5) },
+        detection(Class::Other, 0.5, &good, &mask),
+        at(10, 10, 5, 5),
+        with_score(0.7),
+    ];
+    let (count, scores, _) = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
+    let expected = DetectionCount {
+        given: 15,
+        taken: 1,
+        bad_score: 4,
+        bad_box: 6,
+        bad_mask: 2,
+        ignored: 1,
+        too_small: 1,
+        ..DetectionCount::default()
+    };
+    assert_eq!((count, scores), (expected, vec![0.7]));
+}
+
+#[test]
+fn of_ten_thousand_the_best_are_taken_in_whatever_order_they_come() {
+    let mask = vec![1; 3600];
+    let mut random = Random::new(1);
+    let mut all: Vec<_> = (0..10_000)
+        .map(|_| {
+            let (left, top) = (random.below(300) as i32, random.below(50) as i32);
+            detection(Class::Car, random.below(1000) as f32 / 1000.0, &pixels(left, top, 60, 60), &mask)
+        })
+        .collect();
+    let (count, scores, digest) = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
+    assert_eq!(count.taken + count.covered + count.beyond, 10_000);
+    assert_eq!(count.beyond, 9_996, "four are the bound");
+    assert!(scores.iter().all(|&score| score > 0.99), "{scores:?}");
+    for i in (1..all.len()).rev() {
+        all.swap(i, random.below(i as u32 + 1) as usize);
+    }
+    assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), (count, scores, digest));
+}
+
+#[test]
+fn where_masks_overlap_the_higher_score_is_on_top() {
+    let mask = vec![1; 3600];
+    let (low, high) =
+        (detection(Class::Car, 0.5, &pixels(10, 10, 60, 60), &mask), detection(Class::Van, 0.8, &pixels(40, 10, 60, 60), &mask));
+    let hidden = detection(Class::Car, 0.1, &pixels(15, 12, 50, 50), &mask);
+    for order in [[low, high, hidden], [hidden, high, low]] {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            instances.admit(0, &order, [WIDTH, HEIGHT]);
+            let taken = instances.detections.all();
+            assert_eq!((taken.len(), instances.report.detections.covered), (2, 1));
+            let on = |n: usize, u| instances.masks_now().contains(&taken[n].place, u, 20);
+            assert_eq!([on(0, 39), on(0, 40), on(1, 39), on(1, 40)], [false, true, true, false]);
+        });
+    }
+}
+
+#[test]
+fn the_static_map_sees_nothing_under_any_delete_mask_tracked_or_not() {
+    let mask = vec![1; 3600];
+    let walker = detection(Class::Person, 0.6, &pixels(300, 30, 60, 60), &mask);
+    let car = detection(Class::Car, 0.9, &pixels(20, 30, 60, 60), &mask);
+    let config = InstancesConfig { area_min_px: 2025, ..InstancesConfig::default() };
+    // A table of one track: the walker, of lower score, gets none.
+    with(&Capacity { tracks: 1, ..CAPACITY }, &config, |instances, _| {
+        instances.admit(0, &[walker, car], [WIDTH, HEIGHT]);
+        assert_eq!((instances.report.tracks.tracks, instances.report.tracks.refused), (1, 1));
+        let mut depth = vec![5.0f32; WIDTH * HEIGHT];
+        instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+        for (at, &depth) in depth.iter().enumerate() {
+            let (u, v) = ((at % WIDTH) as i32, (at / WIDTH) as i32);
+            let under = [pixels(300, 30, 60, 60), pixels(20, 30, 60, 60)].iter().any(|pixels| pixels.scaled(1200).contains(u, v));
+            assert_eq!(depth == 0.0, under, "({u}, {v})");
+        }
+        assert_eq!(instances.report.pixels_cleared, 2 * 72 * 72);
+    });
+}
+
+#[test]
+fn without_dynamic_everything_is_background() {
+    let mask = vec![1; 3600];
+    let car = detection(Class::Car, 0.9, &pixels(20, 30, 60, 60), &mask);
+    with(&CAPACITY, &InstancesConfig { dynamic: false, ..any_size() }, |instances, _| {
+        instances.admit(0, &[car], [WIDTH, HEIGHT]);
+        let mut depth = vec![5.0f32; WIDTH * HEIGHT];
+        instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+        assert!(depth.iter().all(|&depth| depth == 5.0) && instances.tracks().count() == 0);
+    });
+}

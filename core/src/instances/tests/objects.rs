@@ -1,0 +1,142 @@
+//! Objects' own volumes.
+
+use super::*;
+
+fn at(frame: u32) -> [Transform; 2] {
+    let t = f64::from(frame) * 0.1;
+    [shift(0.0, 0.0, 5.0 * t), shift(1.0, 0.3, 10.0 + 8.0 * t)]
+}
+
+#[test]
+fn what_was_seen_before_the_motion_was_known_is_fused_when_it_is() {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        let reports: Vec<_> = (0..5)
+            .map(|frame| {
+                let [camera, car] = at(frame);
+                drive.step(camera, &[(&Board::CAR, Some(car))]).objects
+            })
+            .collect();
+        let begun: Vec<u32> = reports.iter().map(|report| report.begun).collect();
+        assert_eq!(begun, [0, 0, 0, 1, 0], "the motion is confirmed in the fourth frame");
+        assert_eq!((reports[3].caught_up, reports[3].fused, reports[4].fused), (3, 1, 1));
+        let (summary, object) = drive.instances.objects().next().unwrap();
+        assert_eq!((summary.frames, summary.state), (2, State::Dynamic));
+        // A board square to the camera: its blocks lie in one layer, however far it drove meanwhile.
+        let volume = object.volume();
+        let layers = (0..volume.pool().high_water() as u32).filter_map(|slot| volume.blocks().coord(slot)).map(|coord| coord.z);
+        let (first, last) = (layers.clone().min().unwrap(), layers.max().unwrap());
+        assert!(last - first <= 2, "{first} to {last}");
+    });
+}
+
+#[test]
+fn a_car_lost_for_too_long_is_handed_over_and_begun_anew() {
+    // The frame in which it is found again has no motion either.
+    for (dynamic_frames, missed, restarts) in [(1, 0, 0), (1, 1, 1), (2, 1, 0), (2, 2, 1)] {
+        let config = InstancesConfig { state: StateConfig { dynamic_frames, ..StateConfig::default() }, ..any_size() };
+        with(&CAPACITY, &config, |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            for frame in 0..16 {
+                let [camera, car] = at(frame);
+                let seen = !(6..6 + missed).contains(&frame);
+                drive.step(camera, &[(&Board::CAR, seen.then_some(car))]);
+            }
+            assert_eq!(drive.track(1).unwrap().state, State::Dynamic);
+            let reasons: Vec<_> = drive.sink.0.iter().map(|taken| taken.1).collect();
+            assert_eq!(reasons, vec![Retirement::Restarted; restarts], "{missed} frames missed");
+            assert!(drive.sink.0.iter().all(|taken| taken.2 > 0), "with what was made of it");
+        });
+    }
+}
+
+#[test]
+fn full_volumes_are_handed_over_for_new_objects_but_not_in_the_frame_they_grow() {
+    let near = Board { half_m: [0.8, 0.5], ..Board::CAR };
+    let parked = |x: f64| Some(shift(x, 0.0, 9.0));
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        let camera = |frame: u32| shift(0.0, 0.0, 0.02 * f64::from(frame));
+        for frame in 0..8 {
+            let boards = [(&near, parked(-3.5)), (&near, parked(0.0)), (&near, parked(3.5))];
+            let report = drive.step(camera(frame), &boards);
+            assert_eq!(report.objects.refused, u32::from(frame >= 3), "three stand, two have volumes");
+        }
+        // One of the two goes out of sight: its volume goes to the third.
+        let owner = drive.instances.objects().next().unwrap().0.id;
+        let gone = drive.track(owner).unwrap().pixels.left;
+        let boards: Vec<_> = [-3.5, 0.0, 3.5]
+            .map(|x| {
+                let there = project(&Point3::new(x - 0.8, 0.0, 9.0))[0][0] as i32;
+                (&near, parked(x).filter(|_| (there - gone).abs() > 40))
+            })
+            .into();
+        for frame in 8..10 {
+            drive.step(camera(frame), &boards);
+        }
+        assert_eq!(drive.sink.0.len(), 1);
+        assert_eq!((drive.sink.0[0].0.id, drive.sink.0[0].1), (owner, Retirement::Displaced));
+        assert_eq!(drive.instances.objects().count(), 2);
+    });
+}
+
+#[test]
+fn the_forgotten_and_the_last_are_handed_over_too() {
+    with(&CAPACITY, &InstancesConfig { forget_frames: 3, ..any_size() }, |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        for frame in 0..16 {
+            let [camera, car] = at(frame);
+            drive.step(camera, &[(&Board::CAR, (frame < 5 || frame > 10).then_some(car))]);
+        }
+        let reasons = |sink: &Taken| sink.0.iter().map(|taken| (taken.0.id, taken.1)).collect::<Vec<_>>();
+        assert_eq!(reasons(&drive.sink), [(1, Retirement::Forgotten)]);
+        let mut sink = Taken::default();
+        assert_eq!(drive.instances.finish(&mut sink), 1);
+        assert_eq!(reasons(&sink), [(2, Retirement::Finished)]);
+        assert_eq!(drive.instances.objects().count(), 0);
+    });
+}
+
+#[test]
+fn people_are_tracked_but_not_reconstructed() {
+    let walker = Board { class: Class::Person, ..Board::CAR };
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        for frame in 0..6 {
+            let [camera, place] = at(frame);
+            drive.step(camera, &[(&walker, Some(place))]);
+        }
+        assert_eq!(drive.track(1).unwrap().state, State::Dynamic);
+        assert_eq!(drive.instances.objects().count(), 0);
+    });
+}
+
+#[test]
+fn an_object_larger_than_its_blocks_refuses_the_rest_and_says_so() {
+    with(&Capacity { object_blocks: 20, ..CAPACITY }, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        let refused: u32 = (0..6)
+            .map(|frame| {
+                let [camera, car] = at(frame);
+                drive.step(camera, &[(&Board::CAR, Some(car))]).objects.blocks_refused
+            })
+            .sum();
+        assert!(refused > 0);
+        assert!(drive.instances.objects().all(|(_, object)| object.volume().pool().len() <= 20));
+    });
+}
+
+#[test]
+fn a_short_ring_of_crops_keeps_the_latest_and_counts_the_rest() {
+    with(&Capacity { crop_pixels: 5_000, ..CAPACITY }, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        let reports: Vec<_> = (0..4)
+            .map(|frame| {
+                let [camera, car] = at(frame);
+                drive.step(camera, &[(&Board::CAR, Some(car))]).objects
+            })
+            .collect();
+        assert_eq!(reports.iter().map(|report| report.crops_dropped).sum::<u32>(), 2);
+        assert_eq!(reports[3].caught_up, 1);
+    });
+}

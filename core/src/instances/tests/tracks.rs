@@ -1,0 +1,110 @@
+//! Who is who from frame to frame.
+
+use super::*;
+
+const MASK: [u8; 3600] = [1; 3600];
+
+fn car(left: i32) -> Detection<'static> {
+    detection(Class::Car, 0.9, &PixelBox { left, top: 30, width: 60, height: 60 }, &MASK)
+}
+
+fn take(instances: &mut Instances<'_>, frame: u32, detections: &[Detection<'_>]) -> Vec<u32> {
+    instances.admit(frame, detections, [WIDTH, HEIGHT]);
+    let (now, before) = instances.masks.split_at_mut(1);
+    let (now, before) = if instances.now == 0 { (&mut now[0], &before[0]) } else { (&mut before[0], &now[0]) };
+    instances.tracks.settle(instances.detections.all(), now, before, &mut instances.report.tracks);
+    instances.tracks().filter(|track| track.seen).map(|track| track.id).collect()
+}
+
+#[test]
+fn two_cars_that_pass_each_other_keep_their_numbers() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        for frame in 0..5 {
+            let step = 20 * frame as i32;
+            assert_eq!(take(instances, frame, &[car(20 + step), car(280 - step)]), [1, 2], "frame {frame}");
+        }
+        let lefts: Vec<i32> = instances.tracks().map(|track| track.pixels.left).collect();
+        assert_eq!(lefts, [100, 200]);
+    });
+}
+
+#[test]
+fn the_best_pair_goes_first_whoever_stands_first_in_the_list() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        take(instances, 0, &[car(100)]);
+        // The nearer one is the old one, though the other has the higher score and overlaps as well.
+        let other = Detection { score: 1.0, ..car(135) };
+        take(instances, 1, &[other, car(102)]);
+        let nearest = instances.tracks().find(|track| track.id == 1).unwrap();
+        // Its mask is cut by the other's, its box is not.
+        assert_eq!((nearest.pixels.left, nearest.sightings), (102, 2));
+    });
+}
+
+#[test]
+fn frames_missed_cost_a_half_then_three_quarters() {
+    // Overlap 2/3 at 12 px... of 60: (60 - 12) / (60 + 12); times 0.9, the scores' mean: 0.6.
+    let score = 48.0 / 72.0 * 0.9;
+    for (gap, discount) in [(1, 1.0), (2, 0.5), (3, 0.25), (9, 0.25)] {
+        for (margin, expected) in [(0.99, 1), (1.01, 2)] {
+            let config = InstancesConfig { association_min: score * discount * margin, ..any_size() };
+            with(&CAPACITY, &config, |instances, _| {
+                take(instances, 0, &[car(100)]);
+                assert_eq!(take(instances, gap, &[car(112)]), [expected], "gap {gap}");
+            });
+        }
+    }
+}
+
+#[test]
+fn a_car_may_be_called_a_truck_for_a_while_but_never_a_person() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        let called = |class| Detection { class, ..car(100) };
+        for (frame, class) in [Class::Car, Class::Car, Class::Truck, Class::Van, Class::Car].into_iter().enumerate() {
+            assert_eq!(take(instances, frame as u32, &[called(class)]), [1]);
+        }
+        assert_eq!(instances.tracks().next().unwrap().class, Class::Car);
+        assert_eq!(take(instances, 5, &[called(Class::Person)]), [2]);
+    });
+}
+
+#[test]
+fn a_track_unseen_for_more_than_fifty_frames_is_forgotten() {
+    for (gap, id) in [(50, 1), (51, 2)] {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            take(instances, 0, &[car(100)]);
+            for frame in 1..gap {
+                take(instances, frame, &[]);
+            }
+            assert_eq!(take(instances, gap, &[car(100)]), [id], "gap {gap}");
+        });
+    }
+}
+
+#[test]
+fn a_full_table_lets_the_one_unseen_for_longest_go_and_nobody_seen_lately() {
+    with(&Capacity { tracks: 2, ..CAPACITY }, &any_size(), |instances, _| {
+        take(instances, 0, &[car(20)]);
+        take(instances, 1, &[car(120)]);
+        assert_eq!(take(instances, 2, &[car(220)]), [3]);
+        assert_eq!(instances.tracks().map(|track| track.id).collect::<Vec<_>>(), [2, 3], "1 went");
+        assert_eq!(instances.report.tracks.evicted, 1);
+        // 2 was seen one frame before 3 was: both may come back any moment.
+        assert_eq!(take(instances, 3, &[car(220), car(320)]), [3, 4]);
+        assert_eq!(take(instances, 4, &[car(20)]), []);
+        assert_eq!(instances.report.tracks.refused, 1);
+    });
+}
+
+#[test]
+fn a_mask_that_stops_filling_its_box_still_overlaps_by_what_it_fills() {
+    // Two diagonal halves of one box: full overlap as boxes, almost none as masks.
+    let half = |upper: bool| -> Vec<u8> { (0..3600).map(|i| u8::from((i % 60 > i / 60) == upper)).collect() };
+    let (upper, lower) = (half(true), half(false));
+    for (overlap, id) in [(Overlap::Mask, 2), (Overlap::Box, 1)] {
+        with(&CAPACITY, &InstancesConfig { overlap, ..any_size() }, |instances, _| {
+            take(instances, 0, &[Detection { mask: &upper, ..car(100) }]);
+            assert_eq!(take(instances, 1, &[Detection { mask: &lower, ..car(100) }]), [id]);
+        });
+    }
+}
