@@ -123,15 +123,7 @@ pub fn sign(mesh: &mut Mesh, dice: &mut Dice) {
     let height = dice.between(2.2, 2.6);
     mesh.bar(metal, (Point::zeros(), 0.034), (Point::new(0.0, -height - 0.3, 0.0), 0.034), 8);
     let radius = 0.36;
-<<<<<<< HEAD
     let face = mesh.surface(Surface::new(Kind::Sign, tone(255, 255, 255), variant));
-=======
-    let face = mesh.surface(Surface {
-        kind: Kind::Sign,
-        seed: variant,
-        ..Surface::new(Kind::Sign, tone(255, 255, 255), 0)
-    });
->>>>>>> 026c5ab (Doubt speeds that the lens could make, and confirm a state three times)
     // Round, triangular, square: the face's corners follow what is painted on it.
     let (corners, turn) = match variant {
         0 | 1 => (20, 0.0),

@@ -94,18 +94,10 @@ impl Scene {
     ) -> Self {
         let t_camera_street = t_street_camera.inverse();
         let thing = |source, t_street_mesh: &Transform, coat, instance| {
-<<<<<<< HEAD
             let turn = Placed::new(t_street_mesh).turn.map(|value| value as f32);
             Thing {
                 source,
                 turn,
-=======
-            let mut to_anchor = Placed::new(t_street_mesh);
-            to_anchor.shift -= anchor;
-            Thing {
-                source,
-                to_anchor,
->>>>>>> 026c5ab (Doubt speeds that the lens could make, and confirm a state three times)
                 to_camera: Placed::new(&(t_camera_street * t_street_mesh)),
                 coat,
                 instance,

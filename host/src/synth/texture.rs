@@ -168,12 +168,8 @@ impl Textures {
     /// Draws them; the same for every street.
     pub fn new() -> Self {
         Self {
-<<<<<<< HEAD
             fine: Ripmap::grain(11, 3.0, 1.25),
             asphalt: Ripmap::grain(14, 3.0, 1.5),
-=======
-            fine: Ripmap::grain(11, 3.0, 1.12),
->>>>>>> 026c5ab (Doubt speeds that the lens could make, and confirm a state three times)
             broad: Ripmap::grain(12, 24.0, 0.85),
             leaves: Ripmap::foliage(13, 2.0),
         }

@@ -19,7 +19,6 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
     let ([u, v, _], [fu, fv, _], [width, height]) = (spot.surface_m, spot.footprint_m, surface.size_m);
     let h = surface.seed;
     let mut tone = glass(painter, surface, spot);
-<<<<<<< HEAD
     let folds = || {
         let hung = Spot {
             footprint_m: [fu, 0.2 * fv, 0.0],
@@ -28,19 +27,6 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
         };
         1.0 + 0.12 * painter.fine(h, &hung, 1.0)
     };
-=======
-    let folds = 1.0
-        + 0.12
-            * painter.fine(
-                h,
-                &Spot {
-                    footprint_m: [fu, 0.2 * fv, 0.0],
-                    surface_m: [u * 1.5, v * 0.2, 0.0],
-                    own_normal: [0.0; 3],
-                },
-                1.0,
-            );
->>>>>>> 026c5ab (Doubt speeds that the lens could make, and confirm a state three times)
     let cloth = [[0.62, 0.60, 0.55], [0.55, 0.50, 0.40], [0.60, 0.60, 0.62], [0.40, 0.30, 0.26]][(h >> 3) as usize & 3];
     match h % 6 {
         0 | 1 => {

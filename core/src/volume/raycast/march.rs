@@ -224,39 +224,6 @@ impl Marcher<'_, '_> {
     }
 
     /// The place in a cell at which the field falls to 0.
-<<<<<<< HEAD
-=======
-    fn crossing(&self, ray: &Ray, step: Step, whole: bool, first: f32, last: f32) -> Option<Crossing> {
-        let corners = if whole { self.whole_corners(step.spot)? } else { self.guessed(ray, step)?.0 };
-        let passage = Passage::new(ray, step.cell, [step.from, step.to]);
-        let share = passage.root(&Field::new(&corners), first, last);
-        let [from_m, to_m] = [step.from, step.to].map(depth_in_m);
-        Some(Crossing {
-            spot: step.spot,
-            corners,
-            place: passage.at(share),
-            depth_m: from_m + (to_m - from_m) * share,
-        })
-    }
-
-    /// Distances at the corners of a cell all of which were seen.
-    #[inline]
-    fn whole_corners(&self, spot: Spot) -> Option<[f32; 8]> {
-        let [x, y, z] = spot.voxel();
-        let slots = self.surface.slots(spot.entry)?;
-        if x < 7 && y < 7 && z < 7 {
-            let near = self.blocks.sdf(slots[0])?.get(x + 8 * y + 64 * z..)?.first_chunk::<74>()?;
-            return Some([near[0], near[1], near[8], near[9], near[64], near[65], near[72], near[73]].map(f32::from));
-        }
-        let mut sdf = [0.0; 8];
-        for (sdf, (slot, voxel)) in sdf.iter_mut().zip(places(slots, spot)) {
-            *sdf = f32::from(*self.blocks.sdf(slot)?.get(voxel)?);
-        }
-        Some(sdf)
-    }
-
-    /// Distances at the corners of a cell that were seen.
->>>>>>> 026c5ab (Doubt speeds that the lens could make, and confirm a state three times)
     #[inline(never)]
     fn crossing<'h>(&self, here: &Here<'h>, step: Step, first: f32, last: f32) -> Option<Crossing<'h>> {
         let field = Field::new(&self.corners(here, step)?);
@@ -306,12 +273,7 @@ impl Marcher<'_, '_> {
         let length = libm::sqrtf(right * right + down * down + forward * forward);
         let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
         let (colour, weight) = self.colour(crossing);
-        Hit {
-            depth_m: crossing.depth_m,
-            normal: [right * scale, down * scale, forward * scale],
-            colour,
-            weight,
-        }
+        Hit { depth_m: crossing.depth_m, normal: [right * scale, down * scale, forward * scale], colour, weight }
     }
 
     /// The mean of the coloured corners, by nearness in 256ths, and the weight of the nearest.
