@@ -5,6 +5,7 @@ use anyhow::{Context, bail};
 use dynvox_core::Config;
 use dynvox_core::egomotion::EgomotionConfig;
 use dynvox_core::geometry::StereoRig;
+use dynvox_core::instances::InstancesConfig;
 use dynvox_core::scene_flow::SceneFlowConfig;
 use dynvox_core::stereo::StereoConfig;
 use dynvox_core::volume::{MeshConfig, RaycastConfig, VolumeConfig};
@@ -19,6 +20,7 @@ pub struct Settings {
     stereo: StereoConfig,
     scene_flow: SceneFlowConfig,
     egomotion: EgomotionConfig,
+    instances: InstancesConfig,
     volume: VolumeConfig,
     raycast: RaycastConfig,
     mesh: MeshConfig,
@@ -53,12 +55,13 @@ impl Settings {
 
     /// The mapper's configuration for a rig.
     pub fn config(&self, rig: StereoRig) -> Config {
-        let Self { stereo, scene_flow, egomotion, volume, raycast, mesh, street: _ } = self;
+        let Self { stereo, scene_flow, egomotion, instances, volume, raycast, mesh, street: _ } = self;
         Config {
             rig,
             stereo: *stereo,
             scene_flow: *scene_flow,
             egomotion: *egomotion,
+            instances: *instances,
             volume: *volume,
             raycast: *raycast,
             mesh: *mesh,

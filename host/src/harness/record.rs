@@ -54,7 +54,8 @@ impl FrameRow {
     /// What harmed the map in this frame, in words.
     pub fn cause(&self) -> String {
         let (allocation, motion) = (&self.report.allocation, self.motion());
-        let guessed = (!self.report.fused).then(|| format!("its pose had to be guessed ({}), so it was not fused", motion.replace('_', " ")));
+        let guessed =
+            (!self.report.fused).then(|| format!("its pose had to be guessed ({}), so it was not fused", motion.replace('_', " ")));
         let counts = [
             (allocation.refused, "requests for blocks found no room in the pool"),
             (allocation.beyond, "points lie beyond the map's coordinates"),

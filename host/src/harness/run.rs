@@ -7,10 +7,10 @@ use crate::evaluation::exact::ExactErrors;
 use crate::export::{FolderError, RunFolder};
 use crate::store::StoreError;
 use dynvox_core::geometry::{Transform, exp};
-use dynvox_core::image::StereoFrame;
+use dynvox_core::instances::NoSink;
 use dynvox_core::memory::{Region, SlabError};
 use dynvox_core::volume::PruneReport;
-use dynvox_core::{Capacity, Config, Mapper, NewError, Severity, Stage, StepError};
+use dynvox_core::{Capacity, Config, Mapper, NewError, Severity, Stage, StepError, StereoFrame};
 use std::time::{Duration, Instant};
 
 /// Frames shown in the report.
@@ -168,7 +168,17 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
     // The mapper is gone: its slab serves to read the map piece by piece.
     let keep_file = plan.streaming.is_some_and(|streaming| streaming.keep_file);
     let (mesh, shelf) = output.finish(slab.bytes_mut(), (&plan.capacity, &plan.config), keep_file, folder)?;
-    let Drive { rows, keyframes, exact, overview_png, regions, blocks, finish, shelf_failure, mapping } = drive;
+    let Drive {
+        rows,
+        keyframes,
+        exact,
+        overview_png,
+        regions,
+        blocks,
+        finish,
+        shelf_failure,
+        mapping,
+    } = drive;
     let truth = plan.dataset.truth().map(|truth| from_first(truth, &plan.indices));
     let poses: Vec<Transform> = rows.iter().map(|row| row.report.t_world_camera).collect();
     Ok(RunRecord {
@@ -236,7 +246,20 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
     let (regions, blocks) = (mapper.footprint().regions().to_vec(), mapper.background().pool().len());
     let shelf_failure = shelf.failure();
     let output = MeshOutput::begin(&mut mapper, shelf, folder)?;
-    Ok((Drive { rows, keyframes, exact, overview_png, regions, blocks, finish, shelf_failure, mapping }, output))
+    Ok((
+        Drive {
+            rows,
+            keyframes,
+            exact,
+            overview_png,
+            regions,
+            blocks,
+            finish,
+            shelf_failure,
+            mapping,
+        },
+        output,
+    ))
 }
 
 /// Refuses what cannot run before any memory is taken.
@@ -330,7 +353,9 @@ impl Course<'_, '_> {
                 let row = self.step(index, &images)?;
                 self.watch(&row)?;
                 if let Some(failure) = self.shelf.failure().filter(|_| was_kept) {
-                    progress.say(&format!("warning: frame {index}: map.blocks takes no more ({failure}). Blocks that leave the pool are lost from here on"));
+                    progress.say(&format!(
+                        "warning: frame {index}: map.blocks takes no more ({failure}). Blocks that leave the pool are lost from here on"
+                    ));
                 }
                 let seconds = (begin.elapsed() - self.aside).as_secs_f64();
                 let blocks = row.report.blocks;
@@ -363,11 +388,12 @@ impl Course<'_, '_> {
             right: images.right.view().ok_or_else(empty)?,
             colour: images.colour.as_ref().and_then(|colour| colour.view()),
             class: None,
+            detections: &[],
         };
         self.threads.take_times();
         let begin = Instant::now();
         let (mapper, threads, shelf) = (&mut self.mapper, &self.threads, &mut self.shelf);
-        let report = threads.run(|| mapper.step_with(&frame, threads, shelf)).map_err(|error| refused(step_reason(error)))?;
+        let report = threads.run(|| mapper.step_with(&frame, threads, shelf, &mut NoSink)).map_err(|error| refused(step_reason(error)))?;
         Ok(FrameRow {
             frame: index,
             time_s: self.plan.dataset.time_s(index),

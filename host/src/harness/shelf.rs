@@ -103,7 +103,12 @@ impl MeshOutput {
                 let (how, place) = ((&config.volume, &config.mesh), (slab, capacity.colour));
                 store::mesh::triangles(file, how, place, &self.drawn, &mut |triangle| add(ply, triangle))
                     .map_err(|error| std::io::Error::other(format!("the slab has no room for a piece of the map: {error:?}")))?;
-                shelf_use = ShelfUse { records: file.records(), bytes: file.bytes(), unreadable: file.unreadable(), ..shelf_use };
+                shelf_use = ShelfUse {
+                    records: file.records(),
+                    bytes: file.bytes(),
+                    unreadable: file.unreadable(),
+                    ..shelf_use
+                };
             }
             self.ply.finish()
         })();

@@ -1,9 +1,9 @@
 //! A map on disk as triangles, piece by piece: what is in memory at once is a cube of 8 blocks a side and the layer behind it.
 
 use super::BlockFile;
+use dynvox_core::Capacity;
 use dynvox_core::memory::{Carver, SlabError};
 use dynvox_core::volume::{BlockCoord, MeshConfig, NoStore, Triangle, Volume, VolumeConfig};
-use dynvox_core::Capacity;
 use hashbrown::HashSet;
 use std::io::{Read, Seek, Write};
 
@@ -14,7 +14,13 @@ const SIDE: i32 = (1 << PIECE_BITS) + 1;
 
 /// What a volume for one piece holds.
 const fn piece(colour: bool) -> Capacity {
-    Capacity { blocks: (SIDE * SIDE * SIDE) as usize, visible_blocks: 1, history_frames: 1, colour, ..Capacity::TINY }
+    Capacity {
+        blocks: (SIDE * SIDE * SIDE) as usize,
+        visible_blocks: 1,
+        history_frames: 1,
+        colour,
+        ..Capacity::TINY
+    }
 }
 
 const _: () = assert!(Volume::bytes(&piece(true)) < Capacity::TINY.bytes(), "any profile's slab has room for a piece");

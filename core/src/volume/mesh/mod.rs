@@ -180,7 +180,10 @@ impl<'v, 's> Patch<'v, 's> {
             *place = (origin + low as i32) as f32;
         }
         place[axis] += share;
-        Vertex { position_m: place.map(|c| self.voxel_size_m * c), colour: mix(self.colour(low), self.colour(high), share) }
+        Vertex {
+            position_m: place.map(|c| self.voxel_size_m * c),
+            colour: mix(self.colour(low), self.colour(high), share),
+        }
     }
 
     /// The colour of a point of the patch, if it has one.

@@ -121,7 +121,13 @@ impl Eye {
     pub fn ray(&self, u: usize, v: usize) -> Ray {
         let [corner, column, row] = self.rays;
         let (u, v) = (u as f32, v as f32);
-        let mut ray = Ray { origin: self.origin, slope: [0.0; 3], zero: [0; 3], per_plane: [0; 3], ahead: [0; 3] };
+        let mut ray = Ray {
+            origin: self.origin,
+            slope: [0.0; 3],
+            zero: [0; 3],
+            per_plane: [0; 3],
+            ahead: [0; 3],
+        };
         for axis in AXES {
             let exact = corner[axis] + row[axis] * v + column[axis] * u;
             let slope = if exact > -LEAST_SLOPE && exact < LEAST_SLOPE { LEAST_SLOPE } else { exact };

@@ -232,7 +232,13 @@ impl Marcher<'_, '_> {
         let place = passage.at(share);
         let (from_m, to_m) = (depth_in_m(step.from), depth_in_m(step.to));
         let depth_m = from_m + (to_m - from_m) * share;
-        Some(Crossing { slots: here.slots, spot: step.spot, gradient: field.gradient(place), place, depth_m })
+        Some(Crossing {
+            slots: here.slots,
+            spot: step.spot,
+            gradient: field.gradient(place),
+            place,
+            depth_m,
+        })
     }
 
     #[inline]
@@ -273,7 +279,12 @@ impl Marcher<'_, '_> {
         let length = libm::sqrtf(right * right + down * down + forward * forward);
         let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
         let (colour, weight) = self.colour(crossing);
-        Hit { depth_m: crossing.depth_m, normal: [right * scale, down * scale, forward * scale], colour, weight }
+        Hit {
+            depth_m: crossing.depth_m,
+            normal: [right * scale, down * scale, forward * scale],
+            colour,
+            weight,
+        }
     }
 
     /// The mean of the coloured corners, by nearness in 256ths, and the weight of the nearest.

@@ -96,7 +96,13 @@ impl<'b> Band<'b> {
         let (normal, normal_low) = self.normal.split_at_mut(at);
         let (colour, colour_low) = self.colour.split_at_mut(at);
         let (weight, weight_low) = self.weight.split_at_mut(at);
-        let low = Band { first_row: self.first_row + rows, depth_m: depth_low, normal: normal_low, colour: colour_low, weight: weight_low };
+        let low = Band {
+            first_row: self.first_row + rows,
+            depth_m: depth_low,
+            normal: normal_low,
+            colour: colour_low,
+            weight: weight_low,
+        };
         (Band { first_row: self.first_row, depth_m, normal, colour, weight }, low)
     }
 }
@@ -148,9 +154,15 @@ impl<'s> Raycaster<'s> {
         }
         let marcher = Marcher { surface: &self.surface, blocks: &volume.blocks, eye: &eye, min_weight };
         let ranges = &self.ranges;
-        let whole = Band { first_row: 0, depth_m: self.depth_m, normal: self.normal, colour: self.colour, weight: self.weight }
-            .split(view.height, view.width)
-            .0;
+        let whole = Band {
+            first_row: 0,
+            depth_m: self.depth_m,
+            normal: self.normal,
+            colour: self.colour,
+            weight: self.weight,
+        }
+        .split(view.height, view.width)
+        .0;
         let rows = view.height.div_ceil(4);
         let (high, low) = whole.split(2 * rows, view.width);
         let ((a, b), (c, d)) = (high.split(rows, view.width), low.split(rows, view.width));

@@ -35,7 +35,10 @@ impl<'s> Ranges<'s> {
     }
 
     pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self { depth_m: carver.cut("raycast.ranges", Self::tiles(capacity.image_width, capacity.image_height))?, columns: 0 })
+        Ok(Self {
+            depth_m: carver.cut("raycast.ranges", Self::tiles(capacity.image_width, capacity.image_height))?,
+            columns: 0,
+        })
     }
 
     /// Whether a picture of this size has room.

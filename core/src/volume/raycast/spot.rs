@@ -46,7 +46,15 @@ pub(super) static WALLS: [Wall; 3] = [wall(0, 1, 2), wall(1, 0, 2), wall(2, 0, 1
 
 #[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
 const fn wall(axis: usize, u: usize, v: usize) -> Wall {
-    Wall { u, v, turn: UNITS[axis], turn_v: UNITS[v], far: UNITS[u] + UNITS[v], stride_u: VOXEL_STRIDES[u], stride_v: VOXEL_STRIDES[v] }
+    Wall {
+        u,
+        v,
+        turn: UNITS[axis],
+        turn_v: UNITS[v],
+        far: UNITS[u] + UNITS[v],
+        stride_u: VOXEL_STRIDES[u],
+        stride_v: VOXEL_STRIDES[v],
+    }
 }
 
 impl Spot {

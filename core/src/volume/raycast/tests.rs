@@ -459,7 +459,10 @@ fn refuses_what_it_cannot_look_at_and_shows_no_picture() {
         assert!(caster.depth_m().is_none());
     }
     for translation in [[f64::NAN, 0.0, 0.0], [f64::INFINITY, 0.0, 0.0], [1e9, 0.0, 0.0]] {
-        let lost = Viewpoint { t_world_camera: Transform::from_parts(translation.into(), good.t_world_camera.rotation), ..good };
+        let lost = Viewpoint {
+            t_world_camera: Transform::from_parts(translation.into(), good.t_world_camera.rotation),
+            ..good
+        };
         assert_eq!(caster.cast(&volume, &lost, &Serial), Err(RaycastError::Viewpoint));
     }
     let absurd = Viewpoint { rig: StereoRig { focal_px: 0.0, ..RIG }, ..good };
