@@ -285,6 +285,7 @@ impl<'s> Instances<'s> {
 
     /// Fuses what this frame shows of each object into its volume, and ends the frame. Objects that must go are handed to `sink`. Without
     /// `poses`, because the camera's is a guess, nothing is fused.
+    #[expect(clippy::too_many_arguments, reason = "everything a frame brings, each once")]
     pub fn reconstruct<E: Executor>(
         &mut self,
         rig: &StereoRig,
@@ -548,7 +549,7 @@ fn sighting(m: &Match, ground: &Ground<'_>) -> Option<Sighting> {
     let ([u, v], [u_right, v_right]) = (centered(m.previous_left), centered(m.previous_right));
     let disparity = u - u_right;
     // False for NaN.
-    if !(disparity >= DISPARITY_MIN_PX) {
+    if disparity.is_nan() || disparity < DISPARITY_MIN_PX {
         return None;
     }
     let per_px = rig.baseline_m / disparity;

@@ -86,7 +86,7 @@ fn the_forgotten_and_the_last_are_handed_over_too() {
         let mut drive = Drive::new(instances, estimator);
         for frame in 0..16 {
             let [camera, car] = at(frame);
-            drive.step(camera, &[(&Board::CAR, (frame < 5 || frame > 10).then_some(car))]);
+            drive.step(camera, &[(&Board::CAR, (!(5..=10).contains(&frame)).then_some(car))]);
         }
         let reasons = |sink: &Taken| sink.0.iter().map(|taken| (taken.0.id, taken.1)).collect::<Vec<_>>();
         assert_eq!(reasons(&drive.sink), [(1, Retirement::Forgotten)]);
