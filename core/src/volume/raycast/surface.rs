@@ -85,7 +85,7 @@ impl<'s> Surface<'s> {
         let in_view = self.cull(volume, eye, limits_m);
         self.index(|_| true);
         self.read_signs(volume, min_weight, executor);
-        self.join_neighbours(executor);
+        self.join_neighbours();
         self.index(|cells| cells.iter().any(|layer| layer.crossed != 0));
         in_view
     }
@@ -177,7 +177,7 @@ impl<'s> Surface<'s> {
     }
 
     /// Finds each block's neighbours and the cells it shares with them.
-    fn join_neighbours<E: Executor>(&mut self, _executor: &E) {
+    fn join_neighbours(&mut self) {
         const UNSEEN: [signs::Layers; 2] = [[0; BLOCK_SIDE]; 2];
         for at in 0..self.len {
             let Some(&[x, y, z]) = self.local.get(at) else { return };
