@@ -162,7 +162,11 @@ impl<'s> Mapper<'s> {
             executor.stage(Stage::Egomotion, || (scene_flow.status == FlowStatus::Matched).then(|| self.move_camera([width, height])));
         let fused = self.camera.held_frames() == 0;
         let moved = egomotion.filter(|_| fused).map(|_| *self.camera.t_current_previous());
-        let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous: moved };
+        let camera = CameraMotion {
+            t_world_camera: *self.camera.t_world_camera(),
+            t_current_previous: moved,
+            known: fused,
+        };
         // (D) The objects' motions.
         executor.stage(Stage::Instances, || {
             self.instances.follow(&config.rig, self.scene_flow.refined(), self.scene_flow.sparse(), &camera, &mut self.estimator);
@@ -172,7 +176,7 @@ impl<'s> Mapper<'s> {
         let allocation = if fused { self.fuse(frame, &view, executor, store) } else { AllocationReport::default() };
         executor.stage(Stage::Instances, || {
             let (picture, disparity) = (Picture { grey: left, colour: frame.colour }, self.stereo.disparity_q8());
-            self.instances.reconstruct(&self.config.rig, &picture, disparity, &camera, fused, executor, objects);
+            self.instances.reconstruct(&self.config.rig, &picture, disparity, &camera, executor, objects);
         });
         // (F) Noise last seen a fixed lag ago goes.
         let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
@@ -264,11 +268,6 @@ impl<'s> Mapper<'s> {
     pub fn finish_with<O: ObjectSink>(&mut self, objects: &mut O) -> PruneReport {
         self.instances.finish(objects);
         self.background.finish()
-    }
-
-    /// TEMP
-    pub fn flow(&self) -> &FlowMatcher<'s> {
-        &self.scene_flow
     }
 
     /// What is tracked, as it stands after the last frame, by age.

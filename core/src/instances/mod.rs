@@ -100,6 +100,8 @@ pub struct CameraMotion {
     pub t_world_camera: Transform,
     /// Previous camera to current camera; `None` in the first frame and where it is only guessed.
     pub t_current_previous: Option<Transform>,
+    /// Whether the pose is known, and not a guess: nothing is fused from a guess.
+    pub known: bool,
 }
 
 /// Detections, tracks and objects.
@@ -283,16 +285,13 @@ impl<'s> Instances<'s> {
         self.report.pixels_cleared = cleared;
     }
 
-    /// Fuses what this frame shows of each object into its volume, and ends the frame. Objects that must go are handed to `sink`. Without
-    /// `poses`, because the camera's is a guess, nothing is fused.
-    #[expect(clippy::too_many_arguments, reason = "everything a frame brings, each once")]
+    /// Fuses what this frame shows of each object into its volume, and ends the frame. Objects that must go are handed to `sink`.
     pub fn reconstruct<E: Executor>(
         &mut self,
         rig: &StereoRig,
         picture: &Picture<'_>,
         disparity_q8: View<'_, u16>,
         camera: &CameraMotion,
-        poses: bool,
         executor: &E,
         sink: &mut impl ObjectSink,
     ) {
@@ -300,7 +299,7 @@ impl<'s> Instances<'s> {
         for index in 0..self.tracks.all().len() {
             let Some(track) = self.tracks.all().get(index).copied() else { break };
             let Some(detection) = track.detection.checked_sub(1).and_then(|at| self.detections.all().get(at as usize)) else { continue };
-            if !poses || track.chain == 0 || track.class().treatment() != Treatment::Reconstruct {
+            if !camera.known || track.chain == 0 || track.class().treatment() != Treatment::Reconstruct {
                 continue;
             }
             let masks = if self.now == 0 { &self.masks[0] } else { &self.masks[1] };
@@ -548,8 +547,9 @@ fn sighting(m: &Match, ground: &Ground<'_>) -> Option<Sighting> {
     let centered = |[u, v]: [f32; 2]| [f64::from(u) - rig.center_u_px, f64::from(v) - rig.center_v_px];
     let ([u, v], [u_right, v_right]) = (centered(m.previous_left), centered(m.previous_right));
     let disparity = u - u_right;
-    // False for NaN.
-    if disparity.is_nan() || disparity < DISPARITY_MIN_PX {
+    // Not so for NaN.
+    let triangulates = disparity >= DISPARITY_MIN_PX;
+    if !triangulates {
         return None;
     }
     let per_px = rig.baseline_m / disparity;

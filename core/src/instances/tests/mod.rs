@@ -131,6 +131,7 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
         let camera = CameraMotion {
             t_world_camera,
             t_current_previous: (self.frame > 0).then_some(t_current_previous),
+            known: true,
         };
         self.instances.admit(self.frame, &detections, [WIDTH, HEIGHT]);
         self.instances.claim(&matches, &[]);
@@ -138,7 +139,7 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
         let grey = vec![128u8; WIDTH * HEIGHT];
         let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
         let disparity = View::new(&disparity, WIDTH, HEIGHT).unwrap();
-        self.instances.reconstruct(&RIG, &picture, disparity, &camera, true, &Serial, &mut self.sink);
+        self.instances.reconstruct(&RIG, &picture, disparity, &camera, &Serial, &mut self.sink);
         self.frame += 1;
         self.t_world_camera = t_world_camera;
         self.before = boards.iter().map(|(_, now)| *now).collect();
