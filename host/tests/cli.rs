@@ -100,6 +100,7 @@ fn bad_input_fails_with_a_sentence_and_leaves_no_folder() {
     fails(&["rig", "--config", "missing.toml"], "missing.toml cannot be read");
     fails(&["rig", "--start", "3"], "leaves none of the 3 frames");
     fails(&["rig", "--scale", "0"], "--scale 0");
+    fails(&["rig", "--profile", "tiny", "--set", "volume.prune_lag=65"], "profile tiny remembers 64");
     fails(&["rig", "--threads", "0"], "begin at 1");
     // In the middle of a run: the last image is cut short.
     let image = root.path().join("rig/right/002.png");
@@ -127,8 +128,59 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
     assert!(
         said(&run).contains("do not fit profile tiny") && said(&run).contains("--profile small, or shrink the images with --scale 0.5")
     );
+    assert!(said(&run).contains("desktop") && said(&run).contains("drive, s"), "the table is shown");
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--scale", "0.5", "--quiet"]);
     assert!(run.status.success(), "black images are a value, not a failure: {}", said(&run));
+}
+
+#[test]
+fn a_strict_run_fails_at_the_first_harm_and_names_frame_and_cause() {
+    let root = TempDir::new().unwrap();
+    let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=4", "--profile", "tiny", "--quiet"];
+    let run = |more: &[&str]| dynvox(root.path(), &[&["run", "--out", "result"], &street[..], more].concat());
+    let strict = run(&["--strict"]);
+    assert_eq!(strict.status.code(), Some(1));
+    assert!(said(&strict).contains("frame 0 harms the map: ") && said(&strict).contains("found no room in the pool"), "{}", said(&strict));
+    assert!(names(root.path()).is_empty(), "nothing half-written");
+    let coarse = ["--set", "volume.voxel_size_m=0.2"];
+    assert!(run(&[&["--strict"], &coarse[..]].concat()).status.success(), "a map that fits is harmed by nothing");
+    let lenient = run(&["--overwrite"]);
+    assert!(lenient.status.success(), "{}", said(&lenient));
+}
+
+#[test]
+fn a_full_disk_is_warned_of_once_and_counted_and_the_run_goes_on() {
+    let root = TempDir::new().unwrap();
+    let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=24", "--set", "volume.voxel_size_m=0.1"];
+    let run = |out: &str, more: &[&str]| {
+        let run = dynvox(root.path(), &[&["run", "--profile", "tiny", "--json", "--out", out], &street[..], more].concat());
+        assert!(run.status.success(), "{}", said(&run));
+        (serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap(), said(&run))
+    };
+    let (kept, _) = run("kept", &["--keep-blocks"]);
+    let (full, warning) = run("full", &["--stream-mib", "1"]);
+    let (lost, _) = run("lost", &["--no-stream"]);
+    assert!(kept["evict"]["out"].as_u64() > Some(0) && kept["health"]["blocks_lost"] == 0, "{kept}");
+    assert_eq!(warning.matches("map.blocks takes no more").count(), 1, "{warning}");
+    assert!(full["health"]["blocks_lost"].as_u64() > Some(0) && full["health"]["disk_failure"].is_string());
+    assert!(full["evict"]["disk_bytes"].as_u64() <= Some(1 << 20));
+    assert_eq!(full["health"]["worst_severity"], "map affected");
+    assert_eq!(lost["evict"]["disk_records"], 0);
+    assert!(lost["map"]["triangles"].as_u64() < full["map"]["triangles"].as_u64());
+    assert!(full["map"]["triangles"].as_u64() < kept["map"]["triangles"].as_u64());
+    assert!(names(&root.path().join("kept")).contains(&"map.blocks".to_owned()));
+    assert!(!names(&root.path().join("full")).contains(&"map.blocks".to_owned()));
+}
+
+#[test]
+fn more_resident_memory_than_allowed_ends_the_run_with_a_sentence() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 2);
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--out", "result", "--rss-limit-mib", "1"]);
+    if cfg!(target_os = "linux") {
+        assert_eq!(run.status.code(), Some(1));
+        assert!(said(&run).contains("more than the 1048576 it may") && said(&run).contains("--rss-limit-mib"), "{}", said(&run));
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
 use crate::export::{self, FolderError, RunFolder, Summary};
-use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, RunRecord, Streaming};
+use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, RunError, RunRecord, Streaming};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -57,6 +57,9 @@ pub struct RunArgs {
     /// Leave map.blocks in the run folder when the mesh is written
     #[arg(long, conflicts_with = "no_stream")]
     keep_blocks: bool,
+    /// Compare the map with the exact depth of a frame so many frames later, when pruning has been there
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    evaluation_delay: usize,
     /// Fail at the first frame that harms the map: a guessed pose, a block lost or refused
     #[arg(long)]
     strict: bool,
@@ -105,8 +108,9 @@ impl RunArgs {
 }
 
 pub fn run(args: &RunArgs) -> anyhow::Result<()> {
-    let settings = Settings::resolve(args.config.as_deref(), &args.set)?;
+    let mut settings = Settings::resolve(args.config.as_deref(), &args.set)?;
     let capacity = super::profile(&args.profile)?;
+    settings.fit(&capacity);
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
     if threads == 0 || args.stride == 0 || args.frames == Some(0) {
         bail!("--threads, --stride and --frames begin at 1. Give a larger number");
@@ -124,6 +128,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
             keep_file: args.keep_blocks,
         }),
         strict: args.strict,
+        evaluation_delay: args.evaluation_delay,
         rss_limit_bytes: args.rss_limit_mib.map_or(capacity.bytes() as u64 + HOST_OVERHEAD_BYTES, |mib| mib.saturating_mul(MIB)),
         quiet: args.silent(),
         dataset,
@@ -133,7 +138,11 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     if !args.silent() {
         introduce(&plan);
     }
-    let record = harness::run(&plan, &folder)?;
+    let record = harness::run(&plan, &folder).map_err(|error| match error {
+        // What does not fit is told with what would.
+        RunError::ImageSize { .. } | RunError::Window { .. } => anyhow::anyhow!("{error}\n\n{}", super::budget::table(&plan.config.volume)),
+        error => error.into(),
+    })?;
     let summary = Summary::of(&record);
     write(&folder, &record, &summary)?;
     let place = folder.commit()?;

@@ -2,7 +2,7 @@
 
 use crate::synth::StreetConfig;
 use anyhow::{Context, bail};
-use dynvox_core::Config;
+use dynvox_core::{Capacity, Config};
 use dynvox_core::egomotion::EgomotionConfig;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::instances::InstancesConfig;
@@ -65,6 +65,14 @@ impl Settings {
             volume: *volume,
             raycast: *raycast,
             mesh: *mesh,
+        }
+    }
+
+    /// Shortens the pruning window to what the profile remembers, unless another than the default was asked for.
+    pub fn fit(&mut self, capacity: &Capacity) {
+        let default = VolumeConfig::default().prune_lag;
+        if self.volume.prune_lag == default {
+            self.volume.prune_lag = u32::try_from(capacity.history_frames).map_or(default, |frames| frames.min(default));
         }
     }
 

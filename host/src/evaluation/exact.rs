@@ -6,6 +6,8 @@ use serde::Serialize;
 
 /// Farthest pixels compared, m: as far as depth is fused.
 const FAR_M: f32 = 20.0;
+/// Error, as a share of the exact depth, up to which a pixel counts as accurate.
+const CLOSE_SHARE: f32 = 0.05;
 /// Width of a bin of the error histogram, m.
 const BIN_M: f32 = 0.000_5;
 /// Width of a bin of the depth histogram, m.
@@ -20,6 +22,8 @@ pub struct ExactFigures {
     pub median_error_m: f64,
     /// Median exact depth of the pixels compared, m, to a centimetre: what the error is to be held against.
     pub median_depth_m: f64,
+    /// Share of the pixels where the map shows a surface that lie within 5 % of the exact depth.
+    pub accuracy: f64,
     /// Share of the exact pixels where the map shows a surface.
     pub completeness: f64,
     /// Exact pixels compared: static ones within 20 m.
@@ -31,12 +35,13 @@ pub struct ExactFigures {
 pub struct ExactErrors {
     errors: Vec<u64>,
     depths: Vec<u64>,
+    close: u64,
     points: u64,
 }
 
 impl Default for ExactErrors {
     fn default() -> Self {
-        Self { errors: vec![0; BINS], depths: vec![0; BINS], points: 0 }
+        Self { errors: vec![0; BINS], depths: vec![0; BINS], close: 0, points: 0 }
     }
 }
 
@@ -52,6 +57,7 @@ impl ExactErrors {
             if shown_m > 0.0 {
                 count(&mut self.errors, (shown_m - exact_m).abs() / BIN_M);
                 count(&mut self.depths, exact_m / DEPTH_BIN_M);
+                self.close += u64::from((shown_m - exact_m).abs() <= CLOSE_SHARE * exact_m);
             }
         }
     }
@@ -61,6 +67,7 @@ impl ExactErrors {
         Some(ExactFigures {
             median_error_m: f64::from(BIN_M) * median_bin(&self.errors)?,
             median_depth_m: f64::from(DEPTH_BIN_M) * median_bin(&self.depths)?,
+            accuracy: self.close as f64 / self.errors.iter().sum::<u64>() as f64,
             completeness: self.errors.iter().sum::<u64>() as f64 / self.points as f64,
             points: self.points,
         })
@@ -102,6 +109,7 @@ mod tests {
         errors.add(&map.view().unwrap(), &exact);
         let figures = errors.figures().unwrap();
         assert_eq!(figures.points, 3);
+        assert_eq!(figures.accuracy, 1.0, "what is not shown is not inaccurate");
         assert!((figures.completeness - 2.0 / 3.0).abs() < 1e-12);
         assert!((figures.median_error_m - 0.1).abs() < 0.001 && (figures.median_depth_m - 10.0).abs() < 0.02, "{figures:?}");
     }

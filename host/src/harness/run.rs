@@ -51,6 +51,8 @@ pub struct Plan {
     pub strict: bool,
     /// Resident memory above which the run fails.
     pub rss_limit_bytes: u64,
+    /// Frames after which the map is compared with the exact depth of a frame, from where it was taken.
+    pub evaluation_delay: usize,
     /// Whether to show no progress.
     pub quiet: bool,
 }
@@ -87,6 +89,19 @@ pub enum RunError {
         fits_height: usize,
         /// What to do.
         action: String,
+    },
+    /// The pruning window is longer than the profile's history.
+    #[error(
+        "volume.prune_lag is {prune_lag} frames; profile {profile} remembers {history_frames}. Choose a larger --profile, or \
+         --set volume.prune_lag={history_frames}"
+    )]
+    Window {
+        /// Frames asked for.
+        prune_lag: u32,
+        /// Frames the profile's history holds.
+        history_frames: usize,
+        /// Name of the profile.
+        profile: String,
     },
     /// The configuration.
     #[error("the configuration cannot be used: {problems}. Correct it with --set key=value or in the --config file")]
@@ -283,6 +298,10 @@ fn check(plan: &Plan) -> Result<(), RunError> {
         });
     }
     let problems = plan.config.validate();
+    let (prune_lag, history_frames) = (plan.config.volume.prune_lag, plan.capacity.history_frames);
+    if problems.is_empty() && plan.config.volume.prune_weight > 0 && prune_lag as usize > history_frames {
+        return Err(RunError::Window { prune_lag, history_frames, profile: plan.profile.clone() });
+    }
     if problems.is_empty() {
         return Ok(());
     }
@@ -344,7 +363,8 @@ impl Course<'_, '_> {
     fn frames(&mut self) -> Result<(), RunError> {
         let frames = self.plan.indices.len();
         let progress = Progress::new(frames, self.plan.quiet);
-        let (is_keyframe, is_compared) = (spread(frames, KEYFRAMES), spread(frames, EXACT_FRAMES));
+        let delay = self.plan.evaluation_delay;
+        let (is_keyframe, is_compared) = (spread(frames, KEYFRAMES), spread(frames.saturating_sub(delay).max(1), EXACT_FRAMES));
         let begin = Instant::now();
         read_ahead(self.plan.dataset.as_ref(), &self.plan.indices, |decoded| {
             for (at, (index, images)) in decoded.iter().enumerate() {
@@ -368,9 +388,12 @@ impl Course<'_, '_> {
                     self.rows.clear();
                 }
                 self.rows.push(row);
-                let exact = images.exact.as_ref().filter(|_| is_compared(at));
+                let exact = images.exact.as_ref().filter(|_| delay == 0 && is_compared(at));
                 if is_keyframe(at) || exact.is_some() {
                     self.look(&images, &t_world_camera, exact, is_keyframe(at).then_some(index));
+                }
+                if let Some(past) = at.checked_sub(delay).filter(|&past| delay > 0 && is_compared(past)) {
+                    self.look_back(past)?;
                 }
                 self.aside += aside.elapsed();
             }
@@ -429,6 +452,17 @@ impl Course<'_, '_> {
         if let Some(row) = self.rows.last_mut() {
             row.stages[Stage::Raycast as usize] = times[Stage::Raycast as usize];
         }
+    }
+
+    /// Compares the map with the exact depth of an earlier frame, which is decoded again.
+    fn look_back(&mut self, past: usize) -> Result<(), RunError> {
+        let (Some(row), Some(&index)) = (self.rows.get(past), self.plan.indices.get(past)) else { return Ok(()) };
+        let t_world_camera = row.report.t_world_camera;
+        let images = self.plan.dataset.frame(index)?;
+        if let Some(exact) = &images.exact {
+            self.look(&images, &t_world_camera, Some(exact), None);
+        }
+        Ok(())
     }
 
     /// The map from behind and above the last camera.

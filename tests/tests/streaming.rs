@@ -1,0 +1,132 @@
+//! A drive that outgrows its pool, with a file beside it.
+
+use dynvox::store::{BlockFile, mesh};
+use dynvox_core::volume::{BlockStore, NoStore, Triangle};
+use dynvox_core::{Capacity, Config, Mapper, Report, Serial, Severity};
+use dynvox_tests::{Clip, HeapSlab};
+use std::collections::BTreeSet;
+
+const VOXEL_M: f32 = 0.1;
+/// Holds what is in view and some metres more.
+const SMALL: Capacity = Capacity { blocks: 4_000, visible_blocks: 4_000, ..Capacity::TINY };
+const LARGE: Capacity = Capacity { blocks: 40_000, ..SMALL };
+
+fn config(clip: &Clip) -> Config {
+    let mut config = clip.config();
+    config.volume.voxel_size_m = VOXEL_M;
+    config.volume.prune_weight = 0;
+    config
+}
+
+fn file(folder: &tempfile::TempDir) -> BlockFile<std::fs::File> {
+    let (file, _) = BlockFile::open(&folder.path().join("map.blocks"), VOXEL_M, 0.75).expect("a fresh folder takes a file");
+    file
+}
+
+/// A triangle's bits: places and colours.
+type Bits = [(u32, u32, u32, [u8; 3]); 3];
+
+fn bits(Triangle { vertices }: Triangle) -> Bits {
+    vertices.map(|vertex| {
+        let [x, y, z] = vertex.position_m.map(f32::to_bits);
+        (x, y, z, vertex.colour)
+    })
+}
+
+fn drive<S: BlockStore>(clip: &Clip, mapper: &mut Mapper<'_>, store: &mut S) -> Vec<Report> {
+    clip.stereo().map(|frame| mapper.step_with(&frame, &Serial, store).expect("a good frame")).collect()
+}
+
+fn sum(reports: &[Report], of: fn(&Report) -> u32) -> u32 {
+    reports.iter().map(of).sum()
+}
+
+#[test]
+fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
+    let clip = Clip::street(320, 96, 60);
+    let config = config(&clip);
+    let mut unbounded = Vec::new();
+    let mut slab = HeapSlab::of(&LARGE);
+    let mut mapper = Mapper::new(&LARGE, &config, slab.bytes()).expect("a slab that fits");
+    let reports = drive(&clip, &mut mapper, &mut NoStore);
+    assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0, "the large pool holds it all");
+    mapper.triangles(&mut |triangle| unbounded.push(bits(triangle)));
+
+    let folder = tempfile::TempDir::new().expect("a folder for the blocks");
+    let (mut store, mut streamed) = (file(&folder), Vec::new());
+    let mut slab = HeapSlab::of(&SMALL);
+    let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
+    let reports = drive(&clip, &mut mapper, &mut store);
+    let evicted = sum(&reports, |report| report.allocation.eviction.kept);
+    assert!(evicted > 2_000, "{evicted} blocks left: the pool is outgrown");
+    assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0);
+    mapper.stream_out(&mut store);
+    drop(mapper);
+    let count = mesh::triangles(
+        &mut store,
+        (&config.volume, &config.mesh),
+        (slab.bytes(), false),
+        &hashbrown::HashSet::new(),
+        &mut |triangle| streamed.push(bits(triangle)),
+    );
+    assert_eq!(count.ok(), Some(streamed.len() as u64));
+    assert!(unbounded.len() > 100_000, "{} triangles", unbounded.len());
+    unbounded.sort_unstable();
+    streamed.sort_unstable();
+    assert!(unbounded == streamed, "{} triangles against {}", unbounded.len(), streamed.len());
+}
+
+#[test]
+fn a_full_disk_is_told_from_the_first_lost_block_on_and_the_drive_goes_on() {
+    let clip = Clip::street(320, 96, 40);
+    let config = config(&clip);
+    let folder = tempfile::TempDir::new().expect("a folder for the blocks");
+    let mut store = file(&folder);
+    store.limit(300_000);
+    let mut slab = HeapSlab::of(&SMALL);
+    let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
+    let reports = drive(&clip, &mut mapper, &mut store);
+    assert!(store.failure().is_some() && store.bytes() <= 300_000);
+    let kept = sum(&reports, |report| report.allocation.eviction.kept);
+    assert!(kept > 0 && sum(&reports, |report| report.allocation.eviction.lost) > 0);
+    assert_eq!(u64::from(kept), store.records());
+    for report in &reports {
+        let harmed = report.severity() == Severity::MapAffected;
+        assert_eq!(harmed, report.allocation.eviction.lost > 0, "frame {}", report.frame);
+    }
+    let stored: BTreeSet<_> = store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect();
+    assert!(!stored.is_empty() && stored.len() <= kept as usize, "what was kept can still be read");
+}
+
+#[test]
+fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
+    let clip = Clip::street(160, 64, 12);
+    for (blocks, prune_weight) in [(1, 0), (1, 1), (2, 1), (17, 0), (17, 1), (17, 3)] {
+        let capacity = Capacity { blocks, history_frames: 1, ..SMALL };
+        let mut config = config(&clip);
+        config.volume.prune_weight = prune_weight;
+        let folder = tempfile::TempDir::new().expect("a folder for the blocks");
+        let mut store = file(&folder);
+        let mut slab = HeapSlab::of(&capacity);
+        let mut mapper = Mapper::new(&capacity, &config, slab.bytes()).expect("a slab that fits");
+        let reports = drive(&clip, &mut mapper, &mut store);
+        let pruned = mapper.finish();
+        let last = reports.last().expect("frames were taken");
+        let made = sum(&reports, |report| report.allocation.made);
+        let left = sum(&reports, |report| {
+            report.allocation.eviction.kept + report.allocation.eviction.empty + report.prune.blocks_freed
+        });
+        let now = mapper.background().pool().len() as u32;
+        assert_eq!(made, left + pruned.blocks_freed + now, "{blocks} blocks, weight {prune_weight}");
+        assert!(last.blocks.peak as usize <= blocks && sum(&reports, |report| report.allocation.refused) > 0);
+        assert_eq!(sum(&reports, |report| report.allocation.eviction.lost), 0);
+        if prune_weight > 0 {
+            assert!(sum(&reports, |report| report.prune.early) > 0, "a history of one frame is cut short, and says so");
+        }
+        let mut triangles = 0;
+        assert_eq!(mapper.triangles(&mut |_| triangles += 1), triangles);
+        assert!(mapper.raycast(&last.t_world_camera, &Serial).is_ok());
+        let out = mapper.stream_out(&mut store);
+        assert_eq!((out.kept + out.empty, out.lost), (now, 0));
+    }
+}
