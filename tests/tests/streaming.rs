@@ -1,6 +1,7 @@
 //! A drive that outgrows its pool, with a file beside it.
 
 use dynvox::store::{BlockFile, mesh};
+use dynvox_core::instances::NoSink;
 use dynvox_core::volume::{BlockStore, NoStore, Triangle};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, Severity};
 use dynvox_tests::{Clip, HeapSlab};
@@ -34,7 +35,7 @@ fn bits(Triangle { vertices }: Triangle) -> Bits {
 }
 
 fn drive<S: BlockStore>(clip: &Clip, mapper: &mut Mapper<'_>, store: &mut S) -> Vec<Report> {
-    clip.stereo().map(|frame| mapper.step_with(&frame, &Serial, store).expect("a good frame")).collect()
+    clip.stereo().map(|frame| mapper.step_with(&frame, &Serial, store, &mut NoSink).expect("a good frame")).collect()
 }
 
 fn sum(reports: &[Report], of: fn(&Report) -> u32) -> u32 {
