@@ -39,7 +39,7 @@ fn bench(criterion: &mut Criterion) {
     let start = slab.as_ptr().align_offset(64);
     let mut volume = Volume::carve(&capacity, &VolumeConfig::default(), &mut Carver::new(&mut slab[start..], bytes).unwrap()).unwrap();
     let grey = vec![128; WIDTH * HEIGHT];
-    let mut fuse = |volume: &mut Volume<'_>, shift_m: f32| {
+    let fuse = |volume: &mut Volume<'_>, shift_m: f32| {
         let depth_m = canyon(shift_m);
         let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
         volume.allocate(&view, depth_m, &mut NoStore);
