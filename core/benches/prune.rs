@@ -33,7 +33,12 @@ fn canyon(shift_m: f32) -> Vec<f32> {
 fn bench(criterion: &mut Criterion) {
     let capacity = Capacity { blocks: 40_000, visible_blocks: 40_000, ..Capacity::ONBOARD };
     let rig = StereoRig { focal_px: 354.0, center_u_px: 300.0, center_v_px: 91.0, baseline_m: 0.54 };
-    let view = Viewpoint { rig, width: WIDTH, height: HEIGHT, t_world_camera: exp(Vector3::zeros(), Vector3::zeros()) };
+    let view = Viewpoint {
+        rig,
+        width: WIDTH,
+        height: HEIGHT,
+        t_world_camera: exp(Vector3::zeros(), Vector3::zeros()),
+    };
     let bytes = Volume::bytes(&capacity);
     let mut slab = vec![0u8; bytes + 64];
     let start = slab.as_ptr().align_offset(64);
@@ -43,7 +48,12 @@ fn bench(criterion: &mut Criterion) {
         let depth_m = canyon(shift_m);
         let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
         volume.allocate(&view, depth_m, &mut NoStore);
-        let seen = Observation { depth_m, grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None, class: None };
+        let seen = Observation {
+            depth_m,
+            grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
+            colour: None,
+            class: None,
+        };
         volume.fuse(&view, seen, &Serial);
     };
     // Shifts of the walls fused before each pruning; what only one frame saw goes.

@@ -63,13 +63,10 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0);
     mapper.stream_out(&mut store);
     drop(mapper);
-    let count = mesh::triangles(
-        &mut store,
-        (&config.volume, &config.mesh),
-        (slab.bytes(), false),
-        &hashbrown::HashSet::new(),
-        &mut |triangle| streamed.push(bits(triangle)),
-    );
+    let count =
+        mesh::triangles(&mut store, (&config.volume, &config.mesh), (slab.bytes(), false), &hashbrown::HashSet::new(), &mut |triangle| {
+            streamed.push(bits(triangle))
+        });
     assert_eq!(count.ok(), Some(streamed.len() as u64));
     assert!(unbounded.len() > 100_000, "{} triangles", unbounded.len());
     unbounded.sort_unstable();
@@ -114,9 +111,7 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
         let pruned = mapper.finish();
         let last = reports.last().expect("frames were taken");
         let made = sum(&reports, |report| report.allocation.made);
-        let left = sum(&reports, |report| {
-            report.allocation.eviction.kept + report.allocation.eviction.empty + report.prune.blocks_freed
-        });
+        let left = sum(&reports, |report| report.allocation.eviction.kept + report.allocation.eviction.empty + report.prune.blocks_freed);
         let now = mapper.background().pool().len() as u32;
         assert_eq!(made, left + pruned.blocks_freed + now, "{blocks} blocks, weight {prune_weight}");
         assert!(last.blocks.peak as usize <= blocks && sum(&reports, |report| report.allocation.refused) > 0);

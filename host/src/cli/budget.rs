@@ -70,7 +70,8 @@ pub fn table(volume: &VolumeConfig) -> String {
 /// Seconds of driving until so many blocks are full; known for the voxels it was measured with.
 fn drive_s(blocks: usize, volume: &VolumeConfig) -> Option<f64> {
     let measured = VolumeConfig::default();
-    let same = volume.voxel_size_m == measured.voxel_size_m && volume.truncation_m == measured.truncation_m && volume.far_m == measured.far_m;
+    let same =
+        volume.voxel_size_m == measured.voxel_size_m && volume.truncation_m == measured.truncation_m && volume.far_m == measured.far_m;
     same.then(|| blocks as f64 / f64::from(BLOCKS_PER_M) / SPEED_M_S)
 }
 

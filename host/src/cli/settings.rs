@@ -2,13 +2,13 @@
 
 use crate::synth::StreetConfig;
 use anyhow::{Context, bail};
-use dynvox_core::{Capacity, Config};
 use dynvox_core::egomotion::EgomotionConfig;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::instances::InstancesConfig;
 use dynvox_core::scene_flow::SceneFlowConfig;
 use dynvox_core::stereo::StereoConfig;
 use dynvox_core::volume::{MeshConfig, RaycastConfig, VolumeConfig};
+use dynvox_core::{Capacity, Config};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use toml::{Table, Value};
