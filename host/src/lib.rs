@@ -5,5 +5,6 @@ pub mod dataset;
 pub mod evaluation;
 pub mod export;
 pub mod harness;
+pub mod segmentation;
 pub mod store;
 pub mod synth;

@@ -1,6 +1,6 @@
 //! `dynvox inspect`.
 
-use crate::dataset::{self, Dataset, Found, Kind};
+use crate::dataset::{self, Dataset, Found, Kind, Masks};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -57,6 +57,14 @@ fn describe(dataset: &dyn Dataset, command: &str) {
             "true poses: the trajectory's errors are measured"
         } else {
             "no true poses: the trajectory's errors stay unknown"
+        }
+    );
+    println!(
+        "  {}",
+        match dataset.masks() {
+            Masks::Folder(folder) => format!("masks in {}: what moves is kept apart", folder.display()),
+            Masks::Exact => "exact masks: what moves is kept apart".to_owned(),
+            Masks::Absent => "no masks: cars go into the static map, unless --instances names some".to_owned(),
         }
     );
     for note in dataset.notes() {

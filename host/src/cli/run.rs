@@ -4,6 +4,7 @@ use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
 use crate::export::{self, FolderError, RunFolder, Summary};
 use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, RunError, RunRecord, Streaming};
+use crate::segmentation::{self, Choice};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -42,6 +43,13 @@ pub struct RunArgs {
     /// Shrink the images, above 0 and up to 1
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     scale: f64,
+    /// Where masks of what could move come from: auto, none, files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or
+    /// noisy[:SEED] (the synthetic street)
+    #[arg(long, default_value = "auto", value_name = "SOURCE")]
+    instances: Choice,
+    /// Whether what moves is kept out of the static map and reconstructed apart; off fuses everything into one map [default: on]
+    #[arg(long, value_name = "on|off", value_parser = on_or_off)]
+    dynamic: Option<bool>,
     /// Settings from a file; config.toml of an earlier run is one
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -103,7 +111,16 @@ impl RunArgs {
             }
             None => super::synth::street(settings)?,
         };
-        Ok(if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) })
+        let dataset = if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) };
+        Ok(segmentation::attach(dataset, &self.instances)?)
+    }
+}
+
+fn on_or_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("say on or off".to_owned()),
     }
 }
 
@@ -116,8 +133,15 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         bail!("--threads, --stride and --frames begin at 1. Give a larger number");
     }
     let dataset = args.open(&settings)?;
+    let indices = harness::frame_indices(dataset.len(), args.start, args.stride, args.frames)?;
+    if let Some(interval_s) = harness::frame_interval_s(dataset.as_ref(), &indices) {
+        settings.set_frame_interval_s(interval_s);
+    }
+    if let Some(dynamic) = args.dynamic {
+        settings.set_dynamic(dynamic);
+    }
     let plan = Plan {
-        indices: harness::frame_indices(dataset.len(), args.start, args.stride, args.frames)?,
+        indices,
         profile: args.profile.clone(),
         capacity,
         config: settings.config(dataset.rig()),
@@ -161,6 +185,7 @@ fn write(folder: &RunFolder, run: &RunRecord, summary: &Summary) -> Result<(), F
     folder.write("trajectory_kitti.txt", |out| export::write_kitti(out, &poses))?;
     folder.write("trajectory_tum.txt", |out| export::write_tum(out, &times, &poses))?;
     folder.write("frames.csv", |out| export::write_frames(out, &run.rows))?;
+    folder.write("tracks.csv", |out| export::write_tracks(out, &run.rows))?;
     folder.write("report.html", |out| export::report::write(out, run))?;
     folder.write("summary.json", |out| Ok(serde_json::to_writer_pretty(out, summary)?))
 }

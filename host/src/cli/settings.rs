@@ -76,6 +76,16 @@ impl Settings {
         }
     }
 
+    /// Sets the time between two frames, which comes with the data set.
+    pub fn set_frame_interval_s(&mut self, interval_s: f64) {
+        self.instances.frame_interval_s = interval_s as f32;
+    }
+
+    /// Says whether what moves is kept apart.
+    pub fn set_dynamic(&mut self, dynamic: bool) {
+        self.instances.dynamic = dynamic;
+    }
+
     /// The street's configuration.
     pub fn street(&self) -> StreetConfig {
         self.street.clone().unwrap_or_default()

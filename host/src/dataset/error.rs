@@ -125,6 +125,14 @@ pub enum DatasetError {
         /// What the machine says.
         source: std::io::Error,
     },
+    /// Masks that cannot be used.
+    #[error("the masks {path} cannot be used: {reason}. Correct them, give others with --instances, or run without: --instances none")]
+    Masks {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
     /// The synthetic street refuses its configuration.
     #[error("the synthetic street cannot be built: {reason}. Change its keys with --set street.<key>=<value>")]
     Street {

@@ -19,6 +19,8 @@ pub fn open(path: &Path) -> Result<Sequence, DatasetError> {
         poses: optional("poses.txt").map(|file| table::read_poses(&file).map(|poses| (file, poses))).transpose()?,
         numbered: false,
         notes: Vec::new(),
+        instances: path.join("instances"),
+        objects: Vec::new(),
     })
 }
 

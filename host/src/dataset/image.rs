@@ -102,6 +102,19 @@ pub fn read_png(path: &Path) -> Result<Decoded, DatasetError> {
     }
 }
 
+/// Reads a grey PNG of 8 or 16 bit as numbers.
+pub fn read_png_u16(path: &Path) -> Result<Image<u16>, DatasetError> {
+    let failed = |reason: String| DatasetError::Image { path: path.to_path_buf(), reason };
+    let decoded = open(path)?.decode().map_err(|error| failed(plain(&error)))?;
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    let pixels = match decoded {
+        DynamicImage::ImageLuma8(image) => image.into_raw().into_iter().map(u16::from).collect(),
+        DynamicImage::ImageLuma16(image) => image.into_raw(),
+        _ => return Err(failed("it is a colour image; numbers of instances are grey, 8 or 16 bit".into())),
+    };
+    Image::new(width, height, pixels).ok_or_else(|| failed("it has no pixels".into()))
+}
+
 /// Width and height without decoding the pixels.
 pub fn png_size(path: &Path) -> Result<(usize, usize), DatasetError> {
     let (width, height) =

@@ -2,9 +2,12 @@
 
 use super::calibration::KittiCalibration;
 use super::sequence::{Parts, Sequence};
-use super::{DatasetError, Images, error::read_failed, table};
+use super::{DatasetError, Images, error::read_failed, labels, table};
 use nalgebra::{Isometry3, Translation3};
 use std::path::{Path, PathBuf};
+
+/// Time between two frames of the tracking benchmark, s.
+const LABELS_INTERVAL_S: f64 = 0.1;
 
 /// Opens a sequence of the odometry benchmark. `path` is its root (with `sequences/`), the `sequences` folder or one sequence.
 pub fn open_odometry(path: &Path, sequence: Option<&str>, images: Images) -> Result<Sequence, DatasetError> {
@@ -55,6 +58,8 @@ pub fn open_odometry(path: &Path, sequence: Option<&str>, images: Images) -> Res
         poses,
         numbered: true,
         notes,
+        instances: folder.join("instances"),
+        objects: Vec::new(),
     })
 }
 
@@ -66,6 +71,14 @@ pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, Da
     let action = "The tracking benchmark keeps left images in image_02/NNNN, right ones in image_03/NNNN: fetch what is missing";
     let calibration = present(split.join("calib").join(format!("{name}.txt")), "Fetch the benchmark's calibration files")?;
     let poses = split.join("poses").join(format!("{name}.txt"));
+    let labels = split.join("label_02").join(format!("{name}.txt"));
+    // Labels have a scale of their own: poses on it are preferred.
+    let scaled = split.join("poses").join(format!("{name}.scaled.txt"));
+    let labels_poses = [&scaled, &poses].into_iter().find(|path| path.is_file() && labels.is_file());
+    let objects = match labels_poses {
+        Some(path) => labels::read_labels(&labels, &table::read_poses(path)?, LABELS_INTERVAL_S)?,
+        None => Vec::new(),
+    };
     Sequence::from_parts(Parts {
         left: present(split.join("image_02").join(&name), action)?,
         right: present(split.join("image_03").join(&name), action)?,
@@ -74,6 +87,8 @@ pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, Da
         poses: if poses.is_file() { Some((poses.clone(), table::read_poses(&poses)?)) } else { None },
         numbered: true,
         notes: Vec::new(),
+        instances: split.join("instances").join(&name),
+        objects,
         name: format!("kitti-tracking-{name}"),
     })
 }

@@ -8,6 +8,7 @@ mod error;
 mod folder;
 mod image;
 mod kitti;
+mod labels;
 mod open;
 mod scaled;
 mod sequence;
@@ -15,16 +16,21 @@ mod street;
 mod table;
 #[cfg(test)]
 mod tests;
+mod truth;
 
 pub use error::DatasetError;
-pub use image::{Image, luma, read_png};
+pub use image::{Image, luma, read_png, read_png_u16};
+pub use labels::read_labels;
 pub use open::{Found, Kind, open, sequences_at, survey};
 pub use scaled::Scaled;
 pub use sequence::Sequence;
 pub use street::StreetFrames;
 pub use table::{pose_of_row, read_poses};
+pub use truth::{ObjectsTruth, TrueObject};
 
+use crate::segmentation::Sightings;
 use dynvox_core::geometry::{StereoRig, Transform};
+use std::path::PathBuf;
 
 /// One stereo pair, decoded.
 #[derive(Clone, Debug)]
@@ -37,6 +43,10 @@ pub struct StereoImages {
     pub colour: Option<Image<[u8; 3]>>,
     /// What the renderer of a synthetic frame knows exactly.
     pub exact: Option<ExactFrame>,
+    /// What is true of the things that move or could, where known.
+    pub objects: Option<ObjectsTruth>,
+    /// What is seen in the left image; nothing before a source of masks is laid over the data set.
+    pub sightings: Sightings,
 }
 
 /// What a renderer knows of a frame exactly.
@@ -46,6 +56,21 @@ pub struct ExactFrame {
     pub depth_m: Image<f32>,
     /// Whether the pixel belongs to something that moves in this frame.
     pub moving: Image<bool>,
+    /// What each left pixel sees: k is an instance of class `classes[k - 1]`, 0 is none.
+    pub instances: Image<u8>,
+    /// Class names of the instances.
+    pub classes: Vec<&'static str>,
+}
+
+/// Which masks a data set brings along.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Masks {
+    /// None.
+    Absent,
+    /// Instance PNGs in a folder beside the images.
+    Folder(PathBuf),
+    /// Exact ones, from the renderer.
+    Exact,
 }
 
 /// Which camera pair of KITTI odometry to use.
@@ -75,6 +100,21 @@ pub trait Dataset: Send + Sync {
 
     /// Width and height of every image, px.
     fn size(&self) -> (usize, usize);
+
+    /// The same of the images as they are stored, before any scaling: masks in files have this size.
+    fn full_size(&self) -> (usize, usize) {
+        self.size()
+    }
+
+    /// Name of a frame's left image without its ending, where it is a file: masks in files have the same names.
+    fn stem(&self, _: usize) -> Option<String> {
+        None
+    }
+
+    /// Masks that come with the data set.
+    fn masks(&self) -> Masks {
+        Masks::Absent
+    }
 
     /// The rig, equal for all frames.
     fn rig(&self) -> StereoRig;

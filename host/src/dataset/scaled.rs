@@ -1,6 +1,6 @@
 //! A data set at a smaller size: every pixel is the area average of the pixels it covers, and the rig shrinks with it.
 
-use super::{Dataset, DatasetError, ExactFrame, Image, StereoImages};
+use super::{Dataset, DatasetError, ExactFrame, Image, Masks, StereoImages};
 use dynvox_core::geometry::{StereoRig, Transform};
 
 /// Least side of a scaled image, px.
@@ -102,6 +102,18 @@ impl Dataset for Scaled {
         (self.columns.len(), self.rows.len())
     }
 
+    fn full_size(&self) -> (usize, usize) {
+        self.inner.full_size()
+    }
+
+    fn stem(&self, index: usize) -> Option<String> {
+        self.inner.stem(index)
+    }
+
+    fn masks(&self) -> Masks {
+        self.inner.masks()
+    }
+
     fn rig(&self) -> StereoRig {
         let rig = self.inner.rig();
         // Pixel centres lie at whole numbers, areas begin half a pixel before them.
@@ -130,9 +142,16 @@ impl Dataset for Scaled {
             left: self.grey(&frame.left).ok_or_else(failed)?,
             right: self.grey(&frame.right).ok_or_else(failed)?,
             colour: colour.transpose()?,
-            exact: frame
-                .exact
-                .and_then(|exact| Some(ExactFrame { depth_m: self.nearest(&exact.depth_m)?, moving: self.nearest(&exact.moving)? })),
+            exact: frame.exact.and_then(|exact| {
+                Some(ExactFrame {
+                    depth_m: self.nearest(&exact.depth_m)?,
+                    moving: self.nearest(&exact.moving)?,
+                    instances: self.nearest(&exact.instances)?,
+                    classes: exact.classes,
+                })
+            }),
+            objects: frame.objects.map(|truth| truth.scaled(self.scale)),
+            sightings: frame.sightings,
         })
     }
 

@@ -1,6 +1,7 @@
 //! A sequence of image files: two lists of PNGs with a rig, times and, where known, poses. Every layout on disk ends up here.
 
-use super::{Dataset, DatasetError, Image, StereoImages, error::read_failed, image};
+use super::{Dataset, DatasetError, Image, Masks, ObjectsTruth, StereoImages, error::read_failed, image};
+use crate::segmentation::Sightings;
 use dynvox_core::geometry::{StereoRig, Transform};
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,8 @@ pub struct Sequence {
     rig: StereoRig,
     times_s: Vec<f64>,
     truth: Option<Vec<Transform>>,
+    masks: Masks,
+    objects: Vec<ObjectsTruth>,
     notes: Vec<String>,
 }
 
@@ -32,6 +35,10 @@ pub(super) struct Parts {
     /// Whether file names are frame numbers, as in KITTI: row `n` of the tables then belongs to file `n`.
     pub numbered: bool,
     pub notes: Vec<String>,
+    /// Folder of instance PNGs, there or not.
+    pub instances: PathBuf,
+    /// True objects by frame number; empty where nothing is known.
+    pub objects: Vec<ObjectsTruth>,
 }
 
 impl Sequence {
@@ -64,7 +71,20 @@ impl Sequence {
             }
             found
         });
-        Ok(Self { name: parts.name, left, right, size, rig: parts.rig, times_s, truth, notes })
+        let masks = if parts.instances.is_dir() { Masks::Folder(parts.instances) } else { Masks::Absent };
+        let objects = rows.iter().map_while(|&row| parts.objects.get(row).cloned()).collect();
+        Ok(Self {
+            name: parts.name,
+            left,
+            right,
+            size,
+            rig: parts.rig,
+            times_s,
+            truth,
+            masks,
+            objects,
+            notes,
+        })
     }
 }
 
@@ -85,6 +105,14 @@ impl Dataset for Sequence {
         self.rig
     }
 
+    fn stem(&self, index: usize) -> Option<String> {
+        Some(self.left.get(index)?.file_stem()?.to_string_lossy().into_owned())
+    }
+
+    fn masks(&self) -> Masks {
+        self.masks.clone()
+    }
+
     fn time_s(&self, index: usize) -> f64 {
         self.times_s.get(index).copied().unwrap_or_default()
     }
@@ -98,7 +126,14 @@ impl Dataset for Sequence {
         for (path, image) in [(left_path, &left.grey), (right_path, &right)] {
             check_size(path, image, self.size)?;
         }
-        Ok(StereoImages { left: left.grey, right, colour: left.colour, exact: None })
+        Ok(StereoImages {
+            left: left.grey,
+            right,
+            colour: left.colour,
+            exact: None,
+            objects: self.objects.get(index).cloned(),
+            sightings: Sightings::default(),
+        })
     }
 
     fn truth(&self) -> Option<&[Transform]> {

@@ -1,6 +1,7 @@
 //! The synthetic street as a data set.
 
-use super::{Dataset, DatasetError, ExactFrame, Image, StereoImages};
+use super::{Dataset, DatasetError, ExactFrame, Image, Masks, ObjectsTruth, StereoImages};
+use crate::segmentation::Sightings;
 use crate::synth::{Street, StreetConfig};
 use dynvox_core::geometry::{StereoRig, Transform};
 
@@ -50,13 +51,27 @@ impl Dataset for StreetFrames {
         let (width, height) = (frame.width, frame.height);
         let failed = || DatasetError::Street { reason: format!("frame {index} has no pixels") };
         let moving = (0..frame.depth_m.len()).map(|pixel| frame.is_moving(pixel)).collect();
-        let exact = Image::new(width, height, frame.depth_m).zip(Image::new(width, height, moving));
+        let objects = ObjectsTruth::of_street(&frame);
+        let exact = || {
+            Some(ExactFrame {
+                depth_m: Image::new(width, height, frame.depth_m)?,
+                moving: Image::new(width, height, moving)?,
+                instances: Image::new(width, height, frame.instances)?,
+                classes: frame.objects.iter().map(|object| object.class).collect(),
+            })
+        };
         Ok(StereoImages {
             left: Image::new(width, height, frame.left_grey).ok_or_else(failed)?,
             right: Image::new(width, height, frame.right_grey).ok_or_else(failed)?,
             colour: Image::new(width, height, frame.left_rgb),
-            exact: exact.map(|(depth_m, moving)| ExactFrame { depth_m, moving }),
+            exact: exact(),
+            objects: Some(objects),
+            sightings: Sightings::default(),
         })
+    }
+
+    fn masks(&self) -> Masks {
+        Masks::Exact
     }
 
     fn truth(&self) -> Option<&[Transform]> {

@@ -102,6 +102,8 @@ mod tests {
         let exact = ExactFrame {
             depth_m: image(vec![10.0, 10.0, 10.0, 10.0, 25.0, 0.0]),
             moving: Image::new(6, 1, vec![false, false, false, true, false, false]).unwrap(),
+            instances: Image::new(6, 1, vec![0; 6]).unwrap(),
+            classes: Vec::new(),
         };
         let mut errors = ExactErrors::default();
         assert_eq!(errors.figures(), None);

@@ -1,4 +1,6 @@
 //! How good a run was, where the truth is known.
 
 pub mod exact;
+pub mod objects;
+pub mod swept;
 pub mod trajectory;

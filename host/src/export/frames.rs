@@ -2,6 +2,7 @@
 
 use crate::harness::FrameRow;
 use dynvox_core::Stage;
+use dynvox_core::instances::State;
 use std::io::{self, Write};
 
 /// Writes the table. Empty cells are values the machine cannot give.
@@ -9,6 +10,10 @@ pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
     write!(out, "frame,time_s,digest,input_digest,step_ms,severity,motion,matches,inliers,residual_px,features_dropped,stereo_density")?;
     write!(out, ",blocks_used,blocks_peak,blocks_visible,blocks_made,blocks_refused,blocks_out,blocks_lost,blocks_empty,blocks_back")?;
     write!(out, ",prune_visited,prune_voxels_reset,prune_blocks_freed,prune_carried_over,prune_early,history_frames,rss_bytes")?;
+    write!(
+        out,
+        ",detections_given,detections_taken,detections_refused,tracks,uncertain,static,dynamic,objects,object_blocks,matches_withheld"
+    )?;
     for stage in Stage::ALL {
         write!(out, ",{0}_ms,{0}_cpu_ms", stage.name())?;
     }
@@ -25,6 +30,11 @@ pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
         write!(out, ",{},{},{},{}", prune.visited, prune.voxels_reset, prune.blocks_freed, prune.carried_over)?;
         write!(out, ",{},{}", prune.early, row.history_frames)?;
         write!(out, ",{}", row.rss_bytes.map(|bytes| bytes.to_string()).unwrap_or_default())?;
+        let seen = &report.instances;
+        write!(out, ",{},{},{}", seen.detections.given, seen.detections.taken, seen.detections.refused())?;
+        let [uncertain, still, moving] = [State::Uncertain, State::Static, State::Dynamic].map(|state| row.tracks_in(state));
+        write!(out, ",{},{uncertain},{still},{moving}", seen.tracks.tracks)?;
+        write!(out, ",{},{},{}", seen.objects.objects, seen.objects.blocks, seen.matches_withheld)?;
         for time in &row.stages {
             write!(out, ",{:.4},{:.4}", time.wall_ms, time.cpu_ms)?;
         }

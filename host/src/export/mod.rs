@@ -3,14 +3,18 @@
 mod folder;
 mod frames;
 mod ply;
+mod portrait;
 pub mod report;
 mod summary;
 #[cfg(test)]
 mod tests;
+mod tracks;
 mod trajectory;
 
 pub use folder::{FolderError, RunFolder};
 pub use frames::write_frames;
 pub use ply::{Mesh, PlyWriter};
+pub use portrait::portrait;
 pub use summary::Summary;
-pub use trajectory::{write_kitti, write_tum};
+pub use tracks::{state_name, write_tracks};
+pub use trajectory::{write_kitti, write_numbered, write_tum};

@@ -39,8 +39,13 @@ pub struct PlyWriter {
 impl PlyWriter {
     /// Begins the file. Faces wait in a second file beside it, since they stand after all vertices.
     pub fn begin(path: &Path) -> io::Result<Self> {
+        Self::begin_in(path, "the first camera")
+    }
+
+    /// As [`PlyWriter::begin`], with the name of the frame of reference for the header.
+    pub fn begin_in(path: &Path, frame: &str) -> io::Result<Self> {
         let mut file = BufWriter::new(File::create(path)?);
-        file.write_all(b"ply\nformat binary_little_endian 1.0\ncomment metres; x right, y down, z forward of the first camera\n")?;
+        write!(file, "ply\nformat binary_little_endian 1.0\ncomment metres; x right, y down, z forward of {frame}\n")?;
         let vertex_count_at = count_line(&mut file, "element vertex ")?;
         file.write_all(
             b"property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n",

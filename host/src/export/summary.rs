@@ -1,7 +1,9 @@
 //! `summary.json`: the figures of a run under fixed keys. A key is present as soon as the run knows its value.
 
+use super::state_name;
 use crate::evaluation::exact::ExactFigures;
-use crate::harness::RunRecord;
+use crate::evaluation::objects::{ObjectFigures, TrackErrors};
+use crate::harness::{RunRecord, TrackRecord};
 use dynvox_core::Report;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -23,6 +25,11 @@ pub struct Summary {
     egomotion: EgomotionSummary,
     #[serde(skip_serializing_if = "Option::is_none")]
     exact: Option<ExactSummary>,
+    /// Every track, by number.
+    objects: Vec<ObjectSummary>,
+    /// Tracks against truth, over all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    objects_truth: Option<ObjectFigures>,
     map: MapSummary,
     prune: PruneSummary,
     evict: EvictSummary,
@@ -58,11 +65,56 @@ struct ExactSummary {
 }
 
 #[derive(Debug, Serialize)]
+struct ObjectSummary {
+    id: u32,
+    class: &'static str,
+    first_frame: usize,
+    last_frame: usize,
+    frames: usize,
+    /// The one it was in most, of static and dynamic.
+    state: &'static str,
+    /// Frames it was seen in, by state: uncertain, static, dynamic.
+    frames_in_state: [usize; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    speed_m_s: Option<f64>,
+    blocks: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    me_t_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    me_r_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    truth: Option<TrackErrors>,
+}
+
+impl ObjectSummary {
+    fn of(track: &TrackRecord) -> Self {
+        let errors = track.errors.as_ref();
+        Self {
+            id: track.id,
+            class: track.class.name(),
+            first_frame: track.first_frame,
+            last_frame: track.last_frame,
+            frames: track.frames,
+            state: state_name(track.state),
+            frames_in_state: track.states,
+            speed_m_s: track.speed_m_s,
+            blocks: track.blocks,
+            me_t_m: errors.and_then(|errors| errors.me_t_m),
+            me_r_deg: errors.and_then(|errors| errors.me_r_deg),
+            truth: errors.cloned(),
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
 struct MapSummary {
     blocks: usize,
     blocks_peak: u32,
     bytes: u64,
     triangles: u64,
+    /// Of these, where something drove while it was seen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    swept_triangles: Option<u64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -96,6 +148,8 @@ struct HealthSummary {
     rss_limit_bytes: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     disk_failure: Option<String>,
+    detections_refused: u64,
+    tracks_refused: u64,
     worst_severity: &'static str,
 }
 
@@ -128,11 +182,14 @@ impl Summary {
                 held_frames: run.held_frames(),
             },
             exact: run.exact.map(|still| ExactSummary { still }),
+            objects: run.objects.tracks.iter().map(ObjectSummary::of).collect(),
+            objects_truth: run.objects.figures.clone(),
             map: MapSummary {
                 blocks: run.blocks,
                 blocks_peak: run.blocks_peak(),
                 bytes: run.map_bytes(),
                 triangles: run.mesh.triangles,
+                swept_triangles: run.objects.swept_triangles,
             },
             prune: PruneSummary {
                 visited: sum(|report| report.prune.visited) + u64::from(run.finish.visited),
@@ -156,6 +213,8 @@ impl Summary {
                 history_frames_most: run.rows.iter().map(|row| row.history_frames).max().unwrap_or_default(),
                 rss_limit_bytes: run.rss_limit_bytes,
                 disk_failure: run.shelf_failure.clone(),
+                detections_refused: sum(|report| report.instances.detections.refused()),
+                tracks_refused: sum(|report| report.instances.tracks.refused + report.instances.objects.refused),
                 matches_dropped: sum(Report::dropped_features),
                 worst_severity: run.worst().name(),
             },

@@ -5,13 +5,18 @@ use std::io::{self, Write};
 
 /// KITTI: the twelve numbers of the rows of `t_world_camera`, one line a frame.
 pub fn write_kitti(out: &mut impl Write, poses: &[Transform]) -> io::Result<()> {
-    for pose in poses {
-        let rotation = pose.rotation.to_rotation_matrix();
-        let rows = rotation.matrix().row_iter().zip(pose.translation.vector.iter());
-        let numbers = rows.flat_map(|(row, shift)| [row[0], row[1], row[2], *shift]);
-        writeln!(out, "{}", joined(numbers))?;
-    }
-    Ok(())
+    poses.iter().try_for_each(|pose| writeln!(out, "{}", row(pose)))
+}
+
+/// Poses of some frames only: the frame's number, then the twelve numbers of KITTI's row.
+pub fn write_numbered(out: &mut impl Write, poses: &[(usize, Transform)]) -> io::Result<()> {
+    poses.iter().try_for_each(|(frame, pose)| writeln!(out, "{frame} {}", row(pose)))
+}
+
+fn row(pose: &Transform) -> String {
+    let rotation = pose.rotation.to_rotation_matrix();
+    let rows = rotation.matrix().row_iter().zip(pose.translation.vector.iter());
+    joined(rows.flat_map(|(row, shift)| [row[0], row[1], row[2], *shift]))
 }
 
 /// TUM: `t x y z qx qy qz qw`, one line a frame.

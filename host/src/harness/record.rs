@@ -1,10 +1,12 @@
 //! What is remembered of a run: a row per frame, a few pictures, the figures at the end.
 
-use super::{ShelfUse, StageTime};
+use super::{ObjectsRecord, ShelfUse, StageTime};
 use crate::evaluation::{exact::ExactFigures, trajectory::TrajectoryErrors};
 use crate::export::Mesh;
+use crate::segmentation::Refusals;
 use dynvox_core::egomotion::MotionStatus;
 use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::instances::{State, TrackReport};
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Capacity, Report, Severity, Stage};
@@ -20,6 +22,10 @@ pub struct FrameRow {
     pub report: Report,
     /// Frames in the pruning window's history.
     pub history_frames: usize,
+    /// Tracks seen in this frame, by age.
+    pub tracks: Vec<TrackReport>,
+    /// What the source of masks said and could not be used.
+    pub refusals: Refusals,
     /// Wall time of the whole step, ms.
     pub step_ms: f64,
     /// Resident memory of the process, where the machine tells.
@@ -64,6 +70,11 @@ impl FrameRow {
         ];
         let counted = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
         guessed.into_iter().chain(counted).collect::<Vec<_>>().join("; ")
+    }
+
+    /// How many of the tracks seen are in a state.
+    pub fn tracks_in(&self, state: State) -> usize {
+        self.tracks.iter().filter(|track| track.state == state).count()
     }
 
     /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the list of visible ones.
@@ -126,6 +137,8 @@ pub struct RunRecord {
     pub errors: Option<TrajectoryErrors>,
     /// The map against exact depth.
     pub exact: Option<ExactFigures>,
+    /// What moves or could.
+    pub objects: ObjectsRecord,
     /// Pictures.
     pub keyframes: Vec<Keyframe>,
     /// The finished map from behind and above the last camera, as a PNG file; empty where there is none.

@@ -1,13 +1,14 @@
 //! One run: frames in, map, trajectory and figures out.
 
+use super::objects::{ObjectsAtWork, ObjectsRecord};
 use super::shelf::{MeshOutput, Shelf, Streaming};
 use super::{FrameRow, HostSlab, Keyframe, Progress, RunRecord, Threads, pictures, read_ahead, resident_bytes};
 use crate::dataset::{Dataset, DatasetError, ExactFrame, StereoImages};
 use crate::evaluation::exact::ExactErrors;
 use crate::export::{FolderError, RunFolder};
+use crate::segmentation::Sighting;
 use crate::store::StoreError;
 use dynvox_core::geometry::{Transform, exp};
-use dynvox_core::instances::NoSink;
 use dynvox_core::memory::{Region, SlabError};
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Capacity, Config, Mapper, NewError, Severity, Stage, StepError, StereoFrame};
@@ -173,6 +174,13 @@ pub fn frame_indices(len: usize, start: usize, stride: usize, frames: Option<usi
     if indices.is_empty() { Err(RunError::NoFrames { start, len }) } else { Ok(indices) }
 }
 
+/// Median time between two of the frames, s; `None` where there is only one.
+pub fn frame_interval_s(dataset: &dyn Dataset, indices: &[usize]) -> Option<f64> {
+    let mut steps: Vec<f64> = indices.windows(2).map(|pair| dataset.time_s(pair[1]) - dataset.time_s(pair[0])).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied()
+}
+
 /// Maps the planned frames and writes the mesh into the folder.
 pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
     let begin = Instant::now();
@@ -193,7 +201,10 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
         finish,
         shelf_failure,
         mapping,
+        mut objects,
+        at_work,
     } = drive;
+    objects.swept_triangles = at_work.swept_triangles(&folder.file("map.ply"))?;
     let truth = plan.dataset.truth().map(|truth| from_first(truth, &plan.indices));
     let poses: Vec<Transform> = rows.iter().map(|row| row.report.t_world_camera).collect();
     Ok(RunRecord {
@@ -221,6 +232,7 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
         seconds: begin.elapsed().as_secs_f64(),
         mapping_seconds: mapping.as_secs_f64(),
         rows,
+        objects,
         keyframes,
         overview_png,
     })
@@ -238,6 +250,8 @@ struct Drive {
     shelf_failure: Option<String>,
     /// Time that went into mapping.
     mapping: Duration,
+    objects: ObjectsRecord,
+    at_work: ObjectsAtWork,
 }
 
 /// Maps the planned frames in `slab`.
@@ -251,13 +265,15 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
         rows: Vec::new(),
         keyframes: Vec::new(),
         exact: ExactErrors::default(),
+        objects: ObjectsAtWork::new(folder, plan),
         aside: Duration::ZERO,
     };
     course.frames()?;
     let mapping = begin.elapsed() - course.aside;
-    let finish = course.mapper.finish();
+    let finish = course.mapper.finish_with(&mut course.objects.sink);
+    let objects = course.objects.finish(&course.rows)?;
     let overview_png = course.overview();
-    let Course { mut mapper, shelf, rows, keyframes, exact, .. } = course;
+    let Course { mut mapper, shelf, rows, keyframes, exact, objects: at_work, .. } = course;
     let (regions, blocks) = (mapper.footprint().regions().to_vec(), mapper.background().pool().len());
     let shelf_failure = shelf.failure();
     let output = MeshOutput::begin(&mut mapper, shelf, folder)?;
@@ -272,6 +288,8 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
             finish,
             shelf_failure,
             mapping,
+            objects,
+            at_work,
         },
         output,
     ))
@@ -355,6 +373,7 @@ struct Course<'p, 's> {
     rows: Vec<FrameRow>,
     keyframes: Vec<Keyframe>,
     exact: ExactErrors,
+    objects: ObjectsAtWork,
     /// Time that only the report needed.
     aside: Duration,
 }
@@ -406,23 +425,29 @@ impl Course<'_, '_> {
     fn step(&mut self, index: usize, images: &StereoImages) -> Result<FrameRow, RunError> {
         let refused = |reason: String| RunError::Step { frame: index, reason };
         let empty = || refused("the images are empty".to_owned());
+        let detections: Vec<_> = images.sightings.all.iter().map(Sighting::detection).collect();
         let frame = StereoFrame {
             left: images.left.view().ok_or_else(empty)?,
             right: images.right.view().ok_or_else(empty)?,
             colour: images.colour.as_ref().and_then(|colour| colour.view()),
             class: None,
-            detections: &[],
+            detections: &detections,
         };
         self.threads.take_times();
         let begin = Instant::now();
-        let (mapper, threads, shelf) = (&mut self.mapper, &self.threads, &mut self.shelf);
-        let report = threads.run(|| mapper.step_with(&frame, threads, shelf, &mut NoSink)).map_err(|error| refused(step_reason(error)))?;
+        let (mapper, threads, shelf, sink) = (&mut self.mapper, &self.threads, &mut self.shelf, &mut self.objects.sink);
+        let stepped = threads.run(|| mapper.step_with(&frame, threads, shelf, sink));
+        let report = stepped.map_err(|error| refused(step_reason(error)))?;
+        let step_ms = begin.elapsed().as_secs_f64() * 1e3;
+        let tracks = self.objects.note(index, &self.mapper, images, &report);
         Ok(FrameRow {
             frame: index,
             time_s: self.plan.dataset.time_s(index),
             report,
             history_frames: self.mapper.background().history().len(),
-            step_ms: begin.elapsed().as_secs_f64() * 1e3,
+            step_ms,
+            tracks,
+            refusals: images.sightings.refusals,
             rss_bytes: resident_bytes().map(|(now, _)| now),
             stages: self.threads.take_times(),
         })

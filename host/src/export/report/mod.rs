@@ -1,6 +1,7 @@
 //! `report.html`: the run on one page, in one file. Pictures and drawings are inside; nothing is fetched, no script runs.
 
 mod chart;
+mod objects;
 
 use crate::harness::{FrameRow, RunRecord, StageTime};
 use base64::{Engine, engine::general_purpose::STANDARD};
@@ -20,7 +21,17 @@ pub fn write(out: &mut impl Write, run: &RunRecord) -> io::Result<()> {
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
          <title>{title}</title><style>{STYLE}</style></head><body><main>"
     )?;
-    for part in [head(run), cards(run), trajectory(run), pictures(run), memory(run), time(run), health(run), configuration(run)] {
+    for part in [
+        head(run),
+        cards(run),
+        trajectory(run),
+        pictures(run),
+        objects::section(run),
+        memory(run),
+        time(run),
+        health(run),
+        configuration(run),
+    ] {
         out.write_all(part.as_bytes())?;
     }
     write!(out, "</main></body></html>")

@@ -1,0 +1,112 @@
+//! Labels of KITTI's tracking benchmark: boxes in space, in the rectified camera's frame, made into objects of the world by the camera's poses.
+//!
+//! A row is `frame track type truncated occluded alpha x1 y1 x2 y2 height width length x y z rotation_y`. The place is the middle of the box's
+//! foot; `rotation_y` turns the car's axis, which lies along x, about y. Here z is forward, so a quarter turn is added.
+
+use super::truth::{ObjectsTruth, TrueObject};
+use super::{DatasetError, error::read_failed};
+use dynvox_core::geometry::Transform;
+use dynvox_core::instances::PixelBox;
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Slower than this a labelled thing stands: labels of parked cars wander, m/s.
+const STANDS_M_S: f64 = 1.5;
+/// Frames before and after over which a label's speed is taken.
+const AROUND: usize = 3;
+
+/// Reads a file of labels; `t_world_camera` has a pose for each frame, on the labels' scale.
+///
+/// # Errors
+/// The file cannot be read, or a line is no label.
+pub fn read_labels(path: &Path, t_world_camera: &[Transform], interval_s: f64) -> Result<Vec<ObjectsTruth>, DatasetError> {
+    let text = std::fs::read_to_string(path).map_err(read_failed(path))?;
+    let mut frames: Vec<ObjectsTruth> =
+        t_world_camera.iter().map(|pose| ObjectsTruth { t_world_camera: *pose, objects: Vec::new() }).collect();
+    for (at, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let wrong = || DatasetError::Table {
+            path: path.to_path_buf(),
+            reason: format!("line {} is no label of the tracking benchmark", at + 1),
+            action: "Fetch the labels anew, or move them away: they are optional".into(),
+        };
+        let (frame, object) = label(line).ok_or_else(wrong)?;
+        if let (Some(object), Some(truth)) = (object, frames.get_mut(frame)) {
+            let t_world_object = truth.t_world_camera * object.t_world_object;
+            truth.objects.push(TrueObject { t_world_object, ..object });
+        }
+    }
+    give_speeds(&mut frames, interval_s);
+    Ok(frames)
+}
+
+/// Frame and thing of a row, its place still in the camera; no thing for regions of which nothing is said.
+fn label(line: &str) -> Option<(usize, Option<TrueObject>)> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let (frame, kind) = (words.first()?.parse().ok()?, *words.get(2)?);
+    if kind == "DontCare" {
+        return Some((frame, None));
+    }
+    let numbers: Option<Vec<f64>> = words.get(6..17)?.iter().map(|word| word.parse().ok()).collect();
+    let [x1, y1, x2, y2, height, width, length, x, y, z, turn] = numbers?[..] else { return None };
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn + std::f64::consts::FRAC_PI_2);
+    let object = TrueObject {
+        id: words.get(1)?.parse().ok()?,
+        pixels: PixelBox {
+            left: x1 as i32,
+            top: y1 as i32,
+            width: (x2 - x1) as i32 + 1,
+            height: (y2 - y1) as i32 + 1,
+        },
+        t_world_object: Transform::from_parts(Translation3::new(x, y, z), rotation),
+        dimensions_m: [width, height, length],
+        moving: false,
+        speed_m_s: 0.0,
+    };
+    Some((frame, Some(object)))
+}
+
+/// Each thing's speed, from where it is some frames before and after.
+fn give_speeds(frames: &mut [ObjectsTruth], interval_s: f64) {
+    let mut ways = BTreeMap::<u32, Vec<(usize, Vector3<f64>)>>::new();
+    for (frame, truth) in frames.iter().enumerate() {
+        for object in &truth.objects {
+            ways.entry(object.id).or_default().push((frame, object.t_world_object.translation.vector));
+        }
+    }
+    for (frame, truth) in frames.iter_mut().enumerate() {
+        for object in &mut truth.objects {
+            let near = || ways.get(&object.id).into_iter().flatten().filter(|(at, _)| at.abs_diff(frame) <= AROUND);
+            if let (Some((first, from)), Some((last, to))) = (near().next(), near().last())
+                && last > first
+            {
+                object.speed_m_s = (to - from).norm() / ((last - first) as f64 * interval_s);
+                object.moving = object.speed_m_s > STANDS_M_S;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_car_that_keeps_its_distance_is_as_fast_as_the_camera() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let path = folder.path().join("0000.txt");
+        let row =
+            |frame: u32| format!("{frame} 7 Car 0 0 0 10.0 20.0 30.0 50.0 1.5 1.6 4.0 2.0 1.6 {} -1.57\n", 20.0 + 0.2 * f64::from(frame));
+        let text: String =
+            (0..5).map(|frame| row(frame) + &format!("{frame} -1 DontCare -1 -1 -10 0 0 9 9 -1 -1 -1 -1000 -1000 -1000 -10\n")).collect();
+        std::fs::write(&path, text).unwrap();
+        let poses: Vec<Transform> = (0..5).map(|frame| Transform::translation(0.0, 0.0, f64::from(frame))).collect();
+        let truth = read_labels(&path, &poses, 0.1).unwrap();
+        assert_eq!(truth.len(), 5);
+        let car = &truth[2].objects[..];
+        assert!(car.len() == 1 && car[0].id == 7 && car[0].moving && (car[0].speed_m_s - 12.0).abs() < 1e-9, "{car:?}");
+        assert!((car[0].t_world_object * Vector3::z() - Vector3::z()).norm() < 1e-3, "its z points forward");
+        std::fs::write(&path, "0 7 Car 0 0\n").unwrap();
+        assert!(read_labels(&path, &poses, 0.1).unwrap_err().to_string().contains("line 1 is no label"));
+    }
+}

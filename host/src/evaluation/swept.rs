@@ -1,0 +1,107 @@
+//! The static map against what drove through it: triangles of `map.ply` inside the boxes moving things filled while they were seen.
+//!
+//! A box is taken smaller than the thing: the ground below it and what it touches belong to the map.
+
+use crate::dataset::TrueObject;
+use dynvox_core::geometry::Transform;
+use nalgebra::Point3;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
+
+/// How far above its foot a box begins: the road is mapped, and not flat to the millimetre, m.
+const FOOT_M: f64 = 0.3;
+/// How far its sides lie inside, m.
+const SIDE_M: f64 = 0.1;
+
+/// The volume moving things swept.
+#[derive(Debug, Default)]
+pub struct Swept {
+    /// Map to object, size, middle of the foot, how far the farthest corner is from it squared.
+    boxes: Vec<(Transform, [f64; 3], Point3<f64>, f64)>,
+}
+
+impl Swept {
+    /// Adds a thing if it moves in this frame; `t_map_world` carries the truth's world into the map's.
+    pub fn add(&mut self, object: &TrueObject, t_map_world: &Transform) {
+        if object.moving {
+            let t_map_object = t_map_world * object.t_world_object;
+            let [width, height, length] = object.dimensions_m;
+            let reach = 0.25 * (width * width + length * length) + height * height;
+            self.boxes.push((t_map_object.inverse(), object.dimensions_m, t_map_object.translation.vector.into(), reach));
+        }
+    }
+
+    /// Whether a point of the map lies in it.
+    pub fn contains(&self, point: &Point3<f64>) -> bool {
+        let mut near = self.boxes.iter().filter(|(_, _, foot, reach)| (point - foot).norm_squared() <= *reach);
+        near.any(|(t_object_map, [width, height, length], ..)| {
+            let place = t_object_map * point;
+            place.x.abs() < 0.5 * width - SIDE_M && place.z.abs() < 0.5 * length - SIDE_M && place.y < -FOOT_M && place.y > -height
+        })
+    }
+
+    /// How many triangles of a mesh have their middle in it. The mesh is one this program wrote.
+    pub fn triangles(&self, ply: &Path) -> io::Result<u64> {
+        let mut file = BufReader::new(std::fs::File::open(ply)?);
+        let (mut vertices, mut faces) = (0usize, 0usize);
+        loop {
+            let mut line = String::new();
+            if file.read_line(&mut line)? == 0 {
+                return Err(io::Error::other("the mesh has no header"));
+            }
+            let number = |name: &str| line.strip_prefix(name).and_then(|number| number.trim().parse().ok());
+            vertices = number("element vertex ").unwrap_or(vertices);
+            faces = number("element face ").unwrap_or(faces);
+            if line == "end_header\n" {
+                break;
+            }
+        }
+        // Which vertices lie in it: a triangle counts when all of its corners do.
+        let mut inside = Vec::with_capacity(vertices);
+        let mut vertex = [0u8; 15];
+        for _ in 0..vertices {
+            file.read_exact(&mut vertex)?;
+            let [x, y, z] = [0, 4, 8].map(|at| f64::from(f32::from_le_bytes([vertex[at], vertex[at + 1], vertex[at + 2], vertex[at + 3]])));
+            inside.push(self.contains(&Point3::new(x, y, z)));
+        }
+        let mut count = 0;
+        let mut face = [0u8; 13];
+        for _ in 0..faces {
+            file.read_exact(&mut face)?;
+            let corner = |at: usize| u32::from_le_bytes([face[at], face[at + 1], face[at + 2], face[at + 3]]) as usize;
+            let all = [1, 5, 9].iter().all(|&at| inside.get(corner(at)).copied().unwrap_or(false));
+            count += u64::from(all);
+        }
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::PlyWriter;
+    use dynvox_core::instances::PixelBox;
+
+    #[test]
+    fn counts_what_stands_where_a_car_drove_and_not_the_road_below_it() {
+        let car = |z: f64, moving| TrueObject {
+            id: 1,
+            pixels: PixelBox::default(),
+            t_world_object: Transform::translation(3.0, 1.6, z),
+            dimensions_m: [1.8, 1.5, 4.0],
+            moving,
+            speed_m_s: 10.0,
+        };
+        let mut swept = Swept::default();
+        (0..5).for_each(|frame| swept.add(&car(10.0 + f64::from(frame), true), &Transform::identity()));
+        swept.add(&car(30.0, false), &Transform::identity());
+        let folder = tempfile::TempDir::new().unwrap();
+        let path = folder.path().join("map.ply");
+        let mut ply = PlyWriter::begin(&path).unwrap();
+        let mut patch = |x: f32, y: f32, z: f32| ply.triangle([0.0, 0.05, 0.1].map(|d| ([x + d, y, z + d * d], [9; 3])));
+        let places = [(3.0, 1.0, 9.0), (3.0, 1.0, 15.5), (3.0, 1.6, 12.0), (5.0, 1.0, 12.0), (3.0, 1.0, 30.0), (3.0, -0.5, 12.0)];
+        places.iter().for_each(|&(x, y, z)| patch(x, y, z));
+        ply.finish().unwrap();
+        assert_eq!(swept.triangles(&path).unwrap(), 2, "two of the patches: the others are road, beside, above, or where a car is parked");
+    }
+}

@@ -1,0 +1,30 @@
+//! `tracks.csv`: one row for each track seen in a frame.
+
+use crate::harness::FrameRow;
+use dynvox_core::instances::State;
+use std::io::{self, Write};
+
+/// Name of a state in tables and files.
+pub const fn state_name(state: State) -> &'static str {
+    match state {
+        State::Uncertain => "uncertain",
+        State::Static => "static",
+        State::Dynamic => "dynamic",
+    }
+}
+
+/// Writes the table. The box is in px, its last column and row not among it; speeds are empty until a motion was measured.
+pub fn write_tracks(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
+    writeln!(out, "frame,id,class,state,speed_m_s,speed_sigma_m_s,x1,y1,x2,y2,score,matches,inliers,measured,blocks")?;
+    for row in rows {
+        for track in &row.tracks {
+            let (id, class, state, pixels) = (track.id, track.class.name(), state_name(track.state), &track.pixels);
+            let [speed, sigma] = track.speed_m_s.map_or([String::new(), String::new()], |speeds| speeds.map(|value| format!("{value:.3}")));
+            write!(out, "{},{id},{class},{state},{speed},{sigma}", row.frame)?;
+            write!(out, ",{},{},{},{}", pixels.left, pixels.top, pixels.left + pixels.width, pixels.top + pixels.height)?;
+            let measured = u8::from(track.measured);
+            writeln!(out, ",{:.3},{},{},{measured},{}", track.score, track.matches, track.inliers, track.blocks)?;
+        }
+    }
+    Ok(())
+}
