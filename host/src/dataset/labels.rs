@@ -77,7 +77,7 @@ fn give_speeds(frames: &mut [ObjectsTruth], interval_s: f64) {
     for (frame, truth) in frames.iter_mut().enumerate() {
         for object in &mut truth.objects {
             let near = || ways.get(&object.id).into_iter().flatten().filter(|(at, _)| at.abs_diff(frame) <= AROUND);
-            if let (Some((first, from)), Some((last, to))) = (near().next(), near().last())
+            if let (Some((first, from)), Some((last, to))) = (near().next(), near().next_back())
                 && last > first
             {
                 object.speed_m_s = (to - from).norm() / ((last - first) as f64 * interval_s);

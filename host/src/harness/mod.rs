@@ -1,5 +1,6 @@
 //! Runs the core on a data set: owns the slab, feeds the frames, takes the times, watches memory, collects what the report shows.
 
+mod error;
 mod objects;
 mod pictures;
 mod progress;
@@ -11,12 +12,13 @@ mod shelf;
 mod slab;
 mod threads;
 
+pub use error::RunError;
 pub use objects::{KeptObject, ObjectsRecord, TrackRecord};
 pub use progress::Progress;
 pub use reader::{AHEAD, read_ahead};
 pub use record::{FrameRow, Keyframe, RunRecord, StageStatistics};
 pub use resident::resident_bytes;
-pub use run::{HOST_OVERHEAD_BYTES, Plan, RunError, frame_indices, frame_interval_s, run};
+pub use run::{HOST_OVERHEAD_BYTES, Plan, frame_indices, frame_interval_s, run};
 pub use shelf::{MeshOutput, Shelf, ShelfUse, Streaming};
 pub use slab::HostSlab;
 pub use threads::{StageTime, Threads};

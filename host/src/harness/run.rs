@@ -1,17 +1,17 @@
 //! One run: frames in, map, trajectory and figures out.
 
+use super::error::{RunError, refused, step_reason};
 use super::objects::{ObjectsAtWork, ObjectsRecord};
 use super::shelf::{MeshOutput, Shelf, Streaming};
 use super::{FrameRow, HostSlab, Keyframe, Progress, RunRecord, Threads, pictures, read_ahead, resident_bytes};
-use crate::dataset::{Dataset, DatasetError, ExactFrame, StereoImages};
+use crate::dataset::{Dataset, ExactFrame, StereoImages};
 use crate::evaluation::exact::ExactErrors;
-use crate::export::{FolderError, RunFolder};
+use crate::export::RunFolder;
 use crate::segmentation::Sighting;
-use crate::store::StoreError;
 use dynvox_core::geometry::{Transform, exp};
-use dynvox_core::memory::{Region, SlabError};
+use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
-use dynvox_core::{Capacity, Config, Mapper, NewError, Severity, Stage, StepError, StereoFrame};
+use dynvox_core::{Capacity, Config, Mapper, Severity, Stage, StereoFrame};
 use std::time::{Duration, Instant};
 
 /// Frames shown in the report.
@@ -56,116 +56,6 @@ pub struct Plan {
     pub evaluation_delay: usize,
     /// Whether to show no progress.
     pub quiet: bool,
-}
-
-/// Why a run ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The data set, or a frame of it.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// The run folder.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// No frame is left of the data set.
-    #[error("--start {start} leaves none of the {len} frames. Give a smaller --start")]
-    NoFrames {
-        /// First frame asked for.
-        start: usize,
-        /// Frames there are.
-        len: usize,
-    },
-    /// The images are larger than the profile's.
-    #[error("images of {width} x {height} px do not fit profile {profile}, which takes {fits_width} x {fits_height}. {action}")]
-    ImageSize {
-        /// Image width, px.
-        width: usize,
-        /// Image height, px.
-        height: usize,
-        /// Name of the profile.
-        profile: String,
-        /// Widest image, px.
-        fits_width: usize,
-        /// Highest image, px.
-        fits_height: usize,
-        /// What to do.
-        action: String,
-    },
-    /// The pruning window is longer than the profile's history.
-    #[error(
-        "volume.prune_lag is {prune_lag} frames; profile {profile} remembers {history_frames}. Choose a larger --profile, or \
-         --set volume.prune_lag={history_frames}"
-    )]
-    Window {
-        /// Frames asked for.
-        prune_lag: u32,
-        /// Frames the profile's history holds.
-        history_frames: usize,
-        /// Name of the profile.
-        profile: String,
-    },
-    /// The configuration.
-    #[error("the configuration cannot be used: {problems}. Correct it with --set key=value or in the --config file")]
-    Config {
-        /// All problems.
-        problems: String,
-    },
-    /// The machine has no room for the slab.
-    #[error("this machine has no {bytes} bytes for the slab of profile {profile}. Choose a smaller --profile; `dynvox budget` lists them")]
-    NoMemory {
-        /// Bytes of the slab.
-        bytes: usize,
-        /// Name of the profile.
-        profile: String,
-    },
-    /// The core refuses the slab.
-    #[error("the core refuses the slab of profile {profile}: {reason}. This is a bug of dynvox: please report it")]
-    Slab {
-        /// Name of the profile.
-        profile: String,
-        /// What the core says.
-        reason: String,
-    },
-    /// The core refuses a frame.
-    #[error("frame {frame} was refused: {reason}. End before it with --frames, or skip it with --start")]
-    Step {
-        /// Number of the frame.
-        frame: usize,
-        /// What the core says.
-        reason: String,
-    },
-    /// The block file.
-    #[error("blocks that leave the pool cannot be kept: {0}. Free the disk, or run with --no-stream")]
-    Store(#[from] StoreError),
-    /// A strict run's map was harmed.
-    #[error("frame {frame} harms the map: {cause}. Without --strict the run goes on and counts it")]
-    Strict {
-        /// Number of the frame.
-        frame: usize,
-        /// What happened.
-        cause: String,
-    },
-    /// The process holds more memory than it may.
-    #[error(
-        "at frame {frame} the process holds {rss_bytes} bytes, more than the {limit_bytes} it may. Allow more with --rss-limit-mib, or choose a \
-         smaller --profile"
-    )]
-    Resident {
-        /// Number of the frame.
-        frame: usize,
-        /// Resident bytes.
-        rss_bytes: u64,
-        /// The ceiling.
-        limit_bytes: u64,
-    },
-    /// The threads cannot be started.
-    #[error("{count} threads cannot be started: {source}. Give fewer --threads")]
-    Threads {
-        /// Threads asked for.
-        count: usize,
-        /// What the machine says.
-        source: rayon::ThreadPoolBuildError,
-    },
 }
 
 /// The frames a run takes: from `start`, every `stride`-th, at most `frames`.
@@ -259,7 +149,7 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
     let begin = Instant::now();
     let mut course = Course {
         plan,
-        mapper: Mapper::new(&plan.capacity, &plan.config, slab).map_err(|error| refused(plan, error))?,
+        mapper: Mapper::new(&plan.capacity, &plan.config, slab).map_err(|error| refused(&plan.profile, error))?,
         threads: Threads::new(plan.threads).map_err(|source| RunError::Threads { count: plan.threads, source })?,
         shelf: Shelf::begin(plan.streaming, folder, &plan.config)?,
         rows: Vec::new(),
@@ -325,24 +215,6 @@ fn check(plan: &Plan) -> Result<(), RunError> {
     }
     let problems: Vec<String> = problems.iter().map(|problem| format!("{} {}", problem.key, problem.rule)).collect();
     Err(RunError::Config { problems: problems.join("; ") })
-}
-
-fn refused(plan: &Plan, error: NewError) -> RunError {
-    let reason = match error {
-        NewError::Slab(SlabError::TooSmall { missing }) => format!("it lacks {missing} bytes"),
-        NewError::Slab(other) => format!("{other:?}"),
-        NewError::Config(problem) => return RunError::Config { problems: format!("{} {}", problem.key, problem.rule) },
-    };
-    RunError::Slab { profile: plan.profile.clone(), reason }
-}
-
-fn step_reason(error: StepError) -> String {
-    match error {
-        StepError::SizesDiffer => "its images differ in size".to_owned(),
-        StepError::SizeChanged => "its images have another size than those before".to_owned(),
-        StepError::TooLarge { width, height } => format!("its images are larger than {width} x {height} px"),
-        StepError::TooSmall { width, height } => format!("its images are smaller than {width} x {height} px"),
-    }
 }
 
 /// Poses of the chosen frames, seen from the first of them.

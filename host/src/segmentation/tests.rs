@@ -191,7 +191,7 @@ fn run_lengths_are_those_of_the_published_tools() {
     // The example of COCO's documentation: 6, 1, 40, 4, 5, 4, 5, 4, 21.
     assert_eq!(rle::runs("61X13mN000`0", 10, 9).unwrap(), [(6, 1), (47, 4), (56, 4), (65, 4)]);
     for (width, height) in [(1, 1), (7, 5), (200, 90)] {
-        let mask = |u: usize, v: usize| (u * 31 + v * 17) % 7 < 3 || (u / 9 + v / 5) % 2 == 0;
+        let mask = |u: usize, v: usize| (u * 31 + v * 17) % 7 < 3 || (u / 9 + v / 5).is_multiple_of(2);
         let mut pixels = vec![false; width * height];
         for (start, length) in rle::runs(&rle::encoded(mask, width, height), width, height).unwrap() {
             pixels[start..start + length].fill(true);
@@ -310,7 +310,8 @@ fn the_street_knows_every_car_it_draws_parked_ones_too() {
     assert!(truth.objects.iter().any(|object| object.moving) && truth.objects.iter().any(|object| !object.moving));
     let mut boxes: Vec<PixelBox> = frame.sightings.all.iter().map(|one| one.pixels).collect();
     let mut expected: Vec<PixelBox> = truth.objects.iter().map(|object| object.pixels).collect();
-    (boxes.sort(), expected.sort());
+    boxes.sort();
+    expected.sort();
     assert_eq!(boxes, expected);
     let pixels: usize = frame.sightings.all.iter().flat_map(|one| &one.mask).filter(|&&pixel| pixel == 1).count();
     assert_eq!(pixels, frame.exact.unwrap().instances.pixels().iter().filter(|&&k| k > 0).count());
