@@ -153,7 +153,7 @@ fn a_strict_run_fails_at_the_first_harm_and_names_frame_and_cause() {
 fn a_full_disk_is_warned_of_once_and_counted_and_the_run_goes_on() {
     let root = TempDir::new().unwrap();
     let street =
-        ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=24", "--set", "volume.voxel_size_m=0.1"];
+        ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=48", "--set", "volume.voxel_size_m=0.1"];
     let run = |out: &str, more: &[&str]| {
         let run =
             dynvox(root.path(), &[&["run", "--profile", "tiny", "--dynamic", "off", "--json", "--out", out], &street[..], more].concat());

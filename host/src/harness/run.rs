@@ -165,8 +165,12 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
     let overview_png = course.overview();
     let Course { mut mapper, shelf, rows, keyframes, exact, objects: at_work, .. } = course;
     let (regions, blocks) = (mapper.footprint().regions().to_vec(), mapper.background().pool().len());
-    let shelf_failure = shelf.failure();
+    let failed_before = shelf.failure().is_some();
     let output = MeshOutput::begin(&mut mapper, shelf, folder)?;
+    let shelf_failure = output.failure();
+    if let Some(failure) = shelf_failure.as_ref().filter(|_| !failed_before) {
+        eprintln!("warning: at the end: map.blocks takes no more ({failure}). The rest of the map is lost");
+    }
     Ok((
         Drive {
             rows,

@@ -88,6 +88,11 @@ impl MeshOutput {
         Ok(Self { ply, shelf, drawn, report })
     }
 
+    /// Why the shelf takes no more, if it does not.
+    pub fn failure(&self) -> Option<String> {
+        self.shelf.failure()
+    }
+
     /// Adds what is on the shelf, reading it piece by piece into `slab`, and ends the file. The shelf goes unless it is to stay.
     pub fn finish(
         mut self,
