@@ -1,6 +1,6 @@
 //! What a frame's instances came to, as plain values.
 
-use super::{Class, DetectionCount, PixelBox, State, TrackCount};
+use super::{Class, DetectionCount, Instances, Object, ObjectSummary, PixelBox, State, TrackCount, follow::motion_world, pose::transform};
 use crate::geometry::Transform;
 
 /// A track as it stands after a frame.
@@ -85,5 +85,44 @@ impl InstancesReport {
     /// Whether anything that should have been used was not.
     pub fn refused(&self) -> u32 {
         self.detections.refused() + self.tracks.refused + self.objects.refused + self.objects.blocks_refused
+    }
+}
+
+impl<'s> Instances<'s> {
+    /// What the last frame came to.
+    pub fn report(&self) -> &InstancesReport {
+        &self.report
+    }
+
+    /// The tracks as they stand, by age.
+    pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
+        let interval_s = f64::from(self.config.frame_interval_s);
+        self.tracks.all().iter().map(move |track| {
+            let object = self.objects.of(track.id).and_then(|at| self.objects.objects.get(at));
+            TrackReport {
+                id: track.id,
+                class: track.class(),
+                state: track.judgement.state(),
+                score: track.score,
+                seen: track.detection > 0,
+                first_frame: track.first_frame,
+                last_frame: track.last_frame,
+                sightings: track.sightings,
+                pixels: track.place.pixels,
+                speed_m_s: track.filter.is_known().then(|| [track.filter.speed()[0] as f32, track.sigma_m_s]),
+                measured: track.measured == 1,
+                center_world_m: track.filter.center_world().coords.into(),
+                motion_world: motion_world(track, interval_s),
+                t_world_object: (track.chain > 0).then(|| transform(&track.t_world_object)),
+                matches: track.matches,
+                inliers: track.inliers,
+                blocks: object.map_or(0, |object| object.volume.pool().len() as u32),
+            }
+        })
+    }
+
+    /// The objects that have a volume now.
+    pub fn objects(&self) -> impl Iterator<Item = (&ObjectSummary, &Object<'s>)> {
+        self.objects.objects.iter().filter_map(|object| Some((object.summary()?, object)))
     }
 }

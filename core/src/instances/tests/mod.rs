@@ -7,8 +7,17 @@ mod objects;
 mod tracks;
 
 use super::*;
-use crate::{Serial, geometry::exp, memory::SLAB_ALIGN};
-use nalgebra::Vector3;
+use crate::{
+    Serial,
+    egomotion::Estimator,
+    geometry::{StereoRig, Transform, exp},
+    image::{View, ViewMut},
+    memory::SLAB_ALIGN,
+    random::Random,
+    scene_flow::Match,
+};
+use claim::AMBIGUOUS;
+use nalgebra::{Point3, Vector3};
 use std::{vec, vec::Vec};
 
 pub(super) const WIDTH: usize = 400;
