@@ -1,22 +1,21 @@
 //! The loop of the paper (Section III), one line per stage.
 
+mod look;
+
 use crate::{
     Capacity, Executor, Footprint, Stage,
     config::{Config, Problem},
     digest::Digest,
     egomotion::{Egomotion, Estimator, MotionEstimate},
     frame::StereoFrame,
-    geometry::{Transform, depth_from_disparity},
+    geometry::depth_from_disparity,
     image::{View, ViewMut},
     instances::{CameraMotion, Detection, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, TrackReport},
     memory::{Carver, SlabError, region_bytes},
     report::{BlockCount, Report},
     scene_flow::{FlowMatcher, FlowStatus},
     stereo::StereoMatcher,
-    volume::{
-        AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, RaycastError, Raycaster, Triangle, Viewpoint,
-        Volume,
-    },
+    volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Raycaster, Triangle, Viewpoint, Volume},
 };
 
 /// Why a mapper cannot be made.
@@ -304,14 +303,6 @@ impl<'s> Mapper<'s> {
         digest.u64(self.background.digest());
         digest.u64(self.instances.digest());
         digest.finish()
-    }
-
-    /// Looks at the static map from a pose, at the size of the frames taken so far. Before the first frame there is no size to look at.
-    pub fn raycast<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
-        let [width, height] = self.size.ok_or(RaycastError::ImageSize)?;
-        let view = Viewpoint { rig: self.config.rig, width, height, t_world_camera: *t_world_camera };
-        executor.stage(Stage::Raycast, || self.raycaster.cast(&self.background, &view, executor))?;
-        Ok(&self.raycaster)
     }
 
     /// The static map's triangles, one after the other, in world coordinates. How many there were.

@@ -6,7 +6,7 @@ use dynvox_core::{
     geometry::Transform,
     image::View,
     instances::{Class, Detection, NoSink, State, TrackReport},
-    volume::NoStore,
+    volume::{NoStore, Raycaster},
 };
 use dynvox_tests::HeapSlab;
 use std::collections::BTreeMap;
@@ -168,4 +168,66 @@ fn each_cars_state_and_motion_are_the_true_ones_whatever_the_order_of_detections
     let mut again = Vec::new();
     drive.run(true, true, |_, report, _| again.push(report.digest));
     assert_eq!(again, digests);
+}
+
+/// A picture's depth, colour and the layer each pixel shows.
+type Picture = Vec<(f32, [u8; 3], u8)>;
+
+fn picture(seen: &Raycaster<'_>) -> Picture {
+    let (depth_m, colour, layer) = (seen.depth_m().unwrap(), seen.colour().unwrap(), seen.layer().unwrap());
+    depth_m.rows().flatten().zip(colour.rows().flatten()).zip(layer.rows().flatten()).map(|((d, c), l)| (*d, *c, *l)).collect()
+}
+
+#[test]
+fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_cars_where_they_are() {
+    let drive = Drive::new();
+    let mut cars = Vec::new();
+    drive.run(true, false, |index, report, mapper| {
+        if index < 6 || index % 3 > 0 {
+            return;
+        }
+        let pose = report.t_world_camera;
+        let mut nearest = picture(mapper.raycast(&pose, &Serial).unwrap());
+        let tracks: Vec<u32> = mapper.placed_objects().map(|placed| placed.summary.id).collect();
+        for (layer, track) in (1..).zip(&tracks) {
+            let alone = picture(mapper.raycast_object(*track, &pose, &Serial).unwrap());
+            for (nearest, pixel) in nearest.iter_mut().zip(alone) {
+                if pixel.0 > 0.0 && (nearest.0 == 0.0 || pixel.0 < nearest.0) {
+                    *nearest = (pixel.0, pixel.1, layer);
+                }
+            }
+        }
+        let composed = picture(mapper.raycast_composed(&pose, &Serial).unwrap());
+        assert!(composed == nearest);
+        assert!(mapper.raycast_object(u32::MAX, &pose, &Serial).is_err());
+
+        // Under the mask of a car seen now, an object is shown, as far away as the car is.
+        let (frame, seen) = &drive.frames[index];
+        let states: BTreeMap<usize, &str> = mapper
+            .tracks()
+            .filter(|track| track.seen && tracks.contains(&track.id))
+            .filter_map(|track| {
+                let near = |seen: &&Seen| (seen.pixels[0] - track.pixels.left).abs() + (seen.pixels[1] - track.pixels.top).abs();
+                Some((seen.iter().min_by_key(near)?.truth, track.state.name()))
+            })
+            .collect();
+        for (truth, state) in states {
+            let pixels = composed.iter().zip(&frame.depth_m).zip(&frame.instances).filter(|(_, mask)| usize::from(**mask) == truth + 1);
+            let (mut shown, mut right, mut all) = (0, 0, 0);
+            for (((depth_m, _, layer), true_m), _) in pixels.filter(|((_, true_m), _)| **true_m < 20.0) {
+                all += 1;
+                shown += u32::from(*layer > 0);
+                right += u32::from(*layer > 0 && (depth_m - true_m).abs() < 0.05 * true_m);
+            }
+            if all < 500 {
+                continue;
+            }
+            cars.push(state);
+            println!(
+                "frame {index}, car {truth}, {state}: of {all} pixels nearer than 20 m {shown} show an object, {right} at its distance"
+            );
+            assert!(shown * 10 > all * 7 && right * 10 > shown * 8, "car {truth}");
+        }
+    });
+    assert!(cars.contains(&"static") && cars.contains(&"dynamic"), "{cars:?}");
 }

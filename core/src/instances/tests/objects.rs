@@ -140,3 +140,46 @@ fn a_short_ring_of_crops_keeps_the_latest_and_counts_the_rest() {
         assert_eq!(reports[3].caught_up, 1);
     });
 }
+
+#[test]
+fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_it_drove_off() {
+    let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 14.0)];
+    for (place, state) in [(at as fn(u32) -> [Transform; 2], State::Dynamic), (parked, State::Static)] {
+        with(&CAPACITY, &any_size(), |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            let mut last = None;
+            for frame in 0..16 {
+                let [camera, car] = place(frame);
+                drive.step(camera, &[(&Board::CAR, (frame < 6).then_some(car))]);
+                let track = drive.track(1).unwrap();
+                let placed = drive.instances.placed().next().map(|placed| placed.t_world_object);
+                let expected = match frame {
+                    0..3 => None,
+                    // Seen, or carried on over a frame or a few without a motion.
+                    _ if track.t_world_object.is_some() => track.t_world_object,
+                    _ if state == State::Static => last,
+                    _ => None,
+                };
+                assert_eq!(placed, expected, "frame {frame} {state:?}");
+                last = placed;
+            }
+            assert_eq!(last.is_some(), state == State::Static);
+            assert_eq!(drive.instances.objects().count(), 1, "either has its volume");
+        });
+    }
+}
+
+#[test]
+fn an_object_of_a_chain_that_broke_is_not_shown_where_the_next_chain_is() {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        for frame in 0..12 {
+            let [camera, car] = at(frame);
+            drive.step(camera, &[(&Board::CAR, (!(6..9).contains(&frame)).then_some(car))]);
+            if (9..12).contains(&frame) {
+                assert!(drive.track(1).unwrap().t_world_object.is_some(), "a new chain has begun");
+                assert_eq!(drive.instances.placed().count(), 0);
+            }
+        }
+    });
+}

@@ -10,7 +10,10 @@
 //! that have corners on both sides (`signs`, `surface`), and these to the range of depths each eight pixels can meet (`ranges`). A cell
 //! without its bit cannot stop a ray, so leaving it out changes nothing; the tests compare with a walk through every cell.
 //!
-//! Memory: 11 bytes a pixel for the images, 8 bytes for eight pixels, 300 bytes per `visible_blocks` and 8 bytes for the next power of two
+//! Several maps make one picture: [`Raycaster::cast`] begins it and [`Raycaster::cast_over`] adds what lies nearer, so that each pixel shows the
+//! nearest surface and says whose it is. Of equal depths the map added first is seen.
+//!
+//! Memory: 12 bytes a pixel for the images, 8 bytes for eight pixels, 300 bytes per `visible_blocks` and 8 bytes for the next power of two
 //! of twice their number. Time: linear in blocks in view and in pixels.
 //!
 //! When more blocks are in view than `visible_blocks`, the picture ends nearer, and the report says where.
@@ -50,6 +53,8 @@ pub enum RaycastError {
     ImageSize,
     /// The pose is not finite or lies beyond the map, or the rig is absurd.
     Viewpoint,
+    /// No such object is in the world now.
+    Object,
 }
 
 /// What a picture is made of.
@@ -75,9 +80,19 @@ pub struct Raycaster<'s> {
     normal: &'s mut [[i8; 3]],
     colour: &'s mut [[u8; 3]],
     weight: &'s mut [u8],
+    layer: &'s mut [u8],
     width: usize,
     height: usize,
     peak_blocks: usize,
+}
+
+/// Which map is looked at.
+#[derive(Clone, Copy)]
+enum Layer {
+    /// The first of a picture: every pixel is set.
+    Ground,
+    /// One more: only pixels that show it nearer than what is there are set, to this number.
+    Over(u8),
 }
 
 /// Some rows of the picture, which one worker fills.
@@ -87,6 +102,7 @@ struct Band<'b> {
     normal: &'b mut [[i8; 3]],
     colour: &'b mut [[u8; 3]],
     weight: &'b mut [u8],
+    layer: &'b mut [u8],
 }
 
 impl<'b> Band<'b> {
@@ -96,14 +112,16 @@ impl<'b> Band<'b> {
         let (normal, normal_low) = self.normal.split_at_mut(at);
         let (colour, colour_low) = self.colour.split_at_mut(at);
         let (weight, weight_low) = self.weight.split_at_mut(at);
+        let (layer, layer_low) = self.layer.split_at_mut(at);
         let low = Band {
             first_row: self.first_row + rows,
             depth_m: depth_low,
             normal: normal_low,
             colour: colour_low,
             weight: weight_low,
+            layer: layer_low,
         };
-        (Band { first_row: self.first_row, depth_m, normal, colour, weight }, low)
+        (Band { first_row: self.first_row, depth_m, normal, colour, weight, layer }, low)
     }
 }
 
@@ -115,7 +133,7 @@ impl<'s> Raycaster<'s> {
             + Ranges::bytes(capacity)
             + region_bytes::<f32>(pixels)
             + 2 * region_bytes::<[u8; 3]>(pixels)
-            + region_bytes::<u8>(pixels)
+            + 2 * region_bytes::<u8>(pixels)
     }
 
     /// Cuts the images and the working space.
@@ -129,6 +147,7 @@ impl<'s> Raycaster<'s> {
             normal: carver.cut("raycast.normal", pixels)?,
             colour: carver.cut("raycast.colour", pixels)?,
             weight: carver.cut("raycast.weight", pixels)?,
+            layer: carver.cut("raycast.layer", pixels)?,
             width: 0,
             height: 0,
             peak_blocks: 0,
@@ -142,6 +161,33 @@ impl<'s> Raycaster<'s> {
         if pixels == 0 || pixels > self.depth_m.len() || !self.ranges.fit(view.width, view.height) {
             return Err(RaycastError::ImageSize);
         }
+        self.draw(volume, view, Layer::Ground, executor)
+    }
+
+    /// Adds another map to the picture, of the same size and seen with the same rig; `view` is the camera's place in that map's own frame.
+    /// Where the map is nearer than what is there it is shown, and [`Self::layer`] is `layer`. The report counts these pixels. After an
+    /// error the picture is as it was.
+    pub fn cast_over<E: Executor>(
+        &mut self,
+        volume: &Volume<'_>,
+        view: &Viewpoint,
+        layer: u8,
+        executor: &E,
+    ) -> Result<RaycastReport, RaycastError> {
+        if [view.width, view.height] != [self.width, self.height] || self.width == 0 {
+            return Err(RaycastError::ImageSize);
+        }
+        self.draw(volume, view, Layer::Over(layer), executor)
+    }
+
+    /// Draws a map into a picture for which there is room.
+    fn draw<E: Executor>(
+        &mut self,
+        volume: &Volume<'_>,
+        view: &Viewpoint,
+        layer: Layer,
+        executor: &E,
+    ) -> Result<RaycastReport, RaycastError> {
         let eye = Eye::new(view, volume.config.voxel_size_m).ok_or(RaycastError::Viewpoint)?;
         let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
         let near_m = self.config.near_m;
@@ -160,6 +206,7 @@ impl<'s> Raycaster<'s> {
             normal: self.normal,
             colour: self.colour,
             weight: self.weight,
+            layer: self.layer,
         }
         .split(view.height, view.width)
         .0;
@@ -171,10 +218,10 @@ impl<'s> Raycaster<'s> {
         // Sky and road go together, so that two threads have about the same to do.
         join4(
             executor,
-            || *hits_a = band(&marcher, ranges, a),
-            || *hits_d = band(&marcher, ranges, d),
-            || *hits_b = band(&marcher, ranges, b),
-            || *hits_c = band(&marcher, ranges, c),
+            || *hits_a = band(&marcher, ranges, layer, a),
+            || *hits_d = band(&marcher, ranges, layer, d),
+            || *hits_b = band(&marcher, ranges, layer, b),
+            || *hits_c = band(&marcher, ranges, layer, c),
         );
         Ok(RaycastReport {
             pixels: hits.iter().sum(),
@@ -204,6 +251,11 @@ impl<'s> Raycaster<'s> {
         View::new(self.weight, self.width, self.height)
     }
 
+    /// Which map is seen: 0 for the one the picture began with, and where there is no surface.
+    pub fn layer(&self) -> Option<View<'_, u8>> {
+        View::new(self.layer, self.width, self.height)
+    }
+
     /// Enters what was in use at most into a footprint.
     pub fn note_use(&self, footprint: &mut Footprint) {
         let (now, peak) = (self.surface.len(), self.peak_blocks);
@@ -214,29 +266,35 @@ impl<'s> Raycaster<'s> {
     }
 }
 
-/// Fills a band and counts its hits.
-fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, band: Band<'_>) -> u32 {
+/// Fills a band and counts the pixels that show the map.
+fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: Layer, band: Band<'_>) -> u32 {
     let width = marcher.eye.width;
     let images = band
         .depth_m
         .chunks_mut(width)
         .zip(band.normal.chunks_mut(width))
-        .zip(band.colour.chunks_mut(width).zip(band.weight.chunks_mut(width)));
+        .zip(band.colour.chunks_mut(width).zip(band.weight.chunks_mut(width)))
+        .zip(band.layer.chunks_mut(width));
     let mut hits = 0;
-    for (v, ((depth_m, normal), (colour, weight))) in (band.first_row..).zip(images) {
+    for (v, (((depth_m, normal), (colour, weight)), layers)) in (band.first_row..).zip(images) {
         let ranges = ranges.row(v);
-        let pixels = depth_m.iter_mut().zip(normal).zip(colour.iter_mut().zip(weight)).enumerate();
-        for (u, ((depth_m, normal), (colour, weight))) in pixels {
-            let hit = ranges.get(u >> ranges::TILE_SHIFT).filter(|range| range[0] <= range[1]).and_then(|&range| marcher.cast(u, v, range));
-            match hit {
-                Some(hit) => {
+        let pixels = depth_m.iter_mut().zip(normal).zip(colour.iter_mut().zip(weight)).zip(layers).enumerate();
+        for (u, (((depth_m, normal), (colour, weight)), shown)) in pixels {
+            let nearer = |than_m: f32| matches!(layer, Layer::Ground) || *depth_m == 0.0 || than_m < *depth_m;
+            // A ray meets nothing before its range begins.
+            let range = ranges.get(u >> ranges::TILE_SHIFT).filter(|range| range[0] <= range[1] && nearer(range[0]));
+            let hit = range.and_then(|&range| marcher.cast(u, v, range)).filter(|hit| nearer(hit.depth_m));
+            match (hit, layer) {
+                (Some(hit), _) => {
                     *depth_m = hit.depth_m;
                     *normal = hit.normal.map(|c| (c * NORMAL_ONE) as i8);
                     *colour = hit.colour;
                     *weight = hit.weight;
+                    *shown = if let Layer::Over(number) = layer { number } else { 0 };
                     hits += 1;
                 }
-                None => (*depth_m, *normal, *colour, *weight) = (0.0, [0; 3], [0; 3], 0),
+                (None, Layer::Ground) => (*depth_m, *normal, *colour, *weight, *shown) = (0.0, [0; 3], [0; 3], 0, 0),
+                (None, Layer::Over(_)) => {}
             }
         }
     }

@@ -1,0 +1,67 @@
+//! Looking at what was made: the static map, the objects where they are now, an object alone.
+
+use super::Mapper;
+use crate::{
+    Stage,
+    executor::Executor,
+    geometry::{Transform, renormalised},
+    instances::PlacedObject,
+    volume::{RaycastError, Raycaster, Viewpoint},
+};
+
+impl<'s> Mapper<'s> {
+    /// Looks at the static map from a pose, at the size of the frames taken so far. Before the first frame there is no size to look at.
+    pub fn raycast<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
+        let view = self.viewpoint(t_world_camera)?;
+        executor.stage(Stage::Raycast, || self.raycaster.cast(&self.background, &view, executor))?;
+        Ok(&self.raycaster)
+    }
+
+    /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is nearest (the compositing of Section
+    /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of [`Mapper::placed_objects`]. Time: that of one raycast and
+    /// of one more for each object, of which there are at most [`crate::instances::MAX_OBJECTS`].
+    pub fn raycast_composed<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
+        let view = self.viewpoint(t_world_camera)?;
+        executor.stage(Stage::Raycast, || {
+            self.raycaster.cast(&self.background, &view, executor)?;
+            for (layer, placed) in (1..=u8::MAX).zip(self.instances.placed()) {
+                // An object too far away for its coordinates is too far away to be seen.
+                let _ = self.raycaster.cast_over(placed.object.volume(), &from_object(&view, &placed), layer, executor);
+            }
+            Ok::<(), RaycastError>(())
+        })?;
+        Ok(&self.raycaster)
+    }
+
+    /// Looks at nothing but the object of a track, where it is now.
+    pub fn raycast_object<E: Executor>(
+        &mut self,
+        track: u32,
+        t_world_camera: &Transform,
+        executor: &E,
+    ) -> Result<&Raycaster<'s>, RaycastError> {
+        let view = self.viewpoint(t_world_camera)?;
+        let placed = self.instances.placed().find(|placed| placed.summary.id == track).ok_or(RaycastError::Object)?;
+        let view = from_object(&view, &placed);
+        executor.stage(Stage::Raycast, || self.raycaster.cast(placed.object.volume(), &view, executor))?;
+        Ok(&self.raycaster)
+    }
+
+    /// The objects that are in the world after the last frame.
+    pub fn placed_objects(&self) -> impl Iterator<Item = PlacedObject<'_, 's>> {
+        self.instances.placed()
+    }
+
+    fn viewpoint(&self, t_world_camera: &Transform) -> Result<Viewpoint, RaycastError> {
+        let [width, height] = self.size.ok_or(RaycastError::ImageSize)?;
+        Ok(Viewpoint { rig: self.config.rig, width, height, t_world_camera: *t_world_camera })
+    }
+}
+
+/// A view of the world as a view from an object's frame.
+fn from_object(view: &Viewpoint, placed: &PlacedObject<'_, '_>) -> Viewpoint {
+    Viewpoint {
+        t_world_camera: renormalised(&(placed.t_world_object.inverse() * view.t_world_camera)),
+        ..*view
+    }
+}
