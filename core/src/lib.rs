@@ -33,4 +33,4 @@ pub use executor::{Executor, Serial, Stage};
 pub use frame::StereoFrame;
 pub use mapper::{Mapper, NewError, StepError};
 pub use memory::{Capacity, Footprint, Slab};
-pub use report::{Report, Severity};
+pub use report::{PoseOrigin, Report, Severity};

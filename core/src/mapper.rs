@@ -8,11 +8,11 @@ use crate::{
     digest::Digest,
     egomotion::{Egomotion, Estimator, MotionEstimate},
     frame::StereoFrame,
-    geometry::depth_from_disparity,
-    image::{View, ViewMut},
+    geometry::{Transform, depth_from_disparity},
+    image::{DISPARITY_ONE_PX, View, ViewMut},
     instances::{CameraMotion, Detection, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, TrackReport},
     memory::{Carver, SlabError, region_bytes},
-    report::{BlockCount, Report},
+    report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
     stereo::StereoMatcher,
     volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Raycaster, Triangle, Viewpoint, Volume},
@@ -54,6 +54,8 @@ pub enum StepError {
     },
     /// The frame's size differs from that of the frames before.
     SizeChanged,
+    /// The frame's pose is not made of finite numbers.
+    PoseNotFinite,
 }
 
 /// Least image width the matchers can use, px.
@@ -146,9 +148,14 @@ impl<'s> Mapper<'s> {
         let [width, height] = self.admit(frame)?;
         let (config, left, right) = (self.config, frame.left, frame.right);
 
-        // (A) Depth from the pair, and (C.1) sparse scene flow over this pair and the last: neither needs the other.
+        // (A) Depth from the pair, unless it is given, and (C.1) sparse scene flow over this pair and the last: neither needs the other.
         let (stereo, scene_flow) = executor.join(
-            || executor.stage(Stage::Stereo, || self.stereo.compute(&config.stereo, left, right, executor)),
+            || {
+                executor.stage(Stage::Stereo, || match frame.disparity_q8 {
+                    Some(given) => self.stereo.take(given),
+                    None => self.stereo.compute(&config.stereo, left, right, executor),
+                })
+            },
             || executor.stage(Stage::SceneFlow, || self.scene_flow.push(&config.scene_flow, left, right, executor)),
         );
         // (B) What a detector saw, joined to what is tracked, with the matches on it.
@@ -157,10 +164,10 @@ impl<'s> Mapper<'s> {
             self.instances.claim(self.scene_flow.refined(), self.scene_flow.sparse());
         });
         // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
-        let egomotion =
-            executor.stage(Stage::Egomotion, || (scene_flow.status == FlowStatus::Matched).then(|| self.move_camera([width, height])));
-        let fused = self.camera.held_frames() == 0;
-        let moved = egomotion.filter(|_| fused).map(|_| *self.camera.t_current_previous());
+        let matched = scene_flow.status == FlowStatus::Matched;
+        let (pose, egomotion) = executor.stage(Stage::Egomotion, || self.move_camera(frame, matched, [width, height]));
+        let fused = pose != PoseOrigin::Held;
+        let moved = matches!(pose, PoseOrigin::Estimated | PoseOrigin::Given).then(|| *self.camera.t_current_previous());
         let camera = CameraMotion {
             t_world_camera: *self.camera.t_world_camera(),
             t_current_previous: moved,
@@ -185,6 +192,7 @@ impl<'s> Mapper<'s> {
             t_world_camera: camera.t_world_camera,
             stereo,
             scene_flow,
+            pose,
             egomotion,
             instances: *self.instances.report(),
             fused,
@@ -205,7 +213,8 @@ impl<'s> Mapper<'s> {
         let right = same(frame.right.width(), frame.right.height());
         let colour = frame.colour.is_none_or(|image| same(image.width(), image.height()));
         let class = frame.class.is_none_or(|image| same(image.width(), image.height()));
-        if !(right && colour && class) {
+        let disparity = frame.disparity_q8.is_none_or(|image| same(image.width(), image.height()));
+        if !(right && colour && class && disparity) {
             return Err(StepError::SizesDiffer);
         }
         if size[0] > self.capacity.image_width || size[1] > self.capacity.image_height {
@@ -214,6 +223,13 @@ impl<'s> Mapper<'s> {
         if size[0] < MIN_WIDTH || size[1] < MIN_HEIGHT {
             return Err(StepError::TooSmall { width: MIN_WIDTH, height: MIN_HEIGHT });
         }
+        let finite = |pose: &Transform| {
+            let [rotation, place] = [pose.rotation.coords.as_slice(), pose.translation.vector.as_slice()];
+            rotation.iter().chain(place).all(|value| value.is_finite())
+        };
+        if !frame.t_world_camera.as_ref().is_none_or(finite) {
+            return Err(StepError::PoseNotFinite);
+        }
         if self.size.is_some_and(|known| known != size) {
             return Err(StepError::SizeChanged);
         }
@@ -221,8 +237,24 @@ impl<'s> Mapper<'s> {
         Ok(size)
     }
 
+    /// Moves the camera: to where it is said to be, or as its matches say, `matched` telling whether there was a frame to match with.
+    fn move_camera(&mut self, frame: &StereoFrame<'_>, matched: bool, size: [usize; 2]) -> (PoseOrigin, Option<MotionEstimate>) {
+        if let Some(t_world_camera) = &frame.t_world_camera {
+            self.camera.place(t_world_camera);
+            // There is no way to the first place.
+            return (if self.frame == 0 { PoseOrigin::First } else { PoseOrigin::Given }, None);
+        }
+        let estimate = matched.then(|| self.follow_matches(size));
+        let pose = match (estimate, self.camera.held_frames()) {
+            (None, _) => PoseOrigin::First,
+            (_, 0) => PoseOrigin::Estimated,
+            _ => PoseOrigin::Held,
+        };
+        (pose, estimate)
+    }
+
     /// Moves the camera by the matches that lie on nothing that moves.
-    fn move_camera(&mut self, size: [usize; 2]) -> MotionEstimate {
+    fn follow_matches(&mut self, size: [usize; 2]) -> MotionEstimate {
         let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
         let (estimate, withheld) = {
             let guides = self.instances.guides_camera(size);
@@ -330,12 +362,20 @@ impl<'s> Mapper<'s> {
     }
 }
 
-/// Digest of the images, row by row, and of the detections, whatever their order.
+/// Digest of the images, row by row, of given disparities and pose, and of the detections, whatever their order.
 fn input_digest(frame: &StereoFrame<'_>) -> u64 {
     let mut digest = Digest::default();
     frame.left.rows().chain(frame.right.rows()).for_each(|row| digest.bytes(row));
     frame.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
     frame.class.iter().flat_map(View::rows).for_each(|row| digest.bytes(row));
+    if let Some(disparity) = &frame.disparity_q8 {
+        // A mark first, so that a given disparity is never taken for an image of classes.
+        digest.u64(u64::from(DISPARITY_ONE_PX));
+        disparity.rows().flatten().for_each(|&value| digest.u64(u64::from(value)));
+    }
+    if let Some(pose) = &frame.t_world_camera {
+        pose.rotation.coords.iter().chain(pose.translation.vector.iter()).for_each(|&value| digest.f64(value));
+    }
     digest.u64(frame.detections.iter().map(Detection::digest).fold(0, u64::wrapping_add));
     digest.finish()
 }

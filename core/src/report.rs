@@ -32,6 +32,20 @@ impl Severity {
     }
 }
 
+/// How the camera's pose came about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PoseOrigin {
+    /// The first frame: the camera is the world, or where it is said to be.
+    #[default]
+    First,
+    /// Estimated from this frame.
+    Estimated,
+    /// A guess: the estimate failed, and the motion before was held.
+    Held,
+    /// Given with the frame.
+    Given,
+}
+
 /// The state of a block pool after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BlockCount {
@@ -56,7 +70,9 @@ pub struct Report {
     pub stereo: StereoReport,
     /// The scene flow.
     pub scene_flow: FlowReport,
-    /// The camera's motion; none was looked for in the first frame.
+    /// How the pose came about.
+    pub pose: PoseOrigin,
+    /// The camera's motion from matches; none was looked for in the first frame, nor where the pose was given.
     pub egomotion: Option<MotionEstimate>,
     /// What moves or could; [`crate::Mapper::tracks`] has the tracks one by one.
     pub instances: InstancesReport,
@@ -79,7 +95,7 @@ impl Report {
     pub fn severity(&self) -> Severity {
         let allocation = &self.allocation;
         let dropped = allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
-        if !self.fused || dropped > 0 {
+        if self.pose == PoseOrigin::Held || dropped > 0 {
             Severity::MapAffected
         } else if self.dropped_features() + self.prune.early > 0 {
             Severity::Recovered

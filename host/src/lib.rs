@@ -2,6 +2,7 @@
 
 pub mod cli;
 pub mod dataset;
+pub mod depth;
 pub mod evaluation;
 pub mod export;
 pub mod harness;

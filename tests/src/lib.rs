@@ -52,6 +52,8 @@ impl Clip {
             right: View::new(&frame.right_grey, width, height).expect("a whole image"),
             colour: None,
             class: None,
+            disparity_q8: None,
+            t_world_camera: None,
             detections: &[],
         })
     }

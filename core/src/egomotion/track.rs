@@ -41,12 +41,24 @@ impl Egomotion {
         estimator: &mut Estimator<'_>,
     ) -> MotionEstimate {
         let estimate = estimator.estimate(config, rig, matches, &mut self.random, Some(&self.t_current_previous));
-        match estimate.t_current_previous {
+        self.advance(estimate.t_current_previous);
+        estimate
+    }
+
+    /// Moves the camera by one frame: as found or, failing that, as before.
+    pub fn advance(&mut self, t_current_previous: Option<Transform>) {
+        match t_current_previous {
             Some(motion) => (self.t_current_previous, self.held) = (motion, 0),
             None => self.held = self.held.saturating_add(1),
         }
         self.t_world_camera = renormalised(&(self.t_world_camera * self.t_current_previous.inverse()));
-        estimate
+    }
+
+    /// Puts the camera where it is said to be; its motion is the way from where it was.
+    pub fn place(&mut self, t_world_camera: &Transform) {
+        self.t_current_previous = renormalised(&(t_world_camera.inverse() * self.t_world_camera));
+        self.t_world_camera = renormalised(t_world_camera);
+        self.held = 0;
     }
 
     /// Maps camera coordinates to world coordinates, which are the first camera's.

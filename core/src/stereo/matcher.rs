@@ -162,6 +162,30 @@ impl<'s> StereoMatcher<'s> {
         report
     }
 
+    /// Takes disparities from elsewhere (1/256 px, 0 none) in place of a pair's own. Of an image larger than the capacity, which the mapper
+    /// refuses, as much is taken as there is room for.
+    pub fn take(&mut self, disparity_q8: View<'_, u16>) -> StereoReport {
+        self.width = disparity_q8.width().min(self.image_width).max(1);
+        self.height = disparity_q8.height().min(self.image_height).max(1);
+        self.disparity.fill(0);
+        let mut report = StereoReport {
+            status: StereoStatus::Given,
+            pixels: (self.width * self.height) as u32,
+            ..StereoReport::default()
+        };
+        // A match this far to the left lies outside the right image, whatever the column.
+        let absurd = self.width as u32 * u32::from(DISPARITY_ONE_PX);
+        for (to, from) in self.disparity.chunks_exact_mut(self.width).zip(disparity_q8.rows()) {
+            for (to, &given) in to.iter_mut().zip(from) {
+                let taken = u32::from(given) < absurd;
+                *to = if taken { given } else { 0 };
+                report.refused += u32::from(!taken);
+                report.valid += u32::from(*to != 0);
+            }
+        }
+        report
+    }
+
     /// Checks the input, takes the image's size and blanks the result.
     fn begin(&mut self, config: &StereoConfig, left: View<'_, u8>, right: View<'_, u8>) -> StereoStatus {
         self.width = left.width().min(self.image_width).max(1);

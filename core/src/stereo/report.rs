@@ -6,6 +6,8 @@ pub enum StereoStatus {
     /// Disparities were computed; how many the counts say.
     #[default]
     Matched,
+    /// Nothing was matched: the disparities came from elsewhere.
+    Given,
     /// The support points make no triangle (a black image, fog, a covered lens): no disparity.
     TooFewSupportPoints,
     /// Left and right image differ in size: no disparity.
@@ -47,6 +49,8 @@ pub struct StereoReport {
     pub speckles: u32,
     /// Pixels filled between others.
     pub filled: u32,
+    /// Given disparities that no pair of this width can have, taken as none.
+    pub refused: u32,
     /// Pixels with a disparity in the end.
     pub valid: u32,
     /// Pixels of the image.

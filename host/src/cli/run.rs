@@ -2,6 +2,7 @@
 
 use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
+use crate::depth::{self, DepthChoice};
 use crate::export::{self, FolderError, RunFolder, Summary};
 use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, RunError, RunRecord, Streaming};
 use crate::segmentation::{self, Choice};
@@ -43,6 +44,10 @@ pub struct RunArgs {
     /// Shrink the images, above 0 and up to 1
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     scale: f64,
+    /// Where depth comes from: elas (stereo matching here), files:DIR (PNG, PFM or OpenCV XML named as the images; depth where DIR's name
+    /// speaks of depth and not of disparity), disparity:DIR, depth:DIR, or exact (the synthetic street)
+    #[arg(long, default_value = "elas", value_name = "SOURCE")]
+    depth: DepthChoice,
     /// Where masks of what could move come from: auto, none, files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or
     /// noisy[:SEED] (the synthetic street)
     #[arg(long, default_value = "auto", value_name = "SOURCE")]
@@ -111,6 +116,7 @@ impl RunArgs {
             }
             None => super::synth::street(settings)?,
         };
+        let dataset = depth::attach(dataset, &self.depth)?;
         let dataset = if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) };
         Ok(segmentation::attach(dataset, &self.instances)?)
     }

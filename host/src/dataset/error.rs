@@ -133,6 +133,14 @@ pub enum DatasetError {
         /// What is wrong.
         reason: String,
     },
+    /// Depth that cannot be used.
+    #[error("the depth {path} cannot be used: {reason}. Correct it, give another folder with --depth, or have it computed: --depth elas")]
+    Depth {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
     /// The synthetic street refuses its configuration.
     #[error("the synthetic street cannot be built: {reason}. Change its keys with --set street.<key>=<value>")]
     Street {

@@ -115,6 +115,22 @@ pub fn read_png_u16(path: &Path) -> Result<Image<u16>, DatasetError> {
     Image::new(width, height, pixels).ok_or_else(|| failed("it has no pixels".into()))
 }
 
+/// Reads a grey PNG of 16 bit as numbers; one of 8 bit, such as a picture of a depth image, is refused.
+pub fn read_png_deep(path: &Path) -> Result<Image<u16>, DatasetError> {
+    let failed = |reason: String| DatasetError::Image { path: path.to_path_buf(), reason };
+    match open(path)?.decode().map_err(|error| failed(plain(&error)))? {
+        DynamicImage::ImageLuma16(image) => {
+            let (width, height) = (image.width() as usize, image.height() as usize);
+            Image::new(width, height, image.into_raw()).ok_or_else(|| failed("it has no pixels".into()))
+        }
+        other => Err(failed(format!(
+            "it is of {} channel(s) of {} bit, not of one of 16",
+            other.color().channel_count(),
+            8 * bytes_per_channel(&other)
+        ))),
+    }
+}
+
 /// Width and height without decoding the pixels.
 pub fn png_size(path: &Path) -> Result<(usize, usize), DatasetError> {
     let (width, height) =

@@ -19,7 +19,7 @@ mod tests;
 mod truth;
 
 pub use error::DatasetError;
-pub use image::{Image, luma, read_png, read_png_u16};
+pub use image::{Image, luma, read_png, read_png_deep, read_png_u16};
 pub use labels::read_labels;
 pub use open::{Found, Kind, open, sequences_at, survey};
 pub use scaled::Scaled;
@@ -28,6 +28,7 @@ pub use street::StreetFrames;
 pub use table::{pose_of_row, read_poses};
 pub use truth::{ObjectsTruth, TrueObject};
 
+use crate::depth::GivenDepth;
 use crate::segmentation::Sightings;
 use dynvox_core::geometry::{StereoRig, Transform};
 use std::path::PathBuf;
@@ -41,6 +42,8 @@ pub struct StereoImages {
     pub right: Image<u8>,
     /// Left image in colour, where the data set has it: the same camera as `left`.
     pub colour: Option<Image<[u8; 3]>>,
+    /// Disparity from elsewhere; the core matches the pair where it is absent.
+    pub depth: Option<GivenDepth>,
     /// What the renderer of a synthetic frame knows exactly.
     pub exact: Option<ExactFrame>,
     /// What is true of the things that move or could, where known.

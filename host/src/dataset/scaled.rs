@@ -1,6 +1,7 @@
 //! A data set at a smaller size: every pixel is the area average of the pixels it covers, and the rig shrinks with it.
 
 use super::{Dataset, DatasetError, ExactFrame, Image, Masks, StereoImages};
+use crate::depth::GivenDepth;
 use dynvox_core::geometry::{StereoRig, Transform};
 
 /// Least side of a scaled image, px.
@@ -64,6 +65,12 @@ impl Scaled {
     fn grey(&self, image: &Image<u8>) -> Option<Image<u8>> {
         let pixels = self.shrink::<1>(image.pixels().as_chunks().0, image.width());
         Image::new(self.columns.len(), self.rows.len(), pixels.as_flattened().to_vec())
+    }
+
+    /// Disparities shrink with the image.
+    fn depth(&self, depth: &GivenDepth) -> Option<GivenDepth> {
+        let disparity_q8 = self.nearest(&depth.disparity_q8)?.map(|&value| (f64::from(value) * self.scale).round() as u16);
+        Some(GivenDepth { disparity_q8, refused: depth.refused })
     }
 
     /// The pixel in the middle of each covered area: depths must not be averaged across edges.
@@ -142,6 +149,7 @@ impl Dataset for Scaled {
             left: self.grey(&frame.left).ok_or_else(failed)?,
             right: self.grey(&frame.right).ok_or_else(failed)?,
             colour: colour.transpose()?,
+            depth: frame.depth.and_then(|depth| self.depth(&depth)),
             exact: frame.exact.and_then(|exact| {
                 Some(ExactFrame {
                     depth_m: self.nearest(&exact.depth_m)?,

@@ -130,6 +130,7 @@ impl Dataset for Sequence {
             left: left.grey,
             right,
             colour: left.colour,
+            depth: None,
             exact: None,
             objects: self.objects.get(index).cloned(),
             sightings: Sightings::default(),

@@ -64,6 +64,7 @@ impl Dataset for StreetFrames {
             left: Image::new(width, height, frame.left_grey).ok_or_else(failed)?,
             right: Image::new(width, height, frame.right_grey).ok_or_else(failed)?,
             colour: Image::new(width, height, frame.left_rgb),
+            depth: None,
             exact: exact(),
             objects: Some(objects),
             sightings: Sightings::default(),

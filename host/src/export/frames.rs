@@ -7,7 +7,10 @@ use std::io::{self, Write};
 
 /// Writes the table. Empty cells are values the machine cannot give.
 pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
-    write!(out, "frame,time_s,digest,input_digest,step_ms,severity,motion,matches,inliers,residual_px,features_dropped,stereo_density")?;
+    write!(
+        out,
+        "frame,time_s,digest,input_digest,step_ms,severity,motion,matches,inliers,residual_px,features_dropped,stereo_density,depth_refused"
+    )?;
     write!(out, ",blocks_used,blocks_peak,blocks_visible,blocks_made,blocks_refused,blocks_out,blocks_lost,blocks_empty,blocks_back")?;
     write!(out, ",prune_visited,prune_voxels_reset,prune_blocks_freed,prune_carried_over,prune_early,history_frames,rss_bytes")?;
     write!(
@@ -24,7 +27,7 @@ pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
         let (blocks, allocation, eviction, prune) = (&report.blocks, &report.allocation, &report.allocation.eviction, &report.prune);
         write!(out, "{},{:?},{:016x},{:016x},{:.4}", row.frame, row.time_s, report.digest, report.input_digest, row.step_ms)?;
         write!(out, ",{},{},{matches},{inliers},{residual_px:.4}", report.severity().name(), row.motion())?;
-        write!(out, ",{},{:.4}", report.dropped_features(), report.stereo.density())?;
+        write!(out, ",{},{:.4},{}", report.dropped_features(), report.stereo.density(), row.depth_refused)?;
         write!(out, ",{},{},{},{}", blocks.used, blocks.peak, blocks.visible, allocation.made)?;
         write!(out, ",{},{},{},{},{}", row.blocks_refused(), eviction.kept, eviction.lost, eviction.empty, eviction.returned)?;
         write!(out, ",{},{},{},{}", prune.visited, prune.voxels_reset, prune.blocks_freed, prune.carried_over)?;

@@ -148,6 +148,7 @@ struct HealthSummary {
     rss_limit_bytes: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     disk_failure: Option<String>,
+    depth_values_refused: u64,
     detections_refused: u64,
     tracks_refused: u64,
     worst_severity: &'static str,
@@ -213,6 +214,7 @@ impl Summary {
                 history_frames_most: run.rows.iter().map(|row| row.history_frames).max().unwrap_or_default(),
                 rss_limit_bytes: run.rss_limit_bytes,
                 disk_failure: run.shelf_failure.clone(),
+                depth_values_refused: run.rows.iter().map(|row| u64::from(row.depth_refused)).sum(),
                 detections_refused: sum(|report| report.instances.detections.refused()),
                 tracks_refused: sum(|report| report.instances.tracks.refused + report.instances.objects.refused),
                 matches_dropped: sum(Report::dropped_features),

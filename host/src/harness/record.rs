@@ -9,7 +9,7 @@ use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::instances::{State, TrackReport};
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
-use dynvox_core::{Capacity, Report, Severity, Stage};
+use dynvox_core::{Capacity, PoseOrigin, Report, Severity, Stage};
 
 /// One frame.
 #[derive(Clone, Debug)]
@@ -26,6 +26,8 @@ pub struct FrameRow {
     pub tracks: Vec<TrackReport>,
     /// What the source of masks said and could not be used.
     pub refusals: Refusals,
+    /// Values of a given depth image that are none: not finite, negative, or no disparity of this rig.
+    pub depth_refused: u32,
     /// Wall time of the whole step, ms.
     pub step_ms: f64,
     /// Resident memory of the process, where the machine tells.
@@ -38,6 +40,7 @@ impl FrameRow {
     /// How the camera's motion was found, in one word.
     pub fn motion(&self) -> &'static str {
         match self.report.egomotion.map(|motion| motion.status) {
+            None if self.report.pose == PoseOrigin::Given => "given",
             None => "first",
             Some(MotionStatus::Estimated) => "estimated",
             Some(MotionStatus::TooFewMatches) => "too_few_matches",
@@ -49,7 +52,7 @@ impl FrameRow {
 
     /// Whether the motion was held at constant velocity for want of an estimate.
     pub fn held(&self) -> bool {
-        self.report.egomotion.is_some_and(|motion| motion.status != MotionStatus::Estimated)
+        self.report.pose == PoseOrigin::Held
     }
 
     /// Matches the estimate was made of, inliers among them, and their root mean square error in px.
@@ -60,8 +63,7 @@ impl FrameRow {
     /// What harmed the map in this frame, in words.
     pub fn cause(&self) -> String {
         let (allocation, motion) = (&self.report.allocation, self.motion());
-        let guessed =
-            (!self.report.fused).then(|| format!("its pose had to be guessed ({}), so it was not fused", motion.replace('_', " ")));
+        let guessed = self.held().then(|| format!("its pose had to be guessed ({}), so it was not fused", motion.replace('_', " ")));
         let counts = [
             (allocation.refused, "requests for blocks found no room in the pool"),
             (allocation.beyond, "points lie beyond the map's coordinates"),

@@ -307,6 +307,8 @@ impl Course<'_, '_> {
             right: images.right.view().ok_or_else(empty)?,
             colour: images.colour.as_ref().and_then(|colour| colour.view()),
             class: None,
+            disparity_q8: images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()),
+            t_world_camera: None,
             detections: &detections,
         };
         self.threads.take_times();
@@ -324,6 +326,7 @@ impl Course<'_, '_> {
             step_ms,
             tracks,
             refusals: images.sightings.refusals,
+            depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count()) + report.stereo.refused,
             rss_bytes: resident_bytes().map(|(now, _)| now),
             stages: self.threads.take_times(),
         })

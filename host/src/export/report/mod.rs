@@ -271,6 +271,7 @@ fn counters(run: &RunRecord) -> String {
         ("pruning visits carried over at most", most(|row| u64::from(row.report.prune.carried_over))),
         ("frames pruned early", sum(|row| row.report.prune.early)),
         ("features and matches dropped", sum(|row| row.report.dropped_features())),
+        ("values of given depth refused", sum(|row| row.depth_refused)),
         ("frames with a guessed motion", run.held_frames() as u64),
     ];
     let rows: String = rows.iter().map(|(name, value)| format!("<tr><td>{name}<td class=n>{}</tr>", grouped(*value))).collect();

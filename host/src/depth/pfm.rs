@@ -1,0 +1,45 @@
+//! Portable float maps: `Pf`, width, height, a scale whose sign tells the byte order, then floats, the lowest row first.
+
+use super::{other_size, unusable};
+use crate::dataset::{DatasetError, Image};
+use std::path::Path;
+
+/// Reads a grey PFM of `size`. The scale's magnitude says nothing of the values and is left aside, as other programs do.
+pub fn read_pfm(path: &Path, size: (usize, usize)) -> Result<Image<f32>, DatasetError> {
+    let bytes = std::fs::read(path).map_err(|source| DatasetError::Read { path: path.to_path_buf(), source })?;
+    let refuse = |reason: &str| unusable(path, reason.to_owned());
+    let (header, body) = header(&bytes).ok_or_else(|| refuse("it has no header of a PFM: Pf, width, height, scale"))?;
+    match header[0] {
+        "Pf" => {}
+        "PF" => return Err(refuse("it is a PFM in colour; disparity or depth is one value a pixel")),
+        _ => return Err(refuse("it does not begin with Pf")),
+    }
+    let (Ok(width), Ok(height)) = (header[1].parse::<usize>(), header[2].parse::<usize>()) else {
+        return Err(refuse("its width and height are no numbers"));
+    };
+    if (width, height) != size {
+        return Err(other_size(path, (width, height), size));
+    }
+    let scale: f64 =
+        header[3].parse().ok().filter(|scale: &f64| *scale != 0.0 && scale.is_finite()).ok_or_else(|| refuse("its scale is no number"))?;
+    let (words, rest) = body.as_chunks::<4>();
+    if words.len() != width * height || !rest.is_empty() {
+        return Err(unusable(path, format!("it holds {} bytes of pixels, not {}", body.len(), 4 * width * height)));
+    }
+    let value = |word: &[u8; 4]| if scale < 0.0 { f32::from_le_bytes(*word) } else { f32::from_be_bytes(*word) };
+    let pixels = words.chunks_exact(width).rev().flatten().map(value).collect();
+    Image::new(width, height, pixels).ok_or_else(|| refuse("it has no pixels"))
+}
+
+/// The four words of the header, and what follows the single byte after them.
+fn header(bytes: &[u8]) -> Option<([&str; 4], &[u8])> {
+    let mut words = [""; 4];
+    let mut rest = bytes;
+    for word in &mut words {
+        rest = rest.trim_ascii_start();
+        let end = rest.iter().take(32).position(u8::is_ascii_whitespace)?;
+        *word = std::str::from_utf8(&rest[..end]).ok()?;
+        rest = &rest[end..];
+    }
+    Some((words, rest.get(1..)?))
+}
