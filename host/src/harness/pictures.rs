@@ -1,6 +1,11 @@
 //! Pictures for the report: input, disparity in colours, the map from the camera's place.
 
+use super::Threads;
+use dynvox_core::Mapper;
+use dynvox_core::geometry::Transform;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
+use dynvox_core::instances::State;
+use dynvox_core::volume::{NORMAL_ONE, Raycaster};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 /// Widest picture of a frame, px: wider ones are thinned out, so that the report stays small.
@@ -9,6 +14,12 @@ pub const SMALL_PX: usize = 640;
 pub const LARGE_PX: usize = 1_920;
 /// Pixels without a surface or a disparity.
 const EMPTY: [u8; 3] = [24, 26, 30];
+/// Tint of objects that move.
+const MOVING: [u8; 3] = [255, 120, 20];
+/// Tint of objects that stand.
+const STANDING: [u8; 3] = [40, 130, 255];
+/// Share of a tint in what is tinted.
+const TINT: f32 = 0.45;
 /// Where light comes from, in camera axes (x right, y down, z forward), length 1: behind the camera's left shoulder.
 const TO_LIGHT: [f32; 3] = [-0.36, -0.60, -0.714];
 
@@ -41,24 +52,60 @@ pub fn disparity(disparity_q8: &View<'_, u16>, near_px: f32) -> Vec<u8> {
     })
 }
 
-/// The map: its colours, or clay grey where it has none, lit from behind the camera.
-pub fn map(
-    widest_px: usize,
-    depth_m: &View<'_, f32>,
-    normal: &View<'_, [i8; 3]>,
-    colour: &View<'_, [u8; 3]>,
-    to_camera: impl Fn([f32; 3]) -> [f32; 3],
-) -> Vec<u8> {
-    picture(widest_px, depth_m.width(), depth_m.height(), |u, v| {
-        let (Some(depth), Some(normal), Some(colour)) = (depth_m.get(u, v), normal.get(u, v), colour.get(u, v)) else { return EMPTY };
+/// The map: its colours, or clay grey where it has none, lit from behind the camera; what `tint` names a colour for is tinted. Empty where
+/// nothing was looked at.
+pub fn map(widest_px: usize, seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Vec<u8> {
+    let (Some(depth_m), Some(normal), Some(colour), Some(layer)) = (seen.depth_m(), seen.normal(), seen.colour(), seen.layer()) else {
+        return Vec::new();
+    };
+    Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }.png(widest_px)
+}
+
+/// The street with its objects where they are: what moves tinted orange, what stands blue. Empty where there are no objects.
+pub fn composed(widest_px: usize, mapper: &mut Mapper<'_>, threads: &Threads, t_world_camera: &Transform) -> Vec<u8> {
+    let states: Vec<State> = mapper.placed_objects().map(|placed| placed.summary.state).collect();
+    if states.is_empty() {
+        return Vec::new();
+    }
+    let tint = |layer: u8| match states.get(usize::from(layer).checked_sub(1)?)? {
+        State::Dynamic => Some(MOVING),
+        _ => Some(STANDING),
+    };
+    threads.run(|| mapper.raycast_composed(t_world_camera, threads)).map(|seen| map(widest_px, seen, tint)).unwrap_or_default()
+}
+
+/// What a raycast shows, and how it is painted.
+struct Painting<'a, T> {
+    /// Depth, m; 0 none.
+    depth_m: View<'a, f32>,
+    /// Normals in camera axes.
+    normal: View<'a, [i8; 3]>,
+    /// Colours; black where there is none.
+    colour: View<'a, [u8; 3]>,
+    /// Tint of a pixel, if it has one.
+    tint: T,
+}
+
+impl<T: Fn(usize, usize) -> Option<[u8; 3]>> Painting<'_, T> {
+    fn png(&self, widest_px: usize) -> Vec<u8> {
+        picture(widest_px, self.depth_m.width(), self.depth_m.height(), |u, v| self.pixel(u, v).unwrap_or(EMPTY))
+    }
+
+    fn pixel(&self, u: usize, v: usize) -> Option<[u8; 3]> {
+        let (depth, normal, colour) = (self.depth_m.get(u, v)?, self.normal.get(u, v)?, self.colour.get(u, v)?);
         if depth <= 0.0 {
-            return EMPTY;
+            return None;
         }
-        let facing: f32 = to_camera(normal.map(f32::from)).iter().zip(TO_LIGHT).map(|(n, light)| n * light).sum::<f32>() / 127.0;
+        let facing: f32 = normal.iter().zip(TO_LIGHT).map(|(n, light)| f32::from(*n) * light).sum::<f32>() / NORMAL_ONE;
         let lit = facing.clamp(0.0, 1.0);
         let (base, ambient) = if colour == [0; 3] { ([205, 205, 200], 0.35) } else { (colour, 0.9) };
-        base.map(|channel| (1.05 * f32::from(channel) * (ambient + (1.0 - ambient) * lit)) as u8)
-    })
+        let shaded = base.map(|channel| 1.05 * f32::from(channel) * (ambient + (1.0 - ambient) * lit));
+        Some(match (self.tint)(u, v) {
+            // What is tinted keeps its shading: half its brightness, half the tint's colour.
+            Some(tint) => [0, 1, 2].map(|c| (0.5 * shaded[c] + TINT * f32::from(tint[c])) as u8),
+            None => shaded.map(|channel| channel as u8),
+        })
+    }
 }
 
 /// The *turbo* colour map (Mikhailov, 2019) by its polynomial approximation; `share` from 0 to 1.

@@ -97,6 +97,8 @@ pub struct Keyframe {
     pub disparity_png: Vec<u8>,
     /// The map from the camera's place.
     pub raycast_png: Vec<u8>,
+    /// The same with every object where it is; empty where there are none.
+    pub composed_png: Vec<u8>,
 }
 
 /// Median and 99th percentile of a stage, over the frames it ran in.

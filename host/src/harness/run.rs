@@ -234,12 +234,6 @@ fn spread(frames: usize, count: usize) -> impl Fn(usize) -> bool {
     move |at| ((at + 1) * count) / frames > (at * count) / frames
 }
 
-/// Turns directions of the world into those of a camera.
-fn into_camera(t_world_camera: &Transform) -> impl Fn([f32; 3]) -> [f32; 3] {
-    let turn = t_world_camera.rotation.inverse().to_rotation_matrix().cast::<f32>();
-    move |direction| (turn * nalgebra::Vector3::from(direction)).into()
-}
-
 /// A run under way.
 struct Course<'p, 's> {
     plan: &'p Plan,
@@ -338,8 +332,7 @@ impl Course<'_, '_> {
         let disparity_png = keyframe.map(|_| pictures::disparity(&self.mapper.disparity_q8(), near_px));
         let (mapper, threads) = (&mut self.mapper, &self.threads);
         let Ok(seen) = threads.run(|| mapper.raycast(t_world_camera, threads)) else { return };
-        let (Some(depth_m), Some(normal), Some(colour)) = (seen.depth_m(), seen.normal(), seen.colour()) else { return };
-        if let Some(exact) = exact {
+        if let (Some(exact), Some(depth_m)) = (exact, seen.depth_m()) {
             self.exact.add(&depth_m, exact);
         }
         if let (Some(frame), Some(disparity_png), Some(grey)) = (keyframe, disparity_png, images.left.view()) {
@@ -348,13 +341,17 @@ impl Course<'_, '_> {
                 frame,
                 input_png: pictures::input(&grey, input.as_ref()),
                 disparity_png,
-                raycast_png: pictures::map(pictures::SMALL_PX, &depth_m, &normal, &colour, into_camera(t_world_camera)),
+                raycast_png: pictures::map(pictures::SMALL_PX, seen, |_| None),
+                composed_png: Vec::new(),
             });
         }
         // The raycast's time belongs to the frame it looked from.
         let times = self.threads.take_times();
         if let Some(row) = self.rows.last_mut() {
             row.stages[Stage::Raycast as usize] = times[Stage::Raycast as usize];
+        }
+        if let (Some(_), Some(shown)) = (keyframe, self.keyframes.last_mut()) {
+            shown.composed_png = pictures::composed(pictures::SMALL_PX, &mut self.mapper, &self.threads, t_world_camera);
         }
     }
 
@@ -375,9 +372,10 @@ impl Course<'_, '_> {
         let down = nalgebra::Vector3::new(-OVERVIEW_PITCH_RAD, 0.0, 0.0);
         let t_world_camera = row.report.t_world_camera * exp(down, OVERVIEW_PLACE_M.into());
         let (mapper, threads) = (&mut self.mapper, &self.threads);
-        let Ok(seen) = threads.run(|| mapper.raycast(&t_world_camera, threads)) else { return Vec::new() };
-        let (Some(depth_m), Some(normal), Some(colour)) = (seen.depth_m(), seen.normal(), seen.colour()) else { return Vec::new() };
-        pictures::map(pictures::LARGE_PX, &depth_m, &normal, &colour, into_camera(&t_world_camera))
+        threads
+            .run(|| mapper.raycast(&t_world_camera, threads))
+            .map(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None))
+            .unwrap_or_default()
     }
 
     /// Ends the run where it may not go on.

@@ -123,10 +123,18 @@ fn pictures(run: &RunRecord) -> String {
         "<section><h2>What it saw, measured and mapped</h2><p class=\"soft small\">Left image; disparity from far (blue) to near (red), \
                     none where dark; the map from the camera's place after this frame.</p>"
             .to_owned();
+    if run.keyframes.iter().any(|keyframe| !keyframe.composed_png.is_empty()) {
+        html += "<p class=\"soft small\">Below: the map and, in front of it, every object where it is at that time, from a volume of its own: \
+                 blue those that stand, orange those that move.</p>";
+    }
     for keyframe in &run.keyframes {
+        let composed = match &keyframe.composed_png[..] {
+            [] => String::new(),
+            png => image(png, "map with objects"),
+        };
         let _ = write!(
             html,
-            "<figure><div class=\"three\">{}{}{}</div><figcaption>frame {}</figcaption></figure>",
+            "<figure><div class=\"three\">{}{}{}{composed}</div><figcaption>frame {}</figcaption></figure>",
             image(&keyframe.input_png, "left image"),
             image(&keyframe.disparity_png, "disparity"),
             image(&keyframe.raycast_png, "map"),
