@@ -88,15 +88,22 @@ impl Volume<'_> {
         let (Some(sdf), Some(weight)) = (self.blocks.sdf.get_mut(at), self.blocks.weight.get_mut(at)) else {
             return (0, false);
         };
-        let reset = reset_faint(prune_weight, sdf, weight, self.blocks.colour.get_mut(at));
-        let empty = weight.iter().all(|&weight| weight == 0);
-        let far = self.config.prune_distance > 0.0 && nearest(sdf, weight) > self.config.prune_distance;
-        if empty || far {
+        let census = Census::of(weight, prune_weight);
+        // A block that leaves is not cleared: whoever takes its slot does that.
+        if census.kept == 0 {
             self.free_block(slot);
-        } else if reset > 0 {
+            return (census.faint, true);
+        }
+        if census.faint > 0 {
+            reset_faint(prune_weight, sdf, weight, self.blocks.colour.get_mut(at));
+        }
+        let far = self.config.prune_distance > 0.0 && nearest(sdf, weight) > self.config.prune_distance;
+        if far {
+            self.free_block(slot);
+        } else if census.faint > 0 {
             self.refresh_digest(slot);
         }
-        (reset, empty || far)
+        (census.faint, far)
     }
 
     /// Takes a block out of the map.
@@ -110,26 +117,44 @@ impl Volume<'_> {
     }
 }
 
-/// Resets voxels seen at most `prune_weight` times; how many.
+/// What a block's weights say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Census {
+    /// Voxels seen, but at most `prune_weight` times.
+    faint: u32,
+    /// Voxels seen more often.
+    kept: u32,
+}
+
+/// Voxels counted at a time: their number fits into a byte, so that the count runs in vectors of bytes.
+const GROUP: usize = 128;
+
+impl Census {
+    /// Counts a block's voxels. Pruning reads nothing else of most blocks it visits, so this is its cost.
+    fn of(weight: &[u8; BLOCK_VOXELS], prune_weight: u8) -> Self {
+        let mut census = Self { faint: 0, kept: 0 };
+        for group in weight.as_chunks::<GROUP>().0 {
+            // Weight 0 becomes 255, which no prune weight exceeds.
+            census.faint += u32::from(group.iter().map(|&weight| u8::from(weight.wrapping_sub(1) < prune_weight)).sum::<u8>());
+            census.kept += u32::from(group.iter().map(|&weight| u8::from(weight > prune_weight)).sum::<u8>());
+        }
+        census
+    }
+}
+
+/// Resets voxels seen at most `prune_weight` times.
 fn reset_faint(
     prune_weight: u8,
     sdf: &mut [i16; BLOCK_VOXELS],
     weight: &mut [u8; BLOCK_VOXELS],
     planes: Option<&mut [[u8; BLOCK_VOXELS]; 3]>,
-) -> u32 {
-    let faint = |weight: u8| weight.wrapping_sub(1) < prune_weight;
-    let count = weight.iter().map(|&weight| u16::from(faint(weight))).sum::<u16>();
-    if count == 0 {
-        return 0;
+) {
+    let kept = |weight: u8| weight > prune_weight;
+    for plane in planes.into_iter().flatten() {
+        plane.iter_mut().zip(weight.iter()).for_each(|(channel, &weight)| *channel = if kept(weight) { *channel } else { 0 });
     }
-    if let Some(planes) = planes {
-        for plane in planes {
-            plane.iter_mut().zip(weight.iter()).for_each(|(channel, &weight)| *channel = if faint(weight) { 0 } else { *channel });
-        }
-    }
-    sdf.iter_mut().zip(weight.iter()).for_each(|(sdf, &weight)| *sdf = if faint(weight) { 0 } else { *sdf });
-    weight.iter_mut().for_each(|weight| *weight = if faint(*weight) { 0 } else { *weight });
-    u32::from(count)
+    sdf.iter_mut().zip(weight.iter()).for_each(|(sdf, &weight)| *sdf = if kept(weight) { *sdf } else { 0 });
+    weight.iter_mut().for_each(|weight| *weight = if kept(*weight) { *weight } else { 0 });
 }
 
 /// Smallest |distance| of the seen voxels, as a share of the truncation.
