@@ -11,7 +11,7 @@ use super::{
     suppression::{CLASSES, Candidate},
 };
 use crate::{
-    executor::{Executor, Serial},
+    executor::{Serial, TwoThreads},
     geometry::{Transform, exp},
     image::View,
     memory::{Capacity, Carver, Slab},
@@ -28,24 +28,6 @@ pub(crate) const CAPACITY: Capacity = Capacity {
     ..Capacity::TINY
 };
 const BYTES: usize = FlowMatcher::bytes(&CAPACITY);
-
-/// Really at once, to show that it makes no difference.
-pub(crate) struct Threads;
-
-impl Executor for Threads {
-    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
-    where
-        A: FnOnce() -> RA + Send,
-        B: FnOnce() -> RB + Send,
-        RA: Send,
-        RB: Send,
-    {
-        std::thread::scope(|scope| {
-            let b = scope.spawn(b);
-            (a(), b.join().unwrap())
-        })
-    }
-}
 
 pub(crate) fn slab() -> Box<Slab<BYTES>> {
     Box::new(Slab::ZERO)
@@ -81,9 +63,9 @@ fn matches_lie_where_the_room_says_and_two_threads_change_nothing() {
     let report = serial.push(&config, view(&first[0]), view(&first[1]), &Serial);
     assert_eq!(report.status, FlowStatus::First);
     assert!(serial.sparse().is_empty() && serial.refined().is_empty());
-    joined.push(&config, view(&first[0]), view(&first[1]), &Threads);
+    joined.push(&config, view(&first[0]), view(&first[1]), &TwoThreads);
     let report = serial.push(&config, view(&second[0]), view(&second[1]), &Serial);
-    assert_eq!(report, joined.push(&config, view(&second[0]), view(&second[1]), &Threads));
+    assert_eq!(report, joined.push(&config, view(&second[0]), view(&second[1]), &TwoThreads));
     assert_eq!(report.status, FlowStatus::Matched);
     assert!(report.refined > 200 && report.sparse.closed > 30, "{report:?}");
     let bits = |matches: &[Match]| bytemuck::cast_slice::<Match, u32>(matches).to_vec();

@@ -1,6 +1,7 @@
 //! What blocks hold: structure of arrays, one entry a block.
 //!
-//! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and 16 bytes beside them (coordinates, content digest).
+//! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and 17 bytes beside them (coordinates, content digest, faintest
+//! weight).
 
 use crate::memory::{Capacity, Carver, SlabError, region_bytes};
 
@@ -63,6 +64,8 @@ pub struct Blocks<'s> {
     pub(super) colour: &'s mut [[[u8; BLOCK_VOXELS]; 3]],
     /// Digest of each block's content and place.
     pub(super) digest: &'s mut [u64],
+    /// Least weight of each block's seen voxels, so that pruning need not look; 0 where it is not known.
+    pub(super) faintest: &'s mut [u8],
 }
 
 impl<'s> Blocks<'s> {
@@ -73,6 +76,7 @@ impl<'s> Blocks<'s> {
             + region_bytes::<[u8; BLOCK_VOXELS]>(blocks)
             + if colour { region_bytes::<[[u8; BLOCK_VOXELS]; 3]>(blocks) } else { 0 }
             + region_bytes::<u64>(blocks)
+            + region_bytes::<u8>(blocks)
     }
 
     /// Cuts the payload of `capacity.blocks` blocks.
@@ -84,6 +88,7 @@ impl<'s> Blocks<'s> {
             weight: carver.cut_as_found("volume.weight", capacity.blocks)?,
             colour: if capacity.colour { carver.cut_as_found("volume.colour", coloured)? } else { &mut [] },
             digest: carver.cut("volume.digest", capacity.blocks)?,
+            faintest: carver.cut("volume.faintest", capacity.blocks)?,
         })
     }
 
@@ -104,6 +109,9 @@ impl<'s> Blocks<'s> {
         }
         if let Some(digest) = self.digest.get_mut(slot) {
             *digest = 0;
+        }
+        if let Some(faintest) = self.faintest.get_mut(slot) {
+            *faintest = 0;
         }
     }
 
@@ -126,4 +134,10 @@ impl<'s> Blocks<'s> {
     pub fn colour(&self, slot: u32) -> Option<&[[u8; BLOCK_VOXELS]; 3]> {
         self.colour.get(slot as usize)
     }
+}
+
+/// Least weight of the seen voxels; 0 where none is seen.
+pub(super) fn faintest_weight(weight: &[u8; BLOCK_VOXELS]) -> u8 {
+    // Never seen wraps around to the most there is, and back.
+    weight.iter().map(|weight| weight.wrapping_sub(1)).fold(u8::MAX, |least, one| if one < least { one } else { least }).wrapping_add(1)
 }

@@ -122,17 +122,22 @@ impl<'s> Volume<'s> {
         self.digest
     }
 
-    /// Computes a block's digest anew and corrects the map's by the difference.
-    fn refresh_digest(&mut self, slot: u32) {
+    /// Sums a block up anew after its content changed, and corrects the map's digest by the difference.
+    fn sum_up(&mut self, slot: u32) {
         let at = slot as usize;
-        let (Some(coord), Some(sdf), Some(weight), Some(digest)) =
-            (self.blocks.coord(slot), self.blocks.sdf.get(at), self.blocks.weight.get(at), self.blocks.digest.get_mut(at))
-        else {
+        let (Some(coord), Some(sdf), Some(weight), Some(digest), Some(faintest)) = (
+            self.blocks.coord(slot),
+            self.blocks.sdf.get(at),
+            self.blocks.weight.get(at),
+            self.blocks.digest.get_mut(at),
+            self.blocks.faintest.get_mut(at),
+        ) else {
             return;
         };
         let new = fuse::block_digest(coord, sdf, weight, self.blocks.colour.get(at));
         self.digest = self.digest.wrapping_sub(*digest).wrapping_add(new);
         *digest = new;
+        *faintest = block::faintest_weight(weight);
     }
 
     /// Enters what is in use into a footprint.
@@ -143,6 +148,7 @@ impl<'s> Volume<'s> {
         footprint.set_use::<[u8; BLOCK_VOXELS]>("volume.weight", now, peak);
         footprint.set_use::<[[u8; BLOCK_VOXELS]; 3]>("volume.colour", now, peak);
         footprint.set_use::<u64>("volume.digest", now, peak);
+        footprint.set_use::<u8>("volume.faintest", now, peak);
         footprint.set_use::<u32>("volume.visible", self.visible.slots().len(), self.visible.peak());
     }
 }

@@ -85,6 +85,11 @@ impl Volume<'_> {
     /// Resets the faint voxels of a block, and frees it when nothing is left. How many were reset, and whether it was freed.
     pub(super) fn prune_block(&mut self, slot: u32, prune_weight: u8) -> (u32, bool) {
         let at = slot as usize;
+        // Most blocks are known to hold nothing faint without a look at them.
+        let by_distance = self.config.prune_distance > 0.0;
+        if !by_distance && self.blocks.faintest.get(at).is_some_and(|&faintest| faintest > prune_weight) {
+            return (0, false);
+        }
         let (Some(sdf), Some(weight)) = (self.blocks.sdf.get_mut(at), self.blocks.weight.get_mut(at)) else {
             return (0, false);
         };
@@ -97,11 +102,11 @@ impl Volume<'_> {
         if census.faint > 0 {
             reset_faint(prune_weight, sdf, weight, self.blocks.colour.get_mut(at));
         }
-        let far = self.config.prune_distance > 0.0 && nearest(sdf, weight) > self.config.prune_distance;
+        let far = by_distance && nearest(sdf, weight) > self.config.prune_distance;
         if far {
             self.free_block(slot);
         } else if census.faint > 0 {
-            self.refresh_digest(slot);
+            self.sum_up(slot);
         }
         (census.faint, far)
     }

@@ -139,7 +139,7 @@ impl Volume<'_> {
         let colour = self.blocks.colour.get_mut(at);
         let returned = store.bring_back(ReturningBlock { coord, sdf, weight, colour });
         if returned {
-            self.refresh_digest(slot);
+            self.sum_up(slot);
         }
         returned
     }

@@ -1,27 +1,7 @@
 //! Input without an answer, input that fits nothing, and configurations at their limits: values, never panics.
 
 use super::{scenes::surface, *};
-use crate::{config::Problems, random::Random};
-use std::thread;
-
-/// Really at once: the first of two on a thread of its own.
-struct TwoThreads;
-
-impl Executor for TwoThreads {
-    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
-    where
-        A: FnOnce() -> RA + Send,
-        B: FnOnce() -> RB + Send,
-        RA: Send,
-        RB: Send,
-    {
-        thread::scope(|scope| {
-            let a = scope.spawn(a);
-            let b = b();
-            (a.join().unwrap(), b)
-        })
-    }
-}
+use crate::{config::Problems, executor::TwoThreads, random::Random};
 
 fn noise(width: usize, height: usize, seed: u64) -> Grey {
     let mut random = Random::new(seed);

@@ -11,6 +11,7 @@ pub(super) struct Band<'b> {
     pub(super) weight: &'b mut [[u8; BLOCK_VOXELS]],
     pub(super) colour: &'b mut [[[u8; BLOCK_VOXELS]; 3]],
     pub(super) digest: &'b mut [u64],
+    pub(super) faintest: &'b mut [u8],
 }
 
 impl<'b> Band<'b> {
@@ -24,6 +25,7 @@ impl<'b> Band<'b> {
             weight: blocks.weight,
             colour: blocks.colour,
             digest: blocks.digest,
+            faintest: blocks.faintest,
         }
     }
 
@@ -37,8 +39,18 @@ impl<'b> Band<'b> {
         let (weight, weight_high) = self.weight.split_at_mut(at);
         let (colour, colour_high) = self.colour.split_at_mut(coloured);
         let (digest, digest_high) = self.digest.split_at_mut(at);
+        let (faintest, faintest_high) = self.faintest.split_at_mut(at);
         (
-            Band { slots: low, first: self.first, coord: self.coord, sdf, weight, colour, digest },
+            Band {
+                slots: low,
+                first: self.first,
+                coord: self.coord,
+                sdf,
+                weight,
+                colour,
+                digest,
+                faintest,
+            },
             Band {
                 slots: high,
                 first: border,
@@ -47,6 +59,7 @@ impl<'b> Band<'b> {
                 weight: weight_high,
                 colour: colour_high,
                 digest: digest_high,
+                faintest: faintest_high,
             },
         )
     }

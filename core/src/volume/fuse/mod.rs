@@ -15,6 +15,7 @@ mod band;
 mod row;
 
 use self::band::Band;
+use super::block::faintest_weight;
 use super::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, CLASS_COUNT, ObservationWeight, Viewpoint, Volume, VolumeConfig};
 use crate::{
     digest::Digest,
@@ -145,9 +146,13 @@ impl Fusion<'_> {
         let mut change = 0u64;
         for &slot in band.slots {
             let at = (slot as usize).wrapping_sub(band.first);
-            let (Some(coord), Some(sdf), Some(weight), Some(digest)) =
-                (band.coord.get(slot as usize), band.sdf.get_mut(at), band.weight.get_mut(at), band.digest.get_mut(at))
-            else {
+            let (Some(coord), Some(sdf), Some(weight), Some(digest), Some(faintest)) = (
+                band.coord.get(slot as usize),
+                band.sdf.get_mut(at),
+                band.weight.get_mut(at),
+                band.digest.get_mut(at),
+                band.faintest.get_mut(at),
+            ) else {
                 continue;
             };
             let coord = BlockCoord::unpacked(*coord);
@@ -156,6 +161,7 @@ impl Fusion<'_> {
                 let new = block_digest(coord, sdf, weight, colour.as_deref());
                 change = change.wrapping_add(new).wrapping_sub(*digest);
                 *digest = new;
+                *faintest = faintest_weight(weight);
             }
         }
         change

@@ -1,6 +1,6 @@
 use super::*;
 use crate::{
-    executor::Serial,
+    executor::{Serial, TwoThreads},
     geometry::{StereoRig, Transform, exp},
     memory::SLAB_ALIGN,
     random::Random,
@@ -398,31 +398,13 @@ fn agrees_to_the_bit_with_a_walk_through_every_cell() {
     assert!(hits > 10_000, "{hits}");
 }
 
-/// Both at once.
-struct Threads;
-
-impl Executor for Threads {
-    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
-    where
-        A: FnOnce() -> RA + Send,
-        B: FnOnce() -> RB + Send,
-        RA: Send,
-        RB: Send,
-    {
-        std::thread::scope(|scope| {
-            let b = scope.spawn(b);
-            (a(), b.join().unwrap())
-        })
-    }
-}
-
 #[test]
 fn threads_change_nothing() {
     let volume = rough(9);
     let view = at([0.1, -0.4, 0.2], [0.9, -0.3, 0.2]);
     let mut alone = raycaster(6_000, &RaycastConfig::default());
     let mut together = raycaster(6_000, &RaycastConfig::default());
-    assert_eq!(alone.cast(&volume, &view, &Serial), together.cast(&volume, &view, &Threads));
+    assert_eq!(alone.cast(&volume, &view, &Serial), together.cast(&volume, &view, &TwoThreads));
     assert_eq!(alone.depth_m, together.depth_m);
     assert_eq!(alone.normal, together.normal);
     assert_eq!(alone.colour, together.colour);

@@ -127,7 +127,7 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
                 let seen = observation(&depth_m, &grey);
                 volume.allocate(&view, seen.depth_m, &mut NoStore);
                 if threads {
-                    volume.fuse(&view, seen, &Threads)
+                    volume.fuse(&view, seen, &TwoThreads)
                 } else {
                     volume.fuse(&view, seen, &Serial)
                 }

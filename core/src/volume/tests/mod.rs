@@ -6,12 +6,12 @@ mod pruning;
 
 use super::*;
 use crate::{
-    executor::{Executor, Serial},
+    executor::{Serial, TwoThreads},
     geometry::{StereoRig, exp},
     image::View,
 };
 use nalgebra::Vector3;
-use std::{thread, vec, vec::Vec};
+use std::{vec, vec::Vec};
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
@@ -64,22 +64,4 @@ fn fuse_once(volume: &mut Volume<'_>, view: &Viewpoint, depth_m: &[f32], grey: &
     let report = volume.allocate(view, seen.depth_m, &mut NoStore);
     volume.fuse(view, seen, &Serial);
     report
-}
-
-/// Two threads.
-struct Threads;
-
-impl Executor for Threads {
-    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
-    where
-        A: FnOnce() -> RA + Send,
-        B: FnOnce() -> RB + Send,
-        RA: Send,
-        RB: Send,
-    {
-        thread::scope(|scope| {
-            let b = scope.spawn(b);
-            (a(), b.join().unwrap())
-        })
-    }
 }

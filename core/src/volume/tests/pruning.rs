@@ -17,9 +17,7 @@ fn plant(volume: &mut Volume<'_>, coord: BlockCoord, weight: impl Fn(usize) -> u
         volume.blocks.weight[at][voxel] = weight(voxel);
         volume.blocks.sdf[at][voxel] = 100 + voxel as i16;
     }
-    let new = fuse::block_digest(coord, &volume.blocks.sdf[at], &volume.blocks.weight[at], volume.blocks.colour.get(at));
-    volume.blocks.digest[at] = new;
-    volume.digest = volume.digest.wrapping_add(new);
+    volume.sum_up(slot);
     slot
 }
 
@@ -106,6 +104,34 @@ fn a_block_far_from_any_surface_goes_only_when_asked() {
             frame(volume, &[]);
             assert_eq!(volume.pool.len(), left, "at {prune_distance}");
         });
+    }
+}
+
+#[test]
+fn blocks_left_unread_are_those_with_nothing_faint() {
+    let depth_m = bumpy_depth();
+    let nearer: Vec<f32> = depth_m.iter().map(|depth| 0.95 * depth).collect();
+    let grey = vec![7; WIDTH * HEIGHT];
+    for prune_weight in 0..6 {
+        let mut digests = Vec::new();
+        for known in [true, false] {
+            with_volume(&CAPACITY, &VolumeConfig::default(), |volume| {
+                for (count, depth_m) in [(2, &depth_m), (3, &nearer), (1, &depth_m)] {
+                    for _ in 0..count {
+                        fuse_once(volume, &view([0.0; 3], [0.0; 3]), depth_m, &grey);
+                    }
+                }
+                for (slot, weight) in volume.blocks.weight.iter().enumerate().take(volume.pool.high_water()) {
+                    let least = weight.iter().copied().filter(|&weight| weight > 0).min().unwrap_or(0);
+                    assert_eq!(volume.blocks.faintest[slot], least, "slot {slot}");
+                }
+                if !known {
+                    volume.blocks.faintest.fill(0);
+                }
+                digests.push((volume.prune_whole(prune_weight), volume.digest(), volume.pool.len()));
+            });
+        }
+        assert_eq!(digests[0], digests[1], "weight {prune_weight}");
     }
 }
 
