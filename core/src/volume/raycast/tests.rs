@@ -441,7 +441,7 @@ fn several_maps_in_one_picture_show_what_is_nearest_of_each_alone() {
     caster.cast(&ground, &camera, &Serial).unwrap();
     let mut nearest: Vec<(Pixel, u8)> = pixels(&caster).into_iter().map(|pixel| (pixel, 0)).collect();
     let mut threaded = raycaster(6_000, &RaycastConfig::default());
-    threaded.cast(&ground, &camera, &Threads).unwrap();
+    threaded.cast(&ground, &camera, &TwoThreads).unwrap();
     for (layer, (map, view)) in (1..).zip(&maps) {
         let mut alone = raycaster(6_000, &RaycastConfig::default());
         alone.cast(map, view, &Serial).unwrap();
@@ -453,7 +453,7 @@ fn several_maps_in_one_picture_show_what_is_nearest_of_each_alone() {
             }
         }
         assert_eq!(caster.cast_over(map, view, layer, &Serial).unwrap().pixels, shown);
-        threaded.cast_over(map, view, layer, &Threads).unwrap();
+        threaded.cast_over(map, view, layer, &TwoThreads).unwrap();
     }
     for caster in [&caster, &threaded] {
         let composed: Vec<(Pixel, u8)> = pixels(caster).into_iter().zip(caster.layer.iter().copied()).collect();
