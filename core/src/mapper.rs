@@ -10,7 +10,7 @@ use crate::{
     frame::StereoFrame,
     geometry::{Transform, depth_from_disparity},
     image::{DISPARITY_ONE_PX, View, ViewMut},
-    instances::{CameraMotion, Detection, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, TrackReport},
+    instances::{CameraMotion, Detection, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, ThingAt, TrackReport},
     memory::{Carver, SlabError, region_bytes},
     report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
@@ -304,6 +304,11 @@ impl<'s> Mapper<'s> {
     /// What is tracked, as it stands after the last frame, by age.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
         self.instances.tracks()
+    }
+
+    /// What a pixel of the last frame shows; `None` for the street.
+    pub fn thing_at(&self, u: i32, v: i32) -> Option<ThingAt> {
+        self.instances.at(u, v)
     }
 
     /// The objects reconstructed now, each with its own map.

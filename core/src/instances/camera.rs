@@ -41,7 +41,7 @@ impl<'s> Instances<'s> {
         self.report.matches_withheld = matches;
     }
 
-    fn track_of(&self, detection: &Taken) -> Option<&Track> {
+    pub(super) fn track_of(&self, detection: &Taken) -> Option<&Track> {
         self.tracks.all().get(detection.track.checked_sub(1)? as usize)
     }
 }

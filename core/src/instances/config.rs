@@ -74,7 +74,7 @@ impl Default for InstancesConfig {
 
 impl InstancesConfig {
     /// Whether a box of `area_px` in an image of that width is a detection: strictly larger than the least area.
-    pub(super) fn large_enough(&self, area_px: i64, width: usize) -> bool {
+    pub fn large_enough(&self, area_px: i64, width: usize) -> bool {
         area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > self.least(width)
     }
 

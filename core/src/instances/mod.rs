@@ -40,6 +40,7 @@
 //! Everything the detector gets wrong, and all of it is counted. A mask that holds two cars is one track and gets the motion of the one with
 //! more matches.
 
+mod at;
 mod background;
 mod camera;
 mod claim;
@@ -62,6 +63,7 @@ mod state;
 mod tests;
 mod track;
 
+pub use at::ThingAt;
 pub use camera::CameraMotion;
 pub use class::{Class, Treatment};
 pub use config::{InstancesConfig, MotionConfig, ObjectVolumeConfig, Overlap, StateConfig};

@@ -4,7 +4,7 @@ use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
 use crate::depth::{self, DepthChoice};
 use crate::export::{self, FolderError, RunFolder, Summary};
-use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, RunError, RunRecord, Streaming};
+use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, Reference, RunError, RunRecord, Streaming};
 use crate::segmentation::{self, Choice};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
@@ -70,7 +70,10 @@ pub struct RunArgs {
     /// Leave map.blocks in the run folder when the mesh is written
     #[arg(long, conflicts_with = "no_stream")]
     keep_blocks: bool,
-    /// Compare the map with the exact depth of a frame so many frames later, when pruning has been there
+    /// Hold input and map against LiDAR scans or the synthetic street's exact depth: accuracy and completeness, of the street and of cars
+    #[arg(long, value_enum, value_name = "REFERENCE")]
+    evaluate: Option<Reference>,
+    /// Hold the map against a frame so many frames later, when pruning has been there
     #[arg(long, default_value_t = 0, value_name = "N")]
     evaluation_delay: usize,
     /// Fail at the first frame that harms the map: a guessed pose, a block lost or refused
@@ -158,6 +161,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
             keep_file: args.keep_blocks,
         }),
         strict: args.strict,
+        evaluate: args.evaluate,
         evaluation_delay: args.evaluation_delay,
         rss_limit_bytes: args.rss_limit_mib.map_or(capacity.bytes() as u64 + HOST_OVERHEAD_BYTES, |mib| mib.saturating_mul(MIB)),
         quiet: args.silent(),
@@ -192,6 +196,9 @@ fn write(folder: &RunFolder, run: &RunRecord, summary: &Summary) -> Result<(), F
     folder.write("trajectory_tum.txt", |out| export::write_tum(out, &times, &poses))?;
     folder.write("frames.csv", |out| export::write_frames(out, &run.rows))?;
     folder.write("tracks.csv", |out| export::write_tracks(out, &run.rows))?;
+    if let Some(lidar) = &run.lidar {
+        folder.write("lidar.csv", |out| export::write_lidar(out, &lidar.frames))?;
+    }
     folder.write("report.html", |out| export::report::write(out, run))?;
     folder.write("summary.json", |out| Ok(serde_json::to_writer_pretty(out, summary)?))
 }
@@ -225,6 +232,19 @@ fn conclude(run: &RunRecord, place: &Path) {
             "map against truth",
             format!("median {:.1} cm, {:.1} % complete within 20 m", 100.0 * exact.median_error_m, 100.0 * exact.completeness),
         );
+    }
+    if let Some(figures) = run.lidar.as_ref().and_then(|lidar| lidar.figures.as_ref()) {
+        let percent = |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
+        for (name, of) in [("street", &figures.still), ("cars", &figures.dynamic)] {
+            let (input, map) = (&of.input, &of.fused);
+            if of.frames > 0 {
+                let [right, there] = [&input.accuracy, &input.completeness].map(|share| percent(*share));
+                line(
+                    &format!("{} against {}", name, figures.source),
+                    format!("input {right} right, {there} complete; map {} and {}", percent(map.accuracy), percent(map.completeness)),
+                );
+            }
+        }
     }
     line("map", format!("{} triangles, {} of {} blocks used at most", run.mesh.triangles, run.blocks_peak(), run.capacity.blocks));
     let refused = run.blocks_refused();

@@ -5,7 +5,7 @@
 
 use super::{DatasetError, error::read_failed};
 use dynvox_core::geometry::{RigProblem, StereoRig};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Matrix3x4, Vector3};
 use std::path::Path;
 
 /// A 3 x 4 projection matrix, row by row.
@@ -15,21 +15,36 @@ pub type Projection = [f64; 12];
 #[derive(Debug)]
 pub struct KittiCalibration {
     cameras: [Option<Projection>; 4],
+    /// `Tr` (also `Tr_velo_cam`, `Tr_velo_to_cam`): LiDAR to camera 0.
+    lidar: Option<Projection>,
+    /// `R0_rect` (also `R_rect`): what rectification turns camera 0 by.
+    rectifying: Option<[f64; 9]>,
     path: std::path::PathBuf,
 }
 
 impl KittiCalibration {
-    /// Reads lines `P0: 12 numbers`, or bare lines of 12 numbers for P0, P1, ... in order. Other lines (`Tr:`, `R_rect`) are passed over.
+    /// Reads lines `P0: 12 numbers`, or bare lines of 12 numbers for P0, P1, ... in order; `Tr:` and `R0_rect:` by their several names.
+    /// Other lines are passed over.
     pub fn read(path: &Path) -> Result<Self, DatasetError> {
         Self::parse(&std::fs::read_to_string(path).map_err(read_failed(path))?, path)
     }
 
     fn parse(text: &str, path: &Path) -> Result<Self, DatasetError> {
         let mut cameras = [None; 4];
+        let (mut lidar, mut rectifying) = (None, None);
         let mut bare = 0;
         for (number, line) in text.lines().enumerate().map(|(at, line)| (at + 1, line.trim())) {
             let Some(first) = line.split_whitespace().next() else { continue };
             let slot = match first.trim_end_matches(':') {
+                // A scan is optional: where these lines are damaged it is missed when it is asked for.
+                "Tr" | "Tr_velo_cam" | "Tr_velo_to_cam" => {
+                    lidar = numbers(line);
+                    continue;
+                }
+                "R_rect" | "R0_rect" => {
+                    rectifying = numbers(line);
+                    continue;
+                }
                 "P0" => 0,
                 "P1" => 1,
                 "P2" => 2,
@@ -51,7 +66,7 @@ impl KittiCalibration {
                 *camera = Some(row);
             }
         }
-        Ok(Self { cameras, path: path.to_path_buf() })
+        Ok(Self { cameras, lidar, rectifying, path: path.to_path_buf() })
     }
 
     /// The rig of the pair `left`, `right` (0, 1 grey; 2, 3 colour).
@@ -82,13 +97,31 @@ impl KittiCalibration {
         Ok(Vector3::new((p[3] - p[2] * z) / p[0], (p[7] - p[6] * z) / p[5], z))
     }
 
-    fn camera(&self, camera: usize) -> Result<Projection, DatasetError> {
+    /// LiDAR to rectified camera 0: `R0 * Tr`; `None` where the file does not say.
+    pub fn t_camera_lidar(&self) -> Option<Matrix3x4<f64>> {
+        let rectifying = self.rectifying.map_or_else(Matrix3::identity, |rows| Matrix3::from_row_slice(&rows));
+        Some(rectifying * Matrix3x4::from_row_slice(&self.lidar?))
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Projection of camera `camera`.
+    pub fn camera(&self, camera: usize) -> Result<Projection, DatasetError> {
         self.cameras.get(camera).copied().flatten().ok_or_else(|| DatasetError::Calibration {
             path: self.path.clone(),
             reason: format!("it has no P{camera}"),
             action: format!("Add the line `P{camera}: ` with the 12 numbers of that camera's projection matrix"),
         })
     }
+}
+
+/// The numbers of a line after its label, if there are `N`, all finite.
+fn numbers<const N: usize>(line: &str) -> Option<[f64; N]> {
+    let values = line.split_whitespace().skip(1).map(|word| word.parse().ok().filter(|value: &f64| value.is_finite()));
+    values.collect::<Option<Vec<f64>>>()?.try_into().ok()
 }
 
 /// Reads a plain stereo folder's calibration: KITTI's lines `P0:`, `P1:`, or one `key value` line each for `focal_px`, `center_u_px`,

@@ -21,6 +21,7 @@ pub fn open(path: &Path) -> Result<Sequence, DatasetError> {
         notes: Vec::new(),
         instances: path.join("instances"),
         objects: Vec::new(),
+        lidar: None,
     })
 }
 

@@ -2,7 +2,7 @@
 
 use super::calibration::KittiCalibration;
 use super::sequence::{Parts, Sequence};
-use super::{DatasetError, Images, error::read_failed, labels, table};
+use super::{DatasetError, Images, error::read_failed, labels, lidar::LidarFiles, table};
 use nalgebra::{Isometry3, Translation3};
 use std::path::{Path, PathBuf};
 
@@ -60,6 +60,7 @@ pub fn open_odometry(path: &Path, sequence: Option<&str>, images: Images) -> Res
         notes,
         instances: folder.join("instances"),
         objects: Vec::new(),
+        lidar: LidarFiles::at(folder.join("velodyne"), &calibration, [left, right])?,
     })
 }
 
@@ -69,7 +70,8 @@ pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, Da
     let names = tracking_sequences(&split)?;
     let name = chosen(path, sequence, &names)?;
     let action = "The tracking benchmark keeps left images in image_02/NNNN, right ones in image_03/NNNN: fetch what is missing";
-    let calibration = present(split.join("calib").join(format!("{name}.txt")), "Fetch the benchmark's calibration files")?;
+    let calibration =
+        KittiCalibration::read(&present(split.join("calib").join(format!("{name}.txt")), "Fetch the benchmark's calibration files")?)?;
     let poses = split.join("poses").join(format!("{name}.txt"));
     let labels = split.join("label_02").join(format!("{name}.txt"));
     // Labels have a scale of their own: poses on it are preferred.
@@ -82,13 +84,14 @@ pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, Da
     Sequence::from_parts(Parts {
         left: present(split.join("image_02").join(&name), action)?,
         right: present(split.join("image_03").join(&name), action)?,
-        rig: KittiCalibration::read(&calibration)?.rig(2, 3)?,
+        rig: calibration.rig(2, 3)?,
         times: None,
         poses: if poses.is_file() { Some((poses.clone(), table::read_poses(&poses)?)) } else { None },
         numbered: true,
         notes: Vec::new(),
         instances: split.join("instances").join(&name),
         objects,
+        lidar: LidarFiles::at(split.join("velodyne").join(&name), &calibration, [2, 3])?,
         name: format!("kitti-tracking-{name}"),
     })
 }

@@ -9,6 +9,7 @@ mod folder;
 mod image;
 mod kitti;
 mod labels;
+mod lidar;
 mod open;
 mod scaled;
 mod sequence;
@@ -21,6 +22,7 @@ mod truth;
 pub use error::DatasetError;
 pub use image::{Image, luma, read_png, read_png_deep, read_png_u16};
 pub use labels::read_labels;
+pub use lidar::LidarScan;
 pub use open::{Found, Kind, open, sequences_at, survey};
 pub use scaled::Scaled;
 pub use sequence::Sequence;
@@ -127,6 +129,21 @@ pub trait Dataset: Send + Sync {
 
     /// Decodes or renders a frame.
     fn frame(&self, index: usize) -> Result<StereoImages, DatasetError>;
+
+    /// Whether frames come with exact depth ([`StereoImages::exact`]).
+    fn has_exact_depth(&self) -> bool {
+        self.masks() == Masks::Exact
+    }
+
+    /// Whether there is a LiDAR scan for a frame.
+    fn has_lidar(&self, _: usize) -> bool {
+        false
+    }
+
+    /// The scan of a frame, where there is one. Nothing is read of it before.
+    fn lidar(&self, _: usize) -> Result<Option<LidarScan>, DatasetError> {
+        Ok(None)
+    }
 
     /// True `t_world_camera` of every frame's left camera, where known.
     fn truth(&self) -> Option<&[Transform]> {

@@ -1,6 +1,6 @@
 //! A data set at a smaller size: every pixel is the area average of the pixels it covers, and the rig shrinks with it.
 
-use super::{Dataset, DatasetError, ExactFrame, Image, Masks, StereoImages};
+use super::{Dataset, DatasetError, ExactFrame, Image, LidarScan, Masks, StereoImages};
 use crate::depth::GivenDepth;
 use dynvox_core::geometry::{StereoRig, Transform};
 
@@ -161,6 +161,14 @@ impl Dataset for Scaled {
             objects: frame.objects.map(|truth| truth.scaled(self.scale)),
             sightings: frame.sightings,
         })
+    }
+
+    fn has_lidar(&self, index: usize) -> bool {
+        self.inner.has_lidar(index)
+    }
+
+    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, DatasetError> {
+        Ok(self.inner.lidar(index)?.map(|scan| scan.scaled(self.scale)))
     }
 
     fn truth(&self) -> Option<&[Transform]> {

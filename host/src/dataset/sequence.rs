@@ -1,6 +1,6 @@
 //! A sequence of image files: two lists of PNGs with a rig, times and, where known, poses. Every layout on disk ends up here.
 
-use super::{Dataset, DatasetError, Image, Masks, ObjectsTruth, StereoImages, error::read_failed, image};
+use super::{Dataset, DatasetError, Image, LidarScan, Masks, ObjectsTruth, StereoImages, error::read_failed, image, lidar::LidarFiles};
 use crate::segmentation::Sightings;
 use dynvox_core::geometry::{StereoRig, Transform};
 use std::path::{Path, PathBuf};
@@ -20,6 +20,7 @@ pub struct Sequence {
     truth: Option<Vec<Transform>>,
     masks: Masks,
     objects: Vec<ObjectsTruth>,
+    lidar: Option<LidarFiles>,
     notes: Vec<String>,
 }
 
@@ -39,6 +40,7 @@ pub(super) struct Parts {
     pub instances: PathBuf,
     /// True objects by frame number; empty where nothing is known.
     pub objects: Vec<ObjectsTruth>,
+    pub lidar: Option<LidarFiles>,
 }
 
 impl Sequence {
@@ -83,6 +85,7 @@ impl Sequence {
             truth,
             masks,
             objects,
+            lidar: parts.lidar,
             notes,
         })
     }
@@ -135,6 +138,15 @@ impl Dataset for Sequence {
             objects: self.objects.get(index).cloned(),
             sightings: Sightings::default(),
         })
+    }
+
+    fn has_lidar(&self, index: usize) -> bool {
+        self.lidar.as_ref().zip(self.stem(index)).is_some_and(|(lidar, stem)| lidar.has(&stem))
+    }
+
+    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, DatasetError> {
+        let Some((lidar, stem)) = self.lidar.as_ref().zip(self.stem(index)) else { return Ok(None) };
+        lidar.read(&stem)
     }
 
     fn truth(&self) -> Option<&[Transform]> {

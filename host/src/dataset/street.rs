@@ -1,9 +1,10 @@
 //! The synthetic street as a data set.
 
-use super::{Dataset, DatasetError, ExactFrame, Image, Masks, ObjectsTruth, StereoImages};
+use super::{Dataset, DatasetError, ExactFrame, Image, LidarScan, Masks, ObjectsTruth, StereoImages};
 use crate::segmentation::Sightings;
 use crate::synth::{Street, StreetConfig};
 use dynvox_core::geometry::{StereoRig, Transform};
+use nalgebra::Point3;
 
 /// Frames of a street.
 pub struct StreetFrames {
@@ -73,6 +74,17 @@ impl Dataset for StreetFrames {
 
     fn masks(&self) -> Masks {
         Masks::Exact
+    }
+
+    fn has_lidar(&self, index: usize) -> bool {
+        index < self.frames
+    }
+
+    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, DatasetError> {
+        let t_camera_lidar = self.street.t_camera_lidar();
+        let point = |&[x, y, z, _]: &[f32; 4]| (t_camera_lidar * Point3::new(x, y, z).cast::<f64>()).coords.into();
+        let points_m = self.street.lidar(index as u32).iter().map(point).collect();
+        Ok((index < self.frames).then(|| LidarScan::of_rig(points_m, &self.street.rig())))
     }
 
     fn truth(&self) -> Option<&[Transform]> {

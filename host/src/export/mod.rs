@@ -2,6 +2,7 @@
 
 mod folder;
 mod frames;
+mod lidar;
 mod ply;
 mod portrait;
 pub mod report;
@@ -13,6 +14,7 @@ mod trajectory;
 
 pub use folder::{FolderError, RunFolder};
 pub use frames::write_frames;
+pub use lidar::write_lidar;
 pub use ply::{Mesh, PlyWriter};
 pub use portrait::portrait;
 pub use summary::Summary;

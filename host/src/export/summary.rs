@@ -2,6 +2,7 @@
 
 use super::state_name;
 use crate::evaluation::exact::ExactFigures;
+use crate::evaluation::lidar::LidarFigures;
 use crate::evaluation::objects::{ObjectFigures, TrackErrors};
 use crate::harness::{RunRecord, TrackRecord};
 use dynvox_core::Report;
@@ -25,6 +26,8 @@ pub struct Summary {
     egomotion: EgomotionSummary,
     #[serde(skip_serializing_if = "Option::is_none")]
     exact: Option<ExactSummary>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lidar: Option<LidarFigures>,
     /// Every track, by number.
     objects: Vec<ObjectSummary>,
     /// Tracks against truth, over all.
@@ -183,6 +186,7 @@ impl Summary {
                 held_frames: run.held_frames(),
             },
             exact: run.exact.map(|still| ExactSummary { still }),
+            lidar: run.lidar.as_ref().and_then(|lidar| lidar.figures.clone()),
             objects: run.objects.tracks.iter().map(ObjectSummary::of).collect(),
             objects_truth: run.objects.figures.clone(),
             map: MapSummary {

@@ -1,5 +1,6 @@
 //! Why a run ends early, in sentences.
 
+use super::Reference;
 use crate::dataset::DatasetError;
 use crate::export::FolderError;
 use crate::store::StoreError;
@@ -22,6 +23,16 @@ pub enum RunError {
         start: usize,
         /// Frames there are.
         len: usize,
+    },
+    /// Nothing to hold the map against.
+    #[error("--evaluate {} finds nothing in the {frames} frames: {}", .reference.name(), missing(*.reference, *.frames, *.delay))]
+    NoReference {
+        /// What was asked for.
+        reference: Reference,
+        /// Frames of the run.
+        frames: usize,
+        /// Frames an evaluation waits.
+        delay: usize,
     },
     /// The images are larger than the profile's.
     #[error("images of {width} x {height} px do not fit profile {profile}, which takes {fits_width} x {fits_height}. {action}")]
@@ -114,6 +125,19 @@ pub enum RunError {
         /// What the machine says.
         source: rayon::ThreadPoolBuildError,
     },
+}
+
+/// What a reference lacks, and what to do.
+fn missing(reference: Reference, frames: usize, delay: usize) -> String {
+    match reference {
+        _ if delay >= frames => format!("--evaluation-delay {delay} is beyond the last of them. Give a smaller one, or more --frames"),
+        Reference::Lidar => {
+            "no scan beside the images. KITTI keeps them in velodyne/ (`dynvox inspect` tells where); fetch them, or take the frames \
+             that have one"
+                .to_owned()
+        }
+        Reference::Exact => "only the synthetic street has exact depth. Give --evaluate lidar".to_owned(),
+    }
 }
 
 /// What the core says of a slab, as an error.

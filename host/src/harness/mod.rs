@@ -1,8 +1,9 @@
 //! Runs the core on a data set: owns the slab, feeds the frames, takes the times, watches memory, collects what the report shows.
 
 mod error;
+mod lidar;
 mod objects;
-mod pictures;
+pub(crate) mod pictures;
 mod progress;
 mod reader;
 mod record;
@@ -13,6 +14,7 @@ mod slab;
 mod threads;
 
 pub use error::RunError;
+pub use lidar::{ErrorPictures, LidarRecord, Reference, evaluable};
 pub use objects::{KeptObject, ObjectsRecord, TrackRecord};
 pub use progress::Progress;
 pub use reader::{AHEAD, read_ahead};

@@ -1,6 +1,7 @@
 //! Pictures for the report: input, disparity in colours, the map from the camera's place.
 
 use super::Threads;
+use crate::evaluation::lidar::{Layer, Rule, Sample};
 use dynvox_core::Mapper;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
@@ -28,13 +29,62 @@ fn picture(widest_px: usize, width: usize, height: usize, pixel: impl Fn(usize, 
     let step = width.div_ceil(widest_px).max(1);
     let (columns, rows) = (width.div_ceil(step), height.div_ceil(step));
     let pixels: Vec<u8> = (0..rows).flat_map(|v| (0..columns).map(move |u| (u, v))).flat_map(|(u, v)| pixel(u * step, v * step)).collect();
+    encoded(&pixels, columns, rows)
+}
+
+fn encoded(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
     let mut png = Vec::new();
-    let made = PngEncoder::new(&mut png).write_image(&pixels, columns as u32, rows as u32, ExtendedColorType::Rgb8);
+    let made = PngEncoder::new(&mut png).write_image(rgb, width as u32, height as u32, ExtendedColorType::Rgb8);
     // A picture that cannot be encoded is left out of the report, no more.
     if made.is_err() {
         png.clear();
     }
     png
+}
+
+/// Points over the darkened image, each a spot in the colour of its error: see [`error_colour`].
+pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample, f32)>) -> Vec<u8> {
+    let (width, height) = (grey.width(), grey.height());
+    // A few steps of grey, so that the file stays small.
+    let mut pixels: Vec<[u8; 3]> = grey.rows().flatten().map(|&grey| [grey / 32 * 11; 3]).collect();
+    for (sample, seen_px) in samples {
+        let colour = match sample.layer {
+            Layer::Ignored => IGNORED,
+            Layer::Static | Layer::Dynamic => error_colour(seen_px, sample.target.disparity_px),
+        };
+        let (u, v) = (usize::from(sample.target.u), usize::from(sample.target.v));
+        // Two by two: scans are dense along rows and sparse across them.
+        for (u, v) in [(u, v), (u + 1, v), (u, v + 1), (u + 1, v + 1)] {
+            if let Some(pixel) = pixels.get_mut(v * width + u).filter(|_| u < width) {
+                *pixel = colour;
+            }
+        }
+    }
+    encoded(pixels.as_flattened(), width, height)
+}
+
+/// Points that are in no figure.
+pub const IGNORED: [u8; 3] = [110, 110, 110];
+/// Points nothing is shown at.
+pub const MISSING: [u8; 3] = [190, 60, 230];
+/// Points with an error of so many times what is allowed, and up to where each colour holds: blue is right, yellow to red wrong.
+pub const ERRORS: [(f32, [u8; 3]); 6] = [
+    (0.25, [49, 84, 200]),
+    (0.5, [84, 148, 224]),
+    (1.0, [150, 210, 240]),
+    (2.0, [255, 214, 60]),
+    (4.0, [250, 140, 30]),
+    (f32::INFINITY, [225, 30, 30]),
+];
+
+/// The colour of an error by KITTI's rule: off by 3 px and by 5 % is once what is allowed.
+fn error_colour(seen_px: f32, true_px: f32) -> [u8; 3] {
+    if seen_px <= 0.0 {
+        return MISSING;
+    }
+    let off_px = (seen_px - true_px).abs();
+    let times = (off_px / Rule::KITTI.px).min(off_px / (Rule::KITTI.share * true_px));
+    ERRORS.iter().find(|(up_to, _)| times <= *up_to).map_or(MISSING, |&(_, colour)| colour)
 }
 
 /// The left image, in colour where there is one.

@@ -1,6 +1,6 @@
 //! What is remembered of a run: a row per frame, a few pictures, the figures at the end.
 
-use super::{ObjectsRecord, ShelfUse, StageTime};
+use super::{LidarRecord, ObjectsRecord, ShelfUse, StageTime};
 use crate::evaluation::{exact::ExactFigures, trajectory::TrajectoryErrors};
 use crate::export::Mesh;
 use crate::segmentation::Refusals;
@@ -141,6 +141,8 @@ pub struct RunRecord {
     pub errors: Option<TrajectoryErrors>,
     /// The map against exact depth.
     pub exact: Option<ExactFigures>,
+    /// Input and map against LiDAR or exact depth, where it was asked for.
+    pub lidar: Option<LidarRecord>,
     /// What moves or could.
     pub objects: ObjectsRecord,
     /// Pictures.

@@ -1,6 +1,7 @@
 //! One run: frames in, map, trajectory and figures out.
 
 use super::error::{RunError, refused, step_reason};
+use super::lidar::{LidarAtWork, LidarRecord, Reference, evaluable};
 use super::objects::{ObjectsAtWork, ObjectsRecord};
 use super::shelf::{MeshOutput, Shelf, Streaming};
 use super::{FrameRow, HostSlab, Keyframe, Progress, RunRecord, Threads, pictures, read_ahead, resident_bytes};
@@ -52,7 +53,9 @@ pub struct Plan {
     pub strict: bool,
     /// Resident memory above which the run fails.
     pub rss_limit_bytes: u64,
-    /// Frames after which the map is compared with the exact depth of a frame, from where it was taken.
+    /// What the map is held against, frame by frame.
+    pub evaluate: Option<Reference>,
+    /// Frames after which the map is held against a frame's reference and exact depth, from where it was taken.
     pub evaluation_delay: usize,
     /// Whether to show no progress.
     pub quiet: bool,
@@ -85,6 +88,7 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
         rows,
         keyframes,
         exact,
+        lidar,
         overview_png,
         regions,
         blocks,
@@ -109,6 +113,7 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
         errors: truth.as_ref().and_then(|truth| crate::evaluation::trajectory::errors(truth, &poses)),
         truth,
         exact: exact.figures(),
+        lidar,
         regions,
         slab_bytes,
         rss_peak_bytes: resident_bytes().map(|(_, peak)| peak),
@@ -133,6 +138,7 @@ struct Drive {
     rows: Vec<FrameRow>,
     keyframes: Vec<Keyframe>,
     exact: ExactErrors,
+    lidar: Option<LidarRecord>,
     overview_png: Vec<u8>,
     regions: Vec<Region>,
     blocks: usize,
@@ -155,6 +161,7 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
         rows: Vec::new(),
         keyframes: Vec::new(),
         exact: ExactErrors::default(),
+        lidar: plan.evaluate.map(|reference| evaluation(plan, reference)),
         objects: ObjectsAtWork::new(folder, plan),
         aside: Duration::ZERO,
     };
@@ -163,7 +170,7 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
     let finish = course.mapper.finish_with(&mut course.objects.sink);
     let objects = course.objects.finish(&course.rows)?;
     let overview_png = course.overview();
-    let Course { mut mapper, shelf, rows, keyframes, exact, objects: at_work, .. } = course;
+    let Course { mut mapper, shelf, rows, keyframes, exact, lidar, objects: at_work, .. } = course;
     let (regions, blocks) = (mapper.footprint().regions().to_vec(), mapper.background().pool().len());
     let failed_before = shelf.failure().is_some();
     let output = MeshOutput::begin(&mut mapper, shelf, folder)?;
@@ -176,6 +183,7 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
             rows,
             keyframes,
             exact,
+            lidar: lidar.map(LidarAtWork::finish),
             overview_png,
             regions,
             blocks,
@@ -189,9 +197,20 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
     ))
 }
 
+/// Begins holding the map against a reference.
+fn evaluation(plan: &Plan, reference: Reference) -> LidarAtWork {
+    let evaluable = evaluable(plan.dataset.as_ref(), &plan.indices, reference, plan.evaluation_delay);
+    LidarAtWork::new(reference, plan.evaluation_delay, &plan.config, plan.dataset.size(), &evaluable)
+}
+
 /// Refuses what cannot run before any memory is taken.
 fn check(plan: &Plan) -> Result<(), RunError> {
     let (width, height) = plan.dataset.size();
+    if let Some(reference) = plan.evaluate
+        && evaluable(plan.dataset.as_ref(), &plan.indices, reference, plan.evaluation_delay).is_empty()
+    {
+        return Err(RunError::NoReference { reference, frames: plan.indices.len(), delay: plan.evaluation_delay });
+    }
     let fits = |capacity: &Capacity| width <= capacity.image_width && height <= capacity.image_height;
     if !fits(&plan.capacity) {
         let scale = (plan.capacity.image_width as f64 / width as f64).min(plan.capacity.image_height as f64 / height as f64);
@@ -243,6 +262,7 @@ struct Course<'p, 's> {
     rows: Vec<FrameRow>,
     keyframes: Vec<Keyframe>,
     exact: ExactErrors,
+    lidar: Option<LidarAtWork>,
     objects: ObjectsAtWork,
     /// Time that only the report needed.
     aside: Duration,
@@ -284,6 +304,7 @@ impl Course<'_, '_> {
                 if let Some(past) = at.checked_sub(delay).filter(|&past| delay > 0 && is_compared(past)) {
                     self.look_back(past)?;
                 }
+                self.measure(at, index, &images, &t_world_camera)?;
                 self.aside += aside.elapsed();
             }
             Ok(())
@@ -362,6 +383,17 @@ impl Course<'_, '_> {
         let images = self.plan.dataset.frame(index)?;
         if let Some(exact) = &images.exact {
             self.look(&images, &t_world_camera, Some(exact), None);
+        }
+        Ok(())
+    }
+
+    /// Holds the map against the reference of the frame that is due.
+    fn measure(&mut self, at: usize, index: usize, images: &StereoImages, t_world_camera: &Transform) -> Result<(), RunError> {
+        let Some(lidar) = &mut self.lidar else { return Ok(()) };
+        let Some(due) = lidar.due(at, index, images, &self.mapper, (self.plan.dataset.as_ref(), t_world_camera))? else { return Ok(()) };
+        let (mapper, threads) = (&mut self.mapper, &self.threads);
+        if let Some(depth_m) = threads.run(|| mapper.raycast(&due.t_world_camera, threads)).ok().and_then(|seen| seen.depth_m()) {
+            lidar.compare(&due, &depth_m);
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use super::{
     Frames, Segmenter, Sightings, exact::Exact, indexed::Indexed, mnc::Mnc, mots::MotsPictures, mots::MotsText, noisy::Noisy, unusable,
 };
-use crate::dataset::{Dataset, DatasetError, Masks, StereoImages};
+use crate::dataset::{Dataset, DatasetError, LidarScan, Masks, StereoImages};
 use dynvox_core::geometry::{StereoRig, Transform};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -184,6 +184,14 @@ impl Dataset for Segmented {
         }
         images.sightings = seen;
         Ok(images)
+    }
+
+    fn has_lidar(&self, index: usize) -> bool {
+        self.dataset.has_lidar(index)
+    }
+
+    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, DatasetError> {
+        self.dataset.lidar(index)
     }
 
     fn truth(&self) -> Option<&[Transform]> {

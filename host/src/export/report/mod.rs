@@ -1,6 +1,7 @@
 //! `report.html`: the run on one page, in one file. Pictures and drawings are inside; nothing is fetched, no script runs.
 
 mod chart;
+mod lidar;
 mod objects;
 
 use crate::harness::{FrameRow, RunRecord, StageTime};
@@ -26,6 +27,7 @@ pub fn write(out: &mut impl Write, run: &RunRecord) -> io::Result<()> {
         cards(run),
         trajectory(run),
         pictures(run),
+        lidar::section(run),
         objects::section(run),
         memory(run),
         time(run),
