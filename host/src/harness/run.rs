@@ -391,8 +391,12 @@ impl Course<'_, '_> {
     fn measure(&mut self, at: usize, index: usize, images: &StereoImages, t_world_camera: &Transform) -> Result<(), RunError> {
         let Some(lidar) = &mut self.lidar else { return Ok(()) };
         let Some(due) = lidar.due(at, index, images, &self.mapper, (self.plan.dataset.as_ref(), t_world_camera))? else { return Ok(()) };
-        let (mapper, threads) = (&mut self.mapper, &self.threads);
-        if let Some(depth_m) = threads.run(|| mapper.raycast(&due.t_world_camera, threads)).ok().and_then(|seen| seen.depth_m()) {
+        let (mapper, threads, present) = (&mut self.mapper, &self.threads, self.plan.evaluation_delay == 0);
+        // Where objects were in a past frame is not kept: later the street is looked at alone.
+        let seen = threads.run(|| {
+            if present { mapper.raycast_composed(&due.t_world_camera, threads) } else { mapper.raycast(&due.t_world_camera, threads) }
+        });
+        if let Some(depth_m) = seen.ok().and_then(|seen| seen.depth_m()) {
             lidar.compare(&due, &depth_m);
         }
         Ok(())
