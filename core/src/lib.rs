@@ -25,6 +25,7 @@ pub mod memory;
 pub mod random;
 pub mod report;
 pub mod scene_flow;
+pub mod stage_digests;
 pub mod stereo;
 pub mod volume;
 
@@ -34,3 +35,4 @@ pub use frame::StereoFrame;
 pub use mapper::{Mapper, NewError, StepError};
 pub use memory::{Capacity, Footprint, Slab};
 pub use report::{PoseOrigin, Report, Severity};
+pub use stage_digests::{Digested, StageDigests};

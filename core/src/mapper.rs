@@ -14,9 +14,13 @@ use crate::{
     memory::{Carver, SlabError, region_bytes},
     report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
+    stage_digests::StageDigests,
     stereo::StereoMatcher,
     volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Raycaster, Triangle, Viewpoint, Volume},
 };
+
+#[cfg(test)]
+mod tests;
 
 /// Why a mapper cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,6 +191,7 @@ impl<'s> Mapper<'s> {
         // (F) Noise last seen a fixed lag ago goes.
         let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
 
+        let digests = self.digests(frame, egomotion.as_ref());
         let report = Report {
             frame: self.frame,
             t_world_camera: camera.t_world_camera,
@@ -199,8 +204,8 @@ impl<'s> Mapper<'s> {
             allocation,
             prune,
             blocks: self.block_count(),
-            input_digest: input_digest(frame),
-            digest: self.digest(),
+            digests,
+            digest: digests.whole(self.frame),
         };
         self.frame += 1;
         Ok(report)
@@ -331,15 +336,17 @@ impl<'s> Mapper<'s> {
         }
     }
 
-    /// Digest of all that frames to come depend on in the result: the pose, the map, tracks and objects.
-    fn digest(&self) -> u64 {
-        let pose = self.camera.t_world_camera();
-        let mut digest = Digest::default();
-        digest.u64(u64::from(self.frame));
-        pose.rotation.coords.iter().chain(pose.translation.vector.iter()).for_each(|&value| digest.f64(value));
-        digest.u64(self.background.digest());
-        digest.u64(self.instances.digest());
-        digest.finish()
+    /// Digests of a frame and of what each stage made of it.
+    fn digests(&self, frame: &StereoFrame<'_>, egomotion: Option<&MotionEstimate>) -> StageDigests {
+        StageDigests {
+            input: input_digest(frame),
+            disparity: self.stereo.digest(),
+            matches: self.scene_flow.digest(),
+            egomotion: self.camera.digest(egomotion),
+            tracks: self.instances.tracks_digest(),
+            background: self.background.digest(),
+            objects: self.instances.object_digests(),
+        }
     }
 
     /// The static map's triangles, one after the other, in world coordinates. How many there were.
@@ -376,7 +383,7 @@ fn input_digest(frame: &StereoFrame<'_>) -> u64 {
     if let Some(disparity) = &frame.disparity_q8 {
         // A mark first, so that a given disparity is never taken for an image of classes.
         digest.u64(u64::from(DISPARITY_ONE_PX));
-        disparity.rows().flatten().for_each(|&value| digest.u64(u64::from(value)));
+        disparity.rows().for_each(|row| digest.u16s(row));
     }
     if let Some(pose) = &frame.t_world_camera {
         pose.rotation.coords.iter().chain(pose.translation.vector.iter()).for_each(|&value| digest.f64(value));

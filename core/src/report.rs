@@ -5,6 +5,7 @@ use crate::{
     geometry::Transform,
     instances::InstancesReport,
     scene_flow::FlowReport,
+    stage_digests::StageDigests,
     stereo::StereoReport,
     volume::{AllocationReport, PruneReport},
 };
@@ -84,9 +85,9 @@ pub struct Report {
     pub prune: PruneReport,
     /// The static map's pool.
     pub blocks: BlockCount,
-    /// Digest of the images as they came in, so that a changed decoder is told from a changed core.
-    pub input_digest: u64,
-    /// Digest of the pose and of the whole map after this step.
+    /// Digests of what went in and of what each stage made of it.
+    pub digests: StageDigests,
+    /// One digest for all stages: [`StageDigests::whole`].
     pub digest: u64,
 }
 

@@ -8,7 +8,7 @@ use std::{fs, path::Path};
 fn digests(clip: &Clip, executor: &impl Executor) -> Vec<(u64, u64)> {
     clip.with_mapper(&Capacity::SMALL, |mapper| {
         clip.stereo()
-            .map(|frame| mapper.step(&frame, executor).map(|report| (report.input_digest, report.digest)).expect("a good frame"))
+            .map(|frame| mapper.step(&frame, executor).map(|report| (report.digests.input, report.digest)).expect("a good frame"))
             .collect()
     })
 }
@@ -40,7 +40,7 @@ fn the_street_gives_the_digests_on_file() {
     let clip = Clip::street(320, 96, 8);
     let digests = clip.with_mapper(&Capacity::TINY, |mapper| {
         let steps = clip.stereo().map(|frame| mapper.step(&frame, &Serial).expect("a good frame"));
-        steps.map(|report| format!("{} {:016x} {:016x}\n", report.frame, report.input_digest, report.digest)).collect::<String>()
+        steps.map(|report| format!("{} {:016x} {:016x}\n", report.frame, report.digests.input, report.digest)).collect::<String>()
     });
     if std::env::var_os("DYNVOX_BLESS").is_some() {
         fs::write(&path, &digests).expect("fixtures can be written");

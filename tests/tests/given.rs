@@ -48,7 +48,7 @@ fn disparities_wider_than_the_image_are_refused_and_counted() {
 #[test]
 fn what_is_given_is_part_of_the_inputs_digest_and_motion_goes_on_without_it() {
     let [a, b] = [0, 1].map(|more| reports(3, move |u, v| if (u, v) == (100, 50) { 2_000 + more } else { 2_000 }));
-    assert!(a.iter().zip(&b).all(|(a, b)| a.input_digest != b.input_digest));
+    assert!(a.iter().zip(&b).all(|(a, b)| a.digests.input != b.digests.input));
     assert!(a[2].pose == PoseOrigin::Estimated && a[2].t_world_camera.translation.z > 0.5, "the camera is followed on the images");
 }
 
@@ -84,5 +84,5 @@ fn given_poses_are_where_the_camera_is_and_change_what_the_map_holds() {
     assert_eq!(slow.iter().map(|report| report.pose).collect::<Vec<_>>(), [PoseOrigin::First, PoseOrigin::Given, PoseOrigin::Given]);
     assert_eq!(slow[2].t_world_camera.translation.vector, Vector3::new(7.0, 0.0, 1.6));
     assert!(slow.iter().all(|report| report.egomotion.is_none() && report.fused));
-    assert!(slow[2].digest != fast[2].digest && slow[2].input_digest != fast[2].input_digest);
+    assert!(slow[2].digest != fast[2].digest && slow[2].digests.input != fast[2].digests.input);
 }

@@ -213,3 +213,15 @@ fn cuts_exactly_the_bytes_it_names() {
     Estimator::carve(&CAPACITY, &mut carver).unwrap();
     assert_eq!(carver.footprint().bytes(), BYTES);
 }
+
+impl Egomotion {
+    /// Flips a bit of a component of the pose: x, y, z, w of the rotation, x, y, z of the translation.
+    pub(crate) fn flip(&mut self, component: usize, bit: u32) {
+        let pose = self.pose_mut();
+        let number = match component {
+            0..4 => &mut pose.rotation.as_mut_unchecked().coords[component],
+            _ => &mut pose.translation.vector[component - 4],
+        };
+        *number = f64::from_bits(number.to_bits() ^ 1 << bit);
+    }
+}

@@ -2,6 +2,7 @@
 
 use super::{EgomotionConfig, Estimator, MotionEstimate};
 use crate::{
+    digest::Digest,
     geometry::{StereoRig, Transform, renormalised},
     random::Random,
     scene_flow::Match,
@@ -59,6 +60,27 @@ impl Egomotion {
         self.t_current_previous = renormalised(&(t_world_camera.inverse() * self.t_world_camera));
         self.t_world_camera = renormalised(t_world_camera);
         self.held = 0;
+    }
+
+    #[cfg(test)]
+    pub(super) fn pose_mut(&mut self) -> &mut Transform {
+        &mut self.t_world_camera
+    }
+
+    /// Digest of the pose, of the motion that will be gone by, and of this frame's estimate, where there is one.
+    pub fn digest(&self, estimate: Option<&MotionEstimate>) -> u64 {
+        let mut digest = Digest::default();
+        for transform in [&self.t_world_camera, &self.t_current_previous] {
+            let (turn, shift) = (transform.rotation.coords, transform.translation.vector);
+            turn.iter().chain(shift.iter()).for_each(|&value| digest.f64(value));
+        }
+        digest.u64(u64::from(self.held));
+        if let Some(estimate) = estimate {
+            let counts = [estimate.status as u32, estimate.matches, estimate.inliers, estimate.samples, estimate.steps];
+            counts.iter().for_each(|&count| digest.u64(u64::from(count)));
+            digest.f64(estimate.residual_rms_px);
+        }
+        digest.finish()
     }
 
     /// Maps camera coordinates to world coordinates, which are the first camera's.

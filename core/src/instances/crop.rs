@@ -7,6 +7,7 @@
 
 use super::{MaskPlace, MaskStore, PixelBox};
 use crate::{
+    digest::Digest,
     geometry::StereoRig,
     image::View,
     memory::{Capacity, Carver, SlabError, region_bytes},
@@ -208,6 +209,14 @@ impl<'s> Crops<'s> {
         };
         let grey = View::new(self.grey.get(room.clone())?, width, height)?;
         Some((self.disparity_q8.get(room)?, Picture { grey, colour }))
+    }
+
+    /// Takes which crops wait, and from where they were taken, into a digest.
+    pub fn enter(&self, digest: &mut Digest) {
+        for crop in self.entries.iter().take(self.len) {
+            crop.t_world_camera.iter().chain(&crop.t_world_object).for_each(|&number| digest.f64(number));
+            digest.u64(u64::from(crop.id) << 32 | u64::from(crop.len));
+        }
     }
 
     /// Crops waiting.

@@ -1,24 +1,22 @@
-//! Digest of tracks and objects.
+//! Digests of tracks and objects.
 
-use super::Instances;
-use crate::digest::Digest;
+use super::{Instances, Object};
+use crate::{digest::Digest, stage_digests::ObjectDigests};
 
-impl<'s> Instances<'s> {
-    /// Digest of all that later frames depend on: tracks by age, objects by position.
-    pub fn digest(&self) -> u64 {
+impl Instances<'_> {
+    /// Digest of the tracks by age, their masks, and what of them waits to be fused.
+    pub fn tracks_digest(&self) -> u64 {
         let mut digest = Digest::default();
         for track in self.tracks.all() {
-            let numbers = [track.id, track.class, track.first_frame, track.last_frame, track.chain, track.chains, track.inliers];
-            numbers.iter().for_each(|&number| digest.u64(u64::from(number)));
-            digest.u64(track.judgement.state() as u64);
-            track.t_world_object.iter().for_each(|&number| digest.f64(number));
-            track.filter.rate().iter().for_each(|&number| digest.f64(number));
-            digest.u64(self.masks_now().area(&track.place) as u64);
+            track.enter(&mut digest);
+            self.masks_now().enter(&track.place, &mut digest);
         }
-        for object in &self.objects.objects {
-            digest.u64(object.summary.map_or(0, |summary| u64::from(summary.id) << 32 | u64::from(summary.frames)));
-            digest.u64(object.volume.digest());
-        }
+        self.crops.enter(&mut digest);
         digest.finish()
+    }
+
+    /// Digests of the objects.
+    pub fn object_digests(&self) -> ObjectDigests {
+        ObjectDigests::of(self.objects.objects.iter().filter_map(Object::digest))
     }
 }

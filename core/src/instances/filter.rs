@@ -11,6 +11,7 @@
 //! `independent_matches` count.
 
 use super::config::MotionConfig;
+use crate::digest::Digest;
 use crate::geometry::{StereoRig, Transform, exp};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
@@ -45,14 +46,15 @@ pub(super) struct Filter {
 }
 
 impl Filter {
+    /// Takes all of it into a digest.
+    pub fn enter(&self, digest: &mut Digest) {
+        self.rate.iter().chain(self.covariance.as_flattened()).chain(&self.center_world).for_each(|&number| digest.f64(number));
+        digest.u64(u64::from(self.frames) << 32 | u64::from(self.contradictions));
+    }
+
     /// Whether a motion has ever been seen.
     pub fn is_known(&self) -> bool {
         self.frames > 0
-    }
-
-    /// Turning (rad/s), then velocity (m/s).
-    pub fn rate(&self) -> [f64; 6] {
-        self.rate
     }
 
     fn turn(&self) -> Vector3<f64> {

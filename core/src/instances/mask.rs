@@ -3,6 +3,7 @@
 //!
 //! Memory: 8 bytes for each 64 columns a row of a box touches, out of one bounded buffer.
 
+use crate::digest::Digest;
 use bytemuck::{Pod, Zeroable};
 
 /// Pixels in a word.
@@ -199,6 +200,13 @@ impl<'s> MaskStore<'s> {
         let (word, shift) = (from.div_euclid(WORD), from.rem_euclid(WORD) as u32);
         let at = |word: i32| usize::try_from(word).ok().and_then(|word| row.get(word)).copied().unwrap_or(0);
         if shift == 0 { at(word) } else { at(word) >> shift | at(word + 1) << (64 - shift) }
+    }
+
+    /// Takes a mask, its box and its bits, into a digest.
+    pub fn enter(&self, place: &MaskPlace, digest: &mut Digest) {
+        let PixelBox { left, top, width, height } = place.pixels;
+        [left, top, width, height].iter().for_each(|&side| digest.u64(side as u64));
+        (top..top + height).flat_map(|v| self.row(place, v)).for_each(|&word| digest.u64(word));
     }
 
     /// Pixels in the mask.

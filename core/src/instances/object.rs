@@ -19,8 +19,10 @@
 
 use super::{Class, ObjectVolumeConfig, State};
 use crate::{
+    digest::Digest,
     geometry::Transform,
     memory::{Capacity, Carver, SlabError, region_bytes},
+    stage_digests::ObjectDigest,
     volume::Volume,
 };
 use heapless::Vec;
@@ -104,6 +106,18 @@ impl<'s> Object<'s> {
     /// What is known of it; `None` while the volume waits for an object.
     pub fn summary(&self) -> Option<&ObjectSummary> {
         self.summary.as_ref()
+    }
+
+    /// Digest of what is known of it and of its map; `None` while the volume waits for an object.
+    pub fn digest(&self) -> Option<ObjectDigest> {
+        let summary = self.summary.as_ref()?;
+        let mut digest = Digest::default();
+        let numbers = [summary.chain, summary.class.code(), summary.state as u32, summary.first_frame, summary.last_frame, summary.frames];
+        numbers.iter().for_each(|&number| digest.u64(u64::from(number)));
+        let (turn, shift) = (summary.t_world_object.rotation.coords, summary.t_world_object.translation.vector);
+        turn.iter().chain(shift.iter()).for_each(|&value| digest.f64(value));
+        digest.u64(self.volume.digest());
+        Some(ObjectDigest { id: summary.id, digest: digest.finish() })
     }
 
     pub(super) fn retire(&mut self, config: &ObjectVolumeConfig, reason: Retirement, sink: &mut impl ObjectSink) -> bool {

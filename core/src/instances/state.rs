@@ -15,6 +15,7 @@
 //! A frame in which the thing is not seen is a frame without a motion.
 
 use super::config::StateConfig;
+use crate::digest::Digest;
 use bytemuck::{Pod, Zeroable};
 
 /// What is known about a thing's motion.
@@ -90,6 +91,11 @@ pub(super) struct Judgement {
 impl Judgement {
     pub fn state(&self) -> State {
         State::from_code(self.state)
+    }
+
+    /// Takes all of it into a digest.
+    pub fn enter(&self, digest: &mut Digest) {
+        [self.state, self.vote, self.streak, self.since_motion].iter().for_each(|&number| digest.u64(u64::from(number)));
     }
 
     /// Takes in a frame, seen or not, with a motion or without. Returns the new state.

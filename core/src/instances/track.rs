@@ -11,6 +11,7 @@
 //! Memory: [`Track`] a track and 4 bytes for each pair.
 
 use super::{Class, InstancesConfig, MaskPlace, MaskStore, config::Overlap, detection::Taken, filter::Filter, state::Judgement};
+use crate::digest::Digest;
 use crate::memory::{Capacity, Carver, SlabError, region_bytes};
 use bytemuck::{Pod, Zeroable};
 
@@ -57,6 +58,17 @@ pub(super) struct Track {
 impl Track {
     pub fn class(&self) -> Class {
         Class::from_code(self.class)
+    }
+
+    /// Takes all of it but the place of its mask into a digest.
+    pub fn enter(&self, digest: &mut Digest) {
+        self.filter.enter(digest);
+        self.t_world_object.iter().chain(&self.t_world_origin).for_each(|&number| digest.f64(number));
+        self.drift.iter().for_each(|&px| digest.u64(px as u64));
+        self.judgement.enter(digest);
+        let numbers = [self.id, self.class, self.class_lead, self.score.to_bits(), self.first_frame, self.last_frame, self.sightings];
+        let counts = [self.detection, self.chain, self.chains, self.matches, self.inliers, self.measured, self.sigma_m_s.to_bits()];
+        numbers.iter().chain(&counts).for_each(|&number| digest.u64(u64::from(number)));
     }
 
     /// Majority by counting (Boyer, Moore): the class that leads holds until others were seen more often.

@@ -13,6 +13,7 @@ use super::{
     support::{Motion, support},
 };
 use crate::{
+    digest::Digest,
     executor::{Executor, join4},
     image::View,
     memory::{Capacity, Carver, SlabError, region_bytes},
@@ -129,6 +130,24 @@ impl<'s> FlowMatcher<'s> {
     /// The matches selected for egomotion.
     pub fn bucketed(&self) -> impl Iterator<Item = &Match> + Clone {
         self.selection().iter().filter_map(|&index| self.refined().get(index as usize))
+    }
+
+    #[cfg(test)]
+    pub(super) fn refined_mut(&mut self, at: usize) -> &mut Match {
+        &mut self.refined[at]
+    }
+
+    /// Digest of the last frame's matches: sparse, refined and selected.
+    pub fn digest(&self) -> u64 {
+        let mut digest = Digest::default();
+        for matches in [self.sparse(), self.refined()] {
+            digest.u64(matches.len() as u64);
+            for m in matches {
+                [m.previous_left, m.previous_right, m.current_left, m.current_right].iter().for_each(|&at| digest.f32s(at));
+            }
+        }
+        self.selection().iter().for_each(|&index| digest.u64(u64::from(index)));
+        digest.finish()
     }
 
     /// Forgets the last frame: the next one is a first one.

@@ -312,3 +312,11 @@ fn bins_look_where_their_matches_went_and_empty_ones_where_their_neighbours_did(
     prior.learn(std::iter::empty(), WIDTH, HEIGHT, &config);
     assert_eq!(prior.reach([60, 60]), Some(Reach::widest(&config)));
 }
+
+impl FlowMatcher<'_> {
+    /// Flips a bit of one of the eight coordinates of a refined match.
+    pub(crate) fn flip(&mut self, at: usize, coordinate: usize, bit: u32) {
+        let numbers: &mut [u32; 8] = bytemuck::cast_mut(self.refined_mut(at));
+        numbers[coordinate] ^= 1 << bit;
+    }
+}

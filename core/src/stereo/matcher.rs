@@ -18,6 +18,7 @@ use super::{
 };
 use crate::{
     config::Problems,
+    digest::Digest,
     executor::Executor,
     image::{DISPARITY_ONE_PX, View},
     memory::{Capacity, Carver, SlabError, region_bytes},
@@ -109,6 +110,18 @@ impl<'s> StereoMatcher<'s> {
             width: 1,
             height: 1,
         })
+    }
+
+    #[cfg(test)]
+    pub(super) fn result_mut(&mut self) -> &mut [u16] {
+        self.disparity
+    }
+
+    /// Digest of the last pair's disparities.
+    pub fn digest(&self) -> u64 {
+        let mut digest = Digest::default();
+        self.disparity_q8().rows().for_each(|row| digest.u16s(row));
+        digest.finish()
     }
 
     /// Disparities of the left image, of the last pair given to [`StereoMatcher::compute`]: 1/256 px, 0 = none, exactly as large as the

@@ -1,16 +1,13 @@
 //! `frames.csv`: one row a frame.
 
 use crate::harness::FrameRow;
-use dynvox_core::Stage;
 use dynvox_core::instances::State;
+use dynvox_core::{Digested, Stage};
 use std::io::{self, Write};
 
 /// Writes the table. Empty cells are values the machine cannot give.
 pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
-    write!(
-        out,
-        "frame,time_s,digest,input_digest,step_ms,severity,motion,matches,inliers,residual_px,features_dropped,stereo_density,depth_refused"
-    )?;
+    write!(out, "frame,time_s,digest,step_ms,severity,motion,matches,inliers,residual_px,features_dropped,stereo_density,depth_refused")?;
     write!(out, ",blocks_used,blocks_peak,blocks_visible,blocks_made,blocks_refused,blocks_out,blocks_lost,blocks_empty,blocks_back")?;
     write!(out, ",prune_visited,prune_voxels_reset,prune_blocks_freed,prune_carried_over,prune_early,history_frames,rss_bytes")?;
     write!(
@@ -20,12 +17,15 @@ pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
     for stage in Stage::ALL {
         write!(out, ",{0}_ms,{0}_cpu_ms", stage.name())?;
     }
+    for column in Digested::COLUMNS {
+        write!(out, ",{column}_digest")?;
+    }
     writeln!(out)?;
     for row in rows {
         let report = &row.report;
         let (matches, inliers, residual_px) = row.matches();
         let (blocks, allocation, eviction, prune) = (&report.blocks, &report.allocation, &report.allocation.eviction, &report.prune);
-        write!(out, "{},{:?},{:016x},{:016x},{:.4}", row.frame, row.time_s, report.digest, report.input_digest, row.step_ms)?;
+        write!(out, "{},{:?},{:016x},{:.4}", row.frame, row.time_s, report.digest, row.step_ms)?;
         write!(out, ",{},{},{matches},{inliers},{residual_px:.4}", report.severity().name(), row.motion())?;
         write!(out, ",{},{:.4},{}", report.dropped_features(), report.stereo.density(), row.depth_refused)?;
         write!(out, ",{},{},{},{}", blocks.used, blocks.peak, blocks.visible, allocation.made)?;
@@ -41,6 +41,7 @@ pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
         for time in &row.stages {
             write!(out, ",{:.4},{:.4}", time.wall_ms, time.cpu_ms)?;
         }
+        write!(out, ",{}", report.digests.to_string().replace(' ', ","))?;
         writeln!(out)?;
     }
     Ok(())

@@ -11,7 +11,7 @@ fn admitted(config: &InstancesConfig, size: [usize; 2], detections: &[Detection<
     with(&capacity, config, |instances, _| {
         instances.admit(0, detections, size);
         let scores = instances.detections.all().iter().map(|taken| taken.score).collect();
-        (instances.report.detections, scores, instances.digest())
+        (instances.report.detections, scores, instances.tracks_digest())
     })
 }
 

@@ -169,3 +169,19 @@ pub(super) fn detection<'a>(class: Class, score: f32, pixels: &PixelBox, mask: &
 pub(super) fn any_size() -> InstancesConfig {
     InstancesConfig { area_min_px: 0, ..InstancesConfig::default() }
 }
+
+impl Instances<'_> {
+    /// Flips a bit of a voxel of the first object with a volume; its id.
+    pub(crate) fn flip_voxel(&mut self, voxel: usize, bit: u32) -> Option<u32> {
+        let object = self.objects.objects.iter_mut().find(|object| object.summary.is_some())?;
+        let slot = (0..).find(|&slot| object.volume.pool().handle(slot).is_some())?;
+        object.volume.flip(slot, voxel, bit);
+        object.summary.map(|summary| summary.id)
+    }
+
+    /// Flips the lowest bit of where a track's object lies.
+    pub(crate) fn flip_track(&mut self, at: usize) {
+        let number = &mut self.tracks.all_mut()[at].t_world_object[4];
+        *number = f64::from_bits(number.to_bits() ^ 1);
+    }
+}

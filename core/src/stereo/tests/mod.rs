@@ -50,3 +50,10 @@ pub(super) fn disparity<E: Executor>(config: &StereoConfig, left: &Grey, right: 
         (report, view.rows().flatten().copied().collect())
     })
 }
+
+impl StereoMatcher<'_> {
+    /// Flips a bit of a pixel's disparity.
+    pub(crate) fn flip(&mut self, pixel: usize, bit: u32) {
+        self.result_mut()[pixel] ^= 1 << bit;
+    }
+}

@@ -1,0 +1,109 @@
+//! One bit of one thing changes: the digest changes, and the first difference names the stage that the thing belongs to.
+
+use super::*;
+use crate::stage_digests::Digested;
+
+/// Frames after which the car has a volume.
+const FRAMES: usize = 7;
+
+/// Changes something after the last frame, and says which stage its digests say it was.
+fn named(change: impl Fn(&mut Mapper<'_>)) -> Option<Digested> {
+    let walk = Walk::new(FRAMES);
+    with_mapper(&walk, FRAMES, |mapper, reports| named_by(&walk, mapper, reports, change))
+}
+
+fn named_by(walk: &Walk, mapper: &mut Mapper<'_>, reports: &[Report], change: impl Fn(&mut Mapper<'_>)) -> Option<Digested> {
+    let last = reports.last().unwrap();
+    let digests = |mapper: &Mapper<'_>| walk.with_frame(FRAMES - 1, |frame| mapper.digests(frame, last.egomotion.as_ref()));
+    assert_eq!(digests(mapper), last.digests, "nothing changes by itself");
+    change(mapper);
+    let after = digests(mapper);
+    let named = last.digests.first_difference(&after);
+    if named != Some(Digested::Input) {
+        assert_eq!(named.is_some(), last.digests.whole(last.frame) != after.whole(last.frame));
+    }
+    named
+}
+
+#[test]
+fn a_bit_of_a_voxel_of_the_background() {
+    let walk = Walk::new(FRAMES);
+    with_mapper(&walk, FRAMES, |mapper, reports| {
+        let slot = mapper.background.visible().slots()[0];
+        for bit in 0..24 {
+            for voxel in [0, 77, 511] {
+                let flip = |mapper: &mut Mapper<'_>| mapper.background.flip(slot, voxel, bit);
+                assert_eq!(named_by(&walk, mapper, reports, flip), Some(Digested::Background), "voxel {voxel}, bit {bit}");
+                flip(mapper);
+            }
+        }
+    });
+}
+
+#[test]
+fn a_bit_of_a_voxel_of_an_object() {
+    assert_eq!(named(|mapper| assert_eq!(mapper.instances.flip_voxel(100, 3), Some(1))), Some(Digested::Object(1)));
+}
+
+#[test]
+fn a_bit_of_a_match() {
+    let walk = Walk::new(FRAMES);
+    with_mapper(&walk, FRAMES, |mapper, reports| {
+        let last = mapper.scene_flow.refined().len() - 1;
+        for (at, coordinate, bit) in (0..8).flat_map(|coordinate| [(0, coordinate, 0), (last, coordinate, 12)]) {
+            let flip = |mapper: &mut Mapper<'_>| mapper.scene_flow.flip(at, coordinate, bit);
+            assert_eq!(named_by(&walk, mapper, reports, flip), Some(Digested::Matches), "match {at}, coordinate {coordinate}");
+            flip(mapper);
+        }
+    });
+}
+
+#[test]
+fn a_bit_of_a_component_of_the_pose() {
+    for component in 0..7 {
+        assert_eq!(named(|mapper| mapper.camera.flip(component, 0)), Some(Digested::Egomotion), "component {component}");
+    }
+}
+
+#[test]
+fn a_bit_of_a_disparity_and_of_a_track() {
+    assert_eq!(named(|mapper| mapper.stereo.flip(WIDTH * 80 + 133, 0)), Some(Digested::Disparity));
+    assert_eq!(named(|mapper| mapper.instances.flip_track(0)), Some(Digested::Tracks));
+}
+
+#[test]
+fn a_bit_of_a_pixel_is_seen_as_input_and_a_detection_as_well() {
+    let walk = Walk::new(2);
+    let clean = with_mapper(&walk, 2, |_, reports| reports[1]);
+    for camera in 0..2 {
+        let mut dirty = Walk::new(2);
+        dirty.pairs[1][camera][WIDTH * 90 + 200] ^= 1;
+        let report = with_mapper(&dirty, 2, |_, reports| reports[1]);
+        assert_eq!(clean.digests.first_difference(&report.digests), Some(Digested::Input));
+    }
+    let mut dirty = Walk::new(2);
+    dirty.mask[100] = 0;
+    let report = with_mapper(&dirty, 2, |_, reports| reports[1]);
+    assert_eq!(clean.digests.first_difference(&report.digests), Some(Digested::Input));
+}
+
+#[test]
+fn what_changes_in_memory_between_two_frames_is_named_in_the_next_one() {
+    let walk = Walk::new(FRAMES + 1);
+    let next = |change: &dyn Fn(&mut Mapper<'_>)| {
+        with_mapper(&walk, FRAMES, |mapper, _| {
+            change(mapper);
+            walk.step(FRAMES, mapper).digests
+        })
+    };
+    let clean = next(&|_| {});
+    let named = |change: &dyn Fn(&mut Mapper<'_>)| clean.first_difference(&next(change));
+    assert_eq!(named(&|_| {}), None);
+    assert_eq!(named(&|mapper| mapper.camera.flip(6, 30)), Some(Digested::Egomotion));
+    let raw = |mapper: &mut Mapper<'_>| {
+        let slot = mapper.background.visible().slots()[0];
+        mapper.background.flip_behind_its_back(slot, 200, 23);
+    };
+    assert_eq!(named(&raw), Some(Digested::Background));
+    assert_eq!(named(&|mapper| mapper.instances.flip_track(0)), Some(Digested::Tracks));
+}
