@@ -242,3 +242,45 @@ fn a_written_street_is_mapped_as_a_kitti_folder() {
     let refused = dynvox(root.path(), &["synth", "--out", "x", "--set", "street.width=1"]);
     assert!(!refused.status.success() && said(&refused).contains("width") && !root.path().join("x").exists(), "{}", said(&refused));
 }
+
+#[test]
+fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked() {
+    let root = TempDir::new().unwrap();
+    let small = ["--set", "street.width=320", "--set", "street.height=96"];
+    assert!(dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "4"], &small[..]].concat()).status.success());
+    let run = |args: &[&str]| dynvox(root.path(), &[&["run", "--profile", "small", "--json"], args].concat());
+    let figures = |output: &Output| {
+        assert!(output.status.success(), "{}", said(output));
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["lidar"].clone()
+    };
+    let from_disk = figures(&run(&["street", "--images", "colour", "--evaluate", "lidar", "--out", "a"]));
+    let from_memory = figures(&run(&[&small[..], &["--set", "street.frames=4", "--evaluate", "lidar", "--out", "b"]].concat()));
+    for (source, key) in [("input", "accuracy"), ("input", "completeness"), ("fused", "f1"), ("fused", "points")] {
+        let of = |figures: &serde_json::Value| figures["static"][source][key].as_f64().unwrap();
+        assert!((of(&from_disk) / of(&from_memory) - 1.0).abs() < 1e-3, "{source} {key}: {from_disk} {from_memory}");
+    }
+    assert_eq!((&from_disk["frames"], &from_disk["source"]), (&4.into(), &"lidar".into()));
+    let table = fs::read_to_string(root.path().join("a/lidar.csv")).unwrap();
+    let columns: Vec<usize> = table.lines().map(|line| line.split(',').count()).collect();
+    assert_eq!(columns, [10 + 14 * 4; 1 + 4 * 3]);
+    let report = fs::read_to_string(root.path().join("a/report.html")).unwrap();
+    assert!(report.contains("Against LiDAR") && report.contains("map against LiDAR"));
+    // Exact depth is denser, and only the street has it; two frames later the first two are judged.
+    let settings = [&small[..], &["--set", "street.frames=4", "--evaluate", "exact", "--evaluation-delay", "2", "--out", "c"]].concat();
+    let exact = figures(&run(&settings));
+    assert_eq!((&exact["frames"], &exact["delay_frames"]), (&2.into(), &2.into()));
+    let points = |figures: &serde_json::Value| figures["static"]["fused"]["points"].as_u64().unwrap() / figures["frames"].as_u64().unwrap();
+    assert!(points(&exact) > points(&from_disk), "{exact} {from_disk}");
+    let refused = run(&["street", "--evaluate", "exact", "--out", "d"]);
+    assert!(said(&refused).contains("only the synthetic street has exact depth"), "{}", said(&refused));
+    let refused = run(&["street", "--evaluate", "lidar", "--evaluation-delay", "9", "--out", "d"]);
+    assert!(said(&refused).contains("--evaluation-delay 9 is beyond the last"), "{}", said(&refused));
+    // A broken scan is nobody's business who does not ask for it.
+    fs::write(root.path().join("street/sequences/00/velodyne/000001.bin"), [0; 17]).unwrap();
+    assert!(run(&["street", "--images", "colour", "--out", "e"]).status.success());
+    let refused = run(&["street", "--images", "colour", "--evaluate", "lidar", "--out", "f"]);
+    assert!(said(&refused).contains("000001.bin") && said(&refused).contains("whole number of points"), "{}", said(&refused));
+    rig(root.path(), 2);
+    let refused = run(&["rig", "--evaluate", "lidar", "--out", "g"]);
+    assert!(said(&refused).contains("velodyne/") && !root.path().join("g").exists(), "{}", said(&refused));
+}

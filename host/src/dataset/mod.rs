@@ -135,15 +135,11 @@ pub trait Dataset: Send + Sync {
         self.masks() == Masks::Exact
     }
 
-    /// Whether there is a LiDAR scan for a frame.
-    fn has_lidar(&self, _: usize) -> bool {
-        false
-    }
+    /// Whether there is a LiDAR scan for a frame. Without a default, so that no data set laid over another loses its scans.
+    fn has_lidar(&self, index: usize) -> bool;
 
     /// The scan of a frame, where there is one. Nothing is read of it before.
-    fn lidar(&self, _: usize) -> Result<Option<LidarScan>, DatasetError> {
-        Ok(None)
-    }
+    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, DatasetError>;
 
     /// True `t_world_camera` of every frame's left camera, where known.
     fn truth(&self) -> Option<&[Transform]> {

@@ -1,7 +1,7 @@
 //! Choosing a source and laying it over a data set.
 
 use super::{GivenDepth, Meaning, convert::to_disparity, opencv, other_size, pfm, unusable};
-use crate::dataset::{Dataset, DatasetError, Image, Masks, StereoImages, read_png_deep};
+use crate::dataset::{Dataset, DatasetError, Image, LidarScan, Masks, StereoImages, read_png_deep};
 use dynvox_core::geometry::{StereoRig, Transform};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -193,6 +193,14 @@ impl Dataset for WithDepth {
         let mut images = self.dataset.frame(index)?;
         images.depth = self.depth(index, &images)?;
         Ok(images)
+    }
+
+    fn has_lidar(&self, index: usize) -> bool {
+        self.dataset.has_lidar(index)
+    }
+
+    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, DatasetError> {
+        self.dataset.lidar(index)
     }
 
     fn truth(&self) -> Option<&[Transform]> {

@@ -1,0 +1,100 @@
+//! A map made of exact depth and poses passes the evaluation; one that is off by a known disparity loses what it must.
+#![allow(missing_docs)]
+
+use dynvox::dataset::{Image, LidarScan};
+use dynvox::evaluation::lidar::{Aim, Awaited, EvaluatedFrame, Field, Layer, LidarFigures, Rule, aim, aim_at_exact};
+use dynvox::synth::{Street, StreetConfig, SynthFrame};
+use dynvox_core::image::{DISPARITY_ONE_PX, View};
+use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame};
+use dynvox_tests::HeapSlab;
+
+const FRAMES: u32 = 6;
+
+fn street() -> Street {
+    Street::new(StreetConfig { width: 640, height: 192, frames: FRAMES, ..StreetConfig::static_street() }).unwrap()
+}
+
+fn field(config: &Config) -> Field {
+    Field {
+        width: 640,
+        height: 192,
+        near_m: config.volume.near_m.into(),
+        far_m: config.volume.far_m.into(),
+    }
+}
+
+/// The exact disparity in 1/256 px.
+fn disparity_q8(street: &Street, frame: &SynthFrame) -> Vec<u16> {
+    let scale = street.rig().focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX);
+    frame.depth_m.iter().map(|&depth_m| if depth_m > 0.0 { (scale / f64::from(depth_m)).round() as u16 } else { 0 }).collect()
+}
+
+fn scan(street: &Street, index: u32) -> LidarScan {
+    let t_camera_lidar = street.t_camera_lidar();
+    let point = |&[x, y, z, _]: &[f32; 4]| (t_camera_lidar * nalgebra::Point3::new(x, y, z).cast::<f64>()).coords.into();
+    LidarScan::of_rig(street.lidar(index).iter().map(point).collect(), &street.rig())
+}
+
+#[test]
+fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
+    let street = street();
+    // Nothing is masked: parked cars are street.
+    let config = Config::for_rig(street.rig());
+    let capacity = Capacity::DESKTOP;
+    let mut slab = HeapSlab::of(&capacity);
+    let mut mapper = Mapper::new(&capacity, &config, slab.bytes()).unwrap();
+    let (mut by_scan, mut by_pixel, mut shifted) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut near, mut judged) = (0u32, 0u32);
+    for index in 0..FRAMES {
+        let frame = street.frame(index);
+        let exact_q8 = disparity_q8(&street, &frame);
+        let view = |pixels| View::new(pixels, 640, 192).unwrap();
+        let stereo = StereoFrame {
+            left: view(&frame.left_grey),
+            right: view(&frame.right_grey),
+            colour: None,
+            class: None,
+            disparity_q8: View::new(&exact_q8, 640, 192),
+            t_world_camera: Some(frame.t_world_camera),
+            detections: &[],
+        };
+        mapper.step(&stereo, &Serial).unwrap();
+        let bf = street.rig().focal_baseline_px_m();
+        let exact = Image::new(640, 192, frame.depth_m.clone()).unwrap();
+        let mut aims = [aim(&scan(&street, index), &field(&config)), aim_at_exact(&exact, &street.rig(), &field(&config))];
+        // The sensor stands above and behind the camera and sees past edges: what it sees there is hidden from the camera, and no map can show it.
+        let all = aims[0].targets.len();
+        let bare = |u: u16, v: u16| f32::from(exact_q8[usize::from(v) * 640 + usize::from(u)]) / f32::from(DISPARITY_ONE_PX);
+        aims[0].targets.retain(|target| !Rule::KITTI.is_error(bare(target.u, target.v), target.disparity_px));
+        assert!(aims[0].targets.len() as f64 > 0.97 * all as f64, "{} of {all}", aims[0].targets.len());
+        let map = mapper.raycast(&frame.t_world_camera, &Serial).unwrap().depth_m().unwrap();
+        let input = |u: usize, v: usize| f32::from(exact_q8[v * 640 + u]) / f32::from(DISPARITY_ONE_PX);
+        let judge = |aim: &Aim, map: &View<'_, f32>| -> EvaluatedFrame {
+            Awaited::settle(index as usize, frame.t_world_camera, aim, input, |_, _| Layer::Static).compare(map, bf).0
+        };
+        by_scan.push(judge(&aims[0], &map));
+        by_pixel.push(judge(&aims[1], &map));
+        // A map whose every surface is 4 px off: wrong wherever 4 px are more than 5 %.
+        let off: Vec<f32> =
+            frame.depth_m.iter().map(|&depth_m| if depth_m > 0.0 { (bf / (bf / f64::from(depth_m) + 4.0)) as f32 } else { 0.0 }).collect();
+        let off = judge(&aims[1], &view_f32(&off));
+        let large = aims[1].targets.iter().filter(|target| 4.0 <= Rule::KITTI.share * target.disparity_px).count() as u32;
+        assert_eq!(off.layers[0].sources[1].errors[0], off.layers[0].total - large, "frame {index}");
+        (near, judged) = (near + large, judged + off.layers[0].total);
+        shifted.push(off);
+    }
+    assert!(near > 0 && near < judged, "the scene must have both: {near} of {judged}");
+    for (name, frames) in [("scan", &by_scan), ("pixels", &by_pixel)] {
+        let fused = LidarFigures::of("exact", 0, frames).unwrap().still.fused;
+        assert!(fused.points > 10_000);
+        assert!(fused.accuracy.unwrap() > 0.99 && fused.completeness.unwrap() > 0.99, "{name}: {fused:?}");
+    }
+    let fused = LidarFigures::of("exact", 0, &shifted).unwrap().still.fused;
+    assert_eq!(fused.completeness, Some(1.0));
+    let kept = shifted.iter().map(|frame| frame.layers[0].accuracy(1, 0).unwrap()).sum::<f64>() / f64::from(FRAMES);
+    assert!((fused.accuracy.unwrap() - kept).abs() < 1e-12 && kept < 0.5, "{kept}");
+}
+
+fn view_f32(pixels: &[f32]) -> View<'_, f32> {
+    View::new(pixels, 640, 192).unwrap()
+}
