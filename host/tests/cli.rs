@@ -284,3 +284,31 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
     let refused = run(&["rig", "--evaluate", "lidar", "--out", "g"]);
     assert!(said(&refused).contains("velodyne/") && !root.path().join("g").exists(), "{}", said(&refused));
 }
+
+#[test]
+fn what_moves_is_kept_apart_unless_no_masks_are_taken_or_all_goes_into_one_map() {
+    let root = TempDir::new().unwrap();
+    let street =
+        ["--set", "street.width=480", "--set", "street.height=144", "--set", "street.frames=16", "--set", "volume.voxel_size_m=0.1"];
+    let run = |out: &str, more: &[&str]| -> (serde_json::Value, Vec<String>) {
+        let run = dynvox(root.path(), &[&["run", "--profile", "small", "--json", "--out", out], &street[..], more].concat());
+        assert!(run.status.success(), "{}", said(&run));
+        let tracks = fs::read_to_string(root.path().join(out).join("tracks.csv")).unwrap();
+        (serde_json::from_slice(&run.stdout).unwrap(), tracks.lines().skip(1).map(ToOwned::to_owned).collect())
+    };
+    let (with, tracks) = run("with", &["--keep-blocks"]);
+    let objects = names(&root.path().join("with/objects"));
+    let (meshes, paths): (Vec<&String>, Vec<&String>) = objects.iter().partition(|name| name.ends_with(".ply"));
+    assert!(!tracks.is_empty() && !meshes.is_empty(), "{with}");
+    assert_eq!(meshes.len(), paths.len(), "each mesh comes with its trajectory: {objects:?}");
+    for name in paths {
+        let path = fs::read_to_string(root.path().join("with/objects").join(name)).unwrap();
+        assert!(!path.is_empty() && path.lines().all(|line| line.split(' ').count() == 13), "{name}: a frame and twelve numbers a line");
+    }
+    for (out, option) in [("none", ["--instances", "none"]), ("off", ["--dynamic", "off"])] {
+        let (without, tracks) = run(out, &option);
+        assert_eq!((tracks.len(), without["objects"].as_array().map(Vec::len)), (0, Some(0)), "{out}");
+        assert!(!names(&root.path().join(out)).contains(&"objects".to_owned()));
+        assert!(without["map"]["triangles"].as_u64() > with["map"]["triangles"].as_u64(), "{out}: cars are part of the one map");
+    }
+}

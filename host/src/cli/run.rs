@@ -268,7 +268,7 @@ fn conclude(run: &RunRecord, place: &Path) {
 /// Why blocks are lost, and what to do.
 fn lost_because(run: &RunRecord) -> String {
     match &run.shelf_failure {
-        Some(failure) => format!("map.blocks took no more ({failure}). Free the disk"),
+        Some(failure) => format!("map.blocks took no more ({failure}). Free the disk, or raise --stream-mib"),
         None if run.streaming => "map.blocks could not be read back whole. Look after the disk".to_owned(),
         None => "the pool was full. Run without --no-stream, or choose a larger --profile".to_owned(),
     }

@@ -4,6 +4,7 @@
 
 use crate::dataset::TrueObject;
 use dynvox_core::geometry::Transform;
+use hashbrown::HashMap;
 use nalgebra::Point3;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
@@ -13,11 +14,35 @@ const FOOT_M: f64 = 0.3;
 /// How far its sides lie inside, m.
 const SIDE_M: f64 = 0.1;
 
+/// Side of the squares of ground by which boxes are found, m.
+const SQUARE_M: f64 = 4.0;
+
+/// A box of one frame.
+#[derive(Debug)]
+struct SweptBox {
+    t_object_map: Transform,
+    /// Width, height, length.
+    dimensions_m: [f64; 3],
+}
+
+impl SweptBox {
+    fn contains(&self, point: &Point3<f64>) -> bool {
+        let ([width, height, length], place) = (self.dimensions_m, self.t_object_map * point);
+        place.x.abs() < 0.5 * width - SIDE_M && place.z.abs() < 0.5 * length - SIDE_M && place.y < -FOOT_M && place.y > -height
+    }
+}
+
 /// The volume moving things swept.
 #[derive(Debug, Default)]
 pub struct Swept {
-    /// Map to object, size, middle of the foot, how far the farthest corner is from it squared.
-    boxes: Vec<(Transform, [f64; 3], Point3<f64>, f64)>,
+    boxes: Vec<SweptBox>,
+    /// The boxes that may reach into each square of ground.
+    squares: HashMap<[i64; 2], Vec<u32>>,
+}
+
+/// The square of ground a place lies in.
+fn square(x_m: f64, z_m: f64) -> [i64; 2] {
+    [x_m, z_m].map(|m| (m / SQUARE_M).floor() as i64)
 }
 
 impl Swept {
@@ -25,19 +50,22 @@ impl Swept {
     pub fn add(&mut self, object: &TrueObject, t_map_world: &Transform) {
         if object.moving {
             let t_map_object = t_map_world * object.t_world_object;
-            let [width, height, length] = object.dimensions_m;
-            let reach = 0.25 * (width * width + length * length) + height * height;
-            self.boxes.push((t_map_object.inverse(), object.dimensions_m, t_map_object.translation.vector.into(), reach));
+            let ([width, height, length], foot) = (object.dimensions_m, t_map_object.translation.vector);
+            // The box may lean: no corner is farther away than this.
+            let reach = (0.25 * (width * width + length * length) + height * height).sqrt();
+            let number = self.boxes.len() as u32;
+            self.boxes.push(SweptBox { t_object_map: t_map_object.inverse(), dimensions_m: object.dimensions_m });
+            let ([left, near], [right, far]) = (square(foot.x - reach, foot.z - reach), square(foot.x + reach, foot.z + reach));
+            for x in left..=right {
+                (near..=far).for_each(|z| self.squares.entry([x, z]).or_default().push(number));
+            }
         }
     }
 
     /// Whether a point of the map lies in it.
     pub fn contains(&self, point: &Point3<f64>) -> bool {
-        let mut near = self.boxes.iter().filter(|(_, _, foot, reach)| (point - foot).norm_squared() <= *reach);
-        near.any(|(t_object_map, [width, height, length], ..)| {
-            let place = t_object_map * point;
-            place.x.abs() < 0.5 * width - SIDE_M && place.z.abs() < 0.5 * length - SIDE_M && place.y < -FOOT_M && place.y > -height
-        })
+        let near = self.squares.get(&square(point.x, point.z)).into_iter().flatten();
+        near.filter_map(|&number| self.boxes.get(number as usize)).any(|one| one.contains(point))
     }
 
     /// How many triangles of a mesh have their middle in it. The mesh is one this program wrote.

@@ -1,6 +1,7 @@
 //! Runs the core on a data set: owns the slab, feeds the frames, takes the times, watches memory, collects what the report shows.
 
 mod error;
+mod kept;
 mod lidar;
 mod objects;
 pub(crate) mod pictures;
@@ -12,10 +13,12 @@ mod run;
 mod shelf;
 mod slab;
 mod threads;
+mod tracks;
 
 pub use error::RunError;
+pub use kept::KeptObject;
 pub use lidar::{ErrorPictures, LidarRecord, Reference, evaluable};
-pub use objects::{KeptObject, ObjectsRecord, TrackRecord};
+pub use objects::ObjectsRecord;
 pub use progress::Progress;
 pub use reader::{AHEAD, read_ahead};
 pub use record::{FrameRow, Keyframe, RunRecord, StageStatistics};
@@ -24,3 +27,4 @@ pub use run::{HOST_OVERHEAD_BYTES, Plan, frame_indices, frame_interval_s, run};
 pub use shelf::{MeshOutput, Shelf, ShelfUse, Streaming};
 pub use slab::HostSlab;
 pub use threads::{StageTime, Threads};
+pub use tracks::{TrackRecord, TrackRow};

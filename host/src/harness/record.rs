@@ -1,12 +1,12 @@
 //! What is remembered of a run: a row per frame, a few pictures, the figures at the end.
 
-use super::{LidarRecord, ObjectsRecord, ShelfUse, StageTime};
+use super::{LidarRecord, ObjectsRecord, ShelfUse, StageTime, TrackRow};
 use crate::evaluation::{exact::ExactFigures, trajectory::TrajectoryErrors};
 use crate::export::Mesh;
 use crate::segmentation::Refusals;
 use dynvox_core::egomotion::MotionStatus;
 use dynvox_core::geometry::{StereoRig, Transform};
-use dynvox_core::instances::{State, TrackReport};
+use dynvox_core::instances::State;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Capacity, PoseOrigin, Report, Severity, Stage};
@@ -23,7 +23,7 @@ pub struct FrameRow {
     /// Frames in the pruning window's history.
     pub history_frames: usize,
     /// Tracks seen in this frame, by age.
-    pub tracks: Vec<TrackReport>,
+    pub tracks: Vec<TrackRow>,
     /// What the source of masks said and could not be used.
     pub refusals: Refusals,
     /// Values of a given depth image that are none: not finite, negative, or no disparity of this rig.

@@ -270,7 +270,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
 
     fn append(&mut self) -> io::Result<()> {
         if self.end + self.record.len() as u64 > self.most {
-            return Err(io::ErrorKind::QuotaExceeded.into());
+            return Err(io::Error::new(io::ErrorKind::QuotaExceeded, "it has grown as far as it may"));
         }
         self.file.seek(SeekFrom::Start(self.end))?;
         self.file.write_all(&self.record)
