@@ -1,6 +1,7 @@
 //! The command line. Errors become sentences here and nowhere else.
 
 mod budget;
+mod evaluate;
 mod inspect;
 mod run;
 mod settings;
@@ -20,6 +21,8 @@ Examples:
   dynvox run --set volume.voxel_size_m=0.1 --set street.seed=7 --out out/coarse
   dynvox run --config out/coarse/config.toml    the same again
   dynvox budget --profile small                 where the bytes of a profile go
+  dynvox run ~/kitti --sequence 06 --evaluate lidar     accuracy and completeness of input and map
+  dynvox evaluate trajectory out/kitti-odometry-06-001 ~/kitti/poses/06.txt
   dynvox synth --out street --set street.frames=50
 
 A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open the last in a browser.";
@@ -40,6 +43,8 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Show where the bytes go: all profiles, or one region by region
     Budget(budget::BudgetArgs),
+    /// Hold files against the truth: trajectories
+    Evaluate(evaluate::EvaluateArgs),
     /// Write the synthetic street in KITTI's layout, with all its truth
     Synth(synth::SynthArgs),
 }
@@ -53,6 +58,7 @@ pub fn main() -> ExitCode {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
         Some(Command::Budget(args)) => budget::run(&args),
+        Some(Command::Evaluate(args)) => evaluate::run(&args),
         Some(Command::Synth(args)) => synth::run(&args),
     };
     match done {

@@ -1,0 +1,57 @@
+//! `dynvox evaluate`: figures from files, without a run.
+
+use crate::evaluation::trajectory::{self, TrajectoryErrors, read_trajectory, together};
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct EvaluateArgs {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Hold a trajectory against the true one
+    Trajectory(TrajectoryArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct TrajectoryArgs {
+    /// Estimated poses: a file in KITTI's or TUM's format, or a run folder
+    estimate: PathBuf,
+    /// True poses, in either format; joined by time where both have times, row by row otherwise
+    truth: PathBuf,
+    /// Write the figures to standard output as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
+    match &args.what {
+        What::Trajectory(args) => trajectories(args),
+    }
+}
+
+fn trajectories(args: &TrajectoryArgs) -> anyhow::Result<()> {
+    let (estimate, truth) = together(&read_trajectory(&args.estimate)?, &read_trajectory(&args.truth)?)?;
+    let found = trajectory::errors(&truth, &estimate).ok_or_else(|| anyhow::anyhow!("two poses are needed. Give longer trajectories"))?;
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&found)?);
+        return Ok(());
+    }
+    let length_m = trajectory::travelled_m(&truth).last().copied().unwrap_or_default();
+    println!("{:<28}{} over {length_m:.1} m", "poses", truth.len());
+    tell(&found);
+    Ok(())
+}
+
+fn tell(found: &TrajectoryErrors) {
+    println!("{:<28}{:.4} m, {:.4} deg", "frame to frame, RMS", found.rpe_t_m, found.rpe_r_deg);
+    println!("{:<28}{:.4} m", "after alignment (ATE), RMS", found.ate_m);
+    for (length_m, percent, deg_per_m, pieces) in &found.per_length {
+        println!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m, {pieces} pieces", format!("pieces of {length_m} m"));
+    }
+    if let (Some(percent), Some(deg_per_m)) = (found.t_err_percent, found.r_err_deg_per_m) {
+        println!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m", "all pieces (t_err, r_err)");
+    }
+}

@@ -1,0 +1,115 @@
+//! Trajectory errors: KITTI's relative errors over sub-lengths, relative error per frame, absolute error after alignment.
+//!
+//! `E = (est_i^-1 est_j)^-1 (true_i^-1 true_j)` is the error of a piece from frame i to frame j. A piece of length L ends at the first
+//! frame whose distance travelled along the truth is at least L beyond frame i's; the errors of all pieces of all lengths are averaged
+//! (Geiger, Lenz, Urtasun, *Are we ready for autonomous driving?*, CVPR 2012: 100 to 800 m, from every tenth frame on). A path shorter than
+//! 200 m would give few pieces of few lengths: it is measured over 5 to 50 m from every frame on, and the result says so.
+
+mod align;
+mod files;
+
+pub use files::{Trajectory, TrajectoryError, read_trajectory, together};
+
+use align::aligned_error_m;
+use dynvox_core::geometry::Transform;
+use serde::Serialize;
+
+/// Sub-lengths of the benchmark, m.
+pub const LONG_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0];
+/// Sub-lengths for clips, m.
+pub const SHORT_M: [f64; 6] = [5.0, 10.0, 20.0, 30.0, 40.0, 50.0];
+
+/// Frames between two starts of the benchmark's pieces.
+const LONG_STEP: usize = 10;
+
+/// Errors of a trajectory.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrajectoryErrors {
+    /// Mean translation error of the pieces, percent of their length; `None` where the path is shorter than every length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t_err_percent: Option<f64>,
+    /// Mean rotation error of the pieces, degrees per metre.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub r_err_deg_per_m: Option<f64>,
+    /// Root mean square translation error from frame to frame, m.
+    pub rpe_t_m: f64,
+    /// Root mean square rotation error from frame to frame, degrees.
+    pub rpe_r_deg: f64,
+    /// Root mean square distance of the positions after the best rigid alignment, m.
+    pub ate_m: f64,
+    /// Each sub-length that fits at least once: length in m, translation in percent, rotation in deg/m, pieces.
+    pub per_length: Vec<(f64, f64, f64, usize)>,
+}
+
+/// Compares an estimated with a true `t_world_camera` per frame. `None` with fewer than two frames or unequal lists.
+pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryErrors> {
+    if truth.len() < 2 || truth.len() != estimate.len() {
+        return None;
+    }
+    let travelled = travelled_m(truth);
+    let long = travelled.last()? >= &LONG_M[1];
+    let (lengths, step): (&[f64], usize) = if long { (&LONG_M, LONG_STEP) } else { (&SHORT_M, 1) };
+    let piece = |from: usize, to: usize| {
+        let moved = estimate[from].inverse() * estimate[to];
+        moved.inverse() * (truth[from].inverse() * truth[to])
+    };
+    let mut all = Vec::new();
+    let mut per_length = Vec::new();
+    for &length_m in lengths {
+        let pieces: Vec<(f64, f64)> = (0..truth.len())
+            .step_by(step)
+            .map_while(|from| {
+                let to = travelled.partition_point(|&at| at < travelled[from] + length_m);
+                (to < truth.len()).then(|| {
+                    let error = piece(from, to);
+                    (error.translation.vector.norm() / length_m * 100.0, rotation_deg(&error) / length_m)
+                })
+            })
+            .collect();
+        if let Some((t, r)) = means(&pieces) {
+            per_length.push((length_m, t, r, pieces.len()));
+        }
+        all.extend(pieces);
+    }
+    let steps: Vec<Transform> = (1..truth.len()).map(|to| piece(to - 1, to)).collect();
+    let overall = means(&all);
+    Some(TrajectoryErrors {
+        t_err_percent: overall.map(|(t, _)| t),
+        r_err_deg_per_m: overall.map(|(_, r)| r),
+        rpe_t_m: rms(steps.iter().map(|error| error.translation.vector.norm())),
+        rpe_r_deg: rms(steps.iter().map(rotation_deg)),
+        ate_m: aligned_error_m(truth, estimate),
+        per_length,
+    })
+}
+
+/// Distance travelled up to each frame, m.
+pub fn travelled_m(poses: &[Transform]) -> Vec<f64> {
+    let steps = poses.windows(2).map(|pair| (pair[1].translation.vector - pair[0].translation.vector).norm());
+    std::iter::once(0.0)
+        .chain(steps.scan(0.0, |sum, step| {
+            *sum += step;
+            Some(*sum)
+        }))
+        .collect()
+}
+
+fn means(pieces: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let count = pieces.len() as f64;
+    let sum = pieces.iter().fold((0.0, 0.0), |sum, piece| (sum.0 + piece.0, sum.1 + piece.1));
+    (!pieces.is_empty()).then_some((sum.0 / count, sum.1 / count))
+}
+
+fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    (values.map(|value| value * value).sum::<f64>() / count).sqrt()
+}
+
+/// Angle of a rotation. By the quaternion's vector part: an arc cosine would lose small angles.
+fn rotation_deg(motion: &Transform) -> f64 {
+    let q = motion.rotation.quaternion();
+    (2.0 * q.imag().norm().atan2(q.w.abs())).to_degrees()
+}
+
+#[cfg(test)]
+mod tests;
