@@ -1,6 +1,11 @@
 //! What the mapper takes, frame by frame.
 
-use crate::{geometry::Transform, image::View, instances::Detection};
+use crate::{
+    digest::Digest,
+    geometry::Transform,
+    image::{DISPARITY_ONE_PX, View},
+    instances::Detection,
+};
 
 /// One stereo frame as the core takes it: rectified, equal sizes, 8 bit.
 #[derive(Clone, Copy, Debug)]
@@ -21,4 +26,24 @@ pub struct StereoFrame<'a> {
     pub t_world_camera: Option<Transform>,
     /// What a detector saw in the left image, in any order; empty where there is none.
     pub detections: &'a [Detection<'a>],
+}
+
+impl StereoFrame<'_> {
+    /// Digest of the images, row by row, of given disparities and pose, and of the detections, whatever their order.
+    pub fn digest(&self) -> u64 {
+        let mut digest = Digest::default();
+        self.left.rows().chain(self.right.rows()).for_each(|row| digest.bytes(row));
+        self.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
+        self.class.iter().flat_map(View::rows).for_each(|row| digest.bytes(row));
+        if let Some(disparity) = &self.disparity_q8 {
+            // A mark first, so that a given disparity is never taken for an image of classes.
+            digest.u64(u64::from(DISPARITY_ONE_PX));
+            disparity.rows().for_each(|row| digest.u16s(row));
+        }
+        if let Some(pose) = &self.t_world_camera {
+            pose.rotation.coords.iter().chain(pose.translation.vector.iter()).for_each(|&value| digest.f64(value));
+        }
+        digest.u64(self.detections.iter().map(Detection::digest).fold(0, u64::wrapping_add));
+        digest.finish()
+    }
 }

@@ -5,12 +5,11 @@ mod look;
 use crate::{
     Capacity, Executor, Footprint, Stage,
     config::{Config, Problem},
-    digest::Digest,
     egomotion::{Egomotion, Estimator, MotionEstimate},
     frame::StereoFrame,
     geometry::{Transform, depth_from_disparity},
-    image::{DISPARITY_ONE_PX, View, ViewMut},
-    instances::{CameraMotion, Detection, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, ThingAt, TrackReport},
+    image::{View, ViewMut},
+    instances::{CameraMotion, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, ThingAt, TrackReport},
     memory::{Carver, SlabError, region_bytes},
     report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
@@ -339,7 +338,7 @@ impl<'s> Mapper<'s> {
     /// Digests of a frame and of what each stage made of it.
     fn digests(&self, frame: &StereoFrame<'_>, egomotion: Option<&MotionEstimate>) -> StageDigests {
         StageDigests {
-            input: input_digest(frame),
+            input: frame.digest(),
             disparity: self.stereo.digest(),
             matches: self.scene_flow.digest(),
             egomotion: self.camera.digest(egomotion),
@@ -372,22 +371,4 @@ impl<'s> Mapper<'s> {
         self.raycaster.note_use(&mut footprint);
         footprint
     }
-}
-
-/// Digest of the images, row by row, of given disparities and pose, and of the detections, whatever their order.
-fn input_digest(frame: &StereoFrame<'_>) -> u64 {
-    let mut digest = Digest::default();
-    frame.left.rows().chain(frame.right.rows()).for_each(|row| digest.bytes(row));
-    frame.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
-    frame.class.iter().flat_map(View::rows).for_each(|row| digest.bytes(row));
-    if let Some(disparity) = &frame.disparity_q8 {
-        // A mark first, so that a given disparity is never taken for an image of classes.
-        digest.u64(u64::from(DISPARITY_ONE_PX));
-        disparity.rows().for_each(|row| digest.u16s(row));
-    }
-    if let Some(pose) = &frame.t_world_camera {
-        pose.rotation.coords.iter().chain(pose.translation.vector.iter()).for_each(|&value| digest.f64(value));
-    }
-    digest.u64(frame.detections.iter().map(Detection::digest).fold(0, u64::wrapping_add));
-    digest.finish()
 }

@@ -5,6 +5,7 @@ pub mod dataset;
 pub mod depth;
 pub mod evaluation;
 pub mod export;
+pub mod fixtures;
 pub mod harness;
 pub mod segmentation;
 pub mod store;

@@ -1,9 +1,10 @@
 //! P2: the same frames give the same digests, however the work is spread.
 
+use dynvox::fixtures::{self, FixtureError, Verdict};
 use dynvox::harness::Threads;
 use dynvox_core::{Capacity, Executor, Serial};
 use dynvox_tests::Clip;
-use std::{fs, path::Path};
+use std::path::Path;
 
 fn digests(clip: &Clip, executor: &impl Executor) -> Vec<(u64, u64)> {
     clip.with_mapper(&Capacity::SMALL, |mapper| {
@@ -35,16 +36,15 @@ fn one_pixel_changes_the_digest() {
 }
 
 #[test]
-fn the_street_gives_the_digests_on_file() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/street-320x96.digests");
-    let clip = Clip::street(320, 96, 8);
-    let digests = clip.with_mapper(&Capacity::TINY, |mapper| {
-        let steps = clip.stereo().map(|frame| mapper.step(&frame, &Serial).expect("a good frame"));
-        steps.map(|report| format!("{} {:016x} {:016x}\n", report.frame, report.digests.input, report.digest)).collect::<String>()
-    });
-    if std::env::var_os("DYNVOX_BLESS").is_some() {
-        fs::write(&path, &digests).expect("fixtures can be written");
+fn the_fixtures_give_the_digests_on_file_on_one_two_and_eight_threads() {
+    for fixture in fixtures::all(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures"))).expect("there are fixtures") {
+        let verify = |executor: &dyn Fn() -> Result<Verdict, FixtureError>| {
+            let verdict = executor().expect("the fixture is whole");
+            assert_eq!(verdict.difference, None, "bits have changed: fixtures/README.md says what to do when that is meant");
+        };
+        verify(&|| fixtures::verify(&fixture, &Serial));
+        for threads in [1, 2, 8] {
+            verify(&|| fixtures::verify(&fixture, &Threads::new(threads).expect("a pool")));
+        }
     }
-    let golden = fs::read_to_string(&path).expect("the fixture is there");
-    assert_eq!(digests, golden, "bits have changed: fixtures/README.md says what to do when that is meant");
 }

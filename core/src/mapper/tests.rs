@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     Serial,
     geometry::exp,
-    instances::Class,
+    instances::{Class, Detection},
     memory::SLAB_ALIGN,
     scene_flow::room::{HEIGHT, RIG, WIDTH, see},
 };

@@ -2,6 +2,7 @@
 
 mod budget;
 mod evaluate;
+mod fixtures;
 mod inspect;
 mod run;
 mod settings;
@@ -47,6 +48,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArgs),
     /// Write the synthetic street in KITTI's layout, with all its truth
     Synth(synth::SynthArgs),
+    /// Replay small clips against the digests on file
+    Fixtures(fixtures::FixturesArgs),
 }
 
 /// Runs the command line of this process.
@@ -60,6 +63,7 @@ pub fn main() -> ExitCode {
         Some(Command::Budget(args)) => budget::run(&args),
         Some(Command::Evaluate(args)) => evaluate::run(&args),
         Some(Command::Synth(args)) => synth::run(&args),
+        Some(Command::Fixtures(args)) => fixtures::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -19,6 +19,7 @@ mod table;
 mod tests;
 mod truth;
 
+pub use calibration::read_plain as read_calibration;
 pub use error::DatasetError;
 pub use image::{Image, luma, read_png, read_png_deep, read_png_u16};
 pub use labels::read_labels;

@@ -111,3 +111,15 @@ fn beside(target: &Path, suffix: &str) -> PathBuf {
     let name = target.file_name().unwrap_or_default().to_string_lossy().into_owned();
     target.with_file_name(format!(".{name}.{suffix}"))
 }
+
+/// Writes a file as a whole: under another name first, then in its place.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FolderError> {
+    let failed = |source| FolderError::Write { path: path.to_path_buf(), source };
+    let draft = beside(path, "partial");
+    let written = std::fs::write(&draft, bytes).and_then(|()| std::fs::rename(&draft, path));
+    written.map_err(|source| {
+        // The draft may not even be there.
+        let _ = std::fs::remove_file(&draft);
+        failed(source)
+    })
+}

@@ -12,7 +12,7 @@ mod tests;
 mod tracks;
 mod trajectory;
 
-pub use folder::{FolderError, RunFolder};
+pub use folder::{FolderError, RunFolder, write_whole};
 pub use frames::write_frames;
 pub use lidar::write_lidar;
 pub use ply::{Mesh, PlyWriter};

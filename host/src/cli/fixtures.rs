@@ -1,0 +1,75 @@
+//! `dynvox fixtures`.
+
+use crate::export::write_whole;
+use crate::fixtures::{self, Blessing, Verdict};
+use anyhow::bail;
+use dynvox_core::Serial;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct FixturesArgs {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Action {
+    /// Replay fixtures and compare every digest with the golden ones
+    Verify {
+        /// A fixture, or a folder of fixtures
+        #[arg(default_value = "fixtures", value_name = "DIR")]
+        path: PathBuf,
+    },
+    /// Write the golden digests anew, with the reason beside them
+    Bless {
+        /// A fixture, or a folder of fixtures
+        #[arg(default_value = "fixtures", value_name = "DIR")]
+        path: PathBuf,
+        /// Why the digests are meant to change
+        #[arg(long, value_name = "TEXT")]
+        reason: String,
+    },
+    /// Turn a fixture into one run of bytes that a firmware can embed
+    Pack {
+        /// The fixture
+        fixture: PathBuf,
+        /// File to write
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
+}
+
+pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
+    match &args.action {
+        Action::Verify { path } => {
+            let verdicts = fixtures::all(path)?.iter().map(|fixture| fixtures::verify(fixture, &Serial)).collect::<Result<Vec<_>, _>>()?;
+            verdicts.iter().for_each(|verdict| println!("{}", sentence(verdict)));
+            if verdicts.iter().any(|verdict| verdict.difference.is_some()) {
+                bail!("digests have changed. If that is meant: dynvox fixtures bless --reason \"why\"");
+            }
+        }
+        Action::Bless { path, reason } => {
+            for fixture in fixtures::all(path)? {
+                let what = match fixtures::bless(&fixture, reason, &Serial)? {
+                    Blessing::Unchanged => "is as it was",
+                    Blessing::Written => "is blessed",
+                };
+                println!("{} {what}", fixture.display());
+            }
+        }
+        Action::Pack { fixture, out } => {
+            let bytes = fixtures::pack(fixture)?;
+            write_whole(out, &bytes)?;
+            println!("{} bytes in {}", bytes.len(), out.display());
+        }
+    }
+    Ok(())
+}
+
+fn sentence(verdict: &Verdict) -> String {
+    let name = verdict.fixture.display();
+    match &verdict.difference {
+        None => format!("{name}: {} frames, every bit as it was", verdict.frames),
+        Some(difference) => format!("{name}: differs from frame {} on, first in {}", difference.frame, difference.column),
+    }
+}
