@@ -109,12 +109,14 @@ const _: () = assert!(Capacity::DESKTOP.bytes() < 2048 * MIB);
 impl<'s> Mapper<'s> {
     /// Cuts a mapper out of `slab`, which must begin at a multiple of [`crate::memory::SLAB_ALIGN`] bytes and hold at least
     /// `capacity.bytes()`.
+    // Never inlined: what it needs of the stack, some copies of the mapper, must not stay in its caller's frame.
+    #[inline(never)]
     pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {
         if let Some(problem) = config.validate().first() {
             return Err(NewError::Config(*problem));
         }
         let mut carver = Carver::new(slab, capacity.bytes())?;
-        let mut mapper = Self {
+        Ok(Self {
             config: *config,
             capacity: *capacity,
             stereo: StereoMatcher::carve(capacity, &mut carver)?,
@@ -127,10 +129,8 @@ impl<'s> Mapper<'s> {
             raycaster: Raycaster::carve(capacity, &config.raycast, &mut carver)?,
             size: None,
             frame: 0,
-            footprint: Footprint::default(),
-        };
-        mapper.footprint = carver.footprint().clone();
-        Ok(mapper)
+            footprint: carver.into_footprint(),
+        })
     }
 
     /// Takes one frame: depth, motion, map. Never allocates, never panics; what could not be done is counted in the report. Blocks that
@@ -141,6 +141,8 @@ impl<'s> Mapper<'s> {
 
     /// As [`Mapper::step`], with a store that keeps the blocks that must leave and brings them back when they are seen again, and a sink
     /// for objects that leave.
+    // Never inlined, so that a step's stack can be told from its caller's.
+    #[inline(never)]
     pub fn step_with<E: Executor, S: BlockStore, O: ObjectSink>(
         &mut self,
         frame: &StereoFrame<'_>,

@@ -149,13 +149,15 @@ impl<'s> Points<'s> {
 
     /// Folds the squared errors of a range of points, px²; infinite for points that would be behind the camera.
     #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "`range` ends at `len` at most, and all columns are cut to it first")]
+    #[expect(clippy::indexing_slicing, reason = "all columns are cut to n first")]
     fn errors(&self, view: &Single, range: core::ops::Range<usize>, mut fold: impl FnMut(u32, f32) -> u32) -> u32 {
-        let (x, y, z) = (&self.x[range.clone()], &self.y[range.clone()], &self.z[range.clone()]);
-        let (left_u, left_v) = (&self.left_u[range.clone()], &self.left_v[range.clone()]);
-        let (right_u, right_v) = (&self.right_u[range.clone()], &self.right_v[range.clone()]);
         let n = range.len();
-        let (y, z, left_u, left_v, right_u, right_v) = (&y[..n], &z[..n], &left_u[..n], &left_v[..n], &right_u[..n], &right_v[..n]);
+        let columns = [&*self.x, self.y, self.z, self.left_u, self.left_v, self.right_u, self.right_v];
+        let [Some(x), Some(y), Some(z), Some(left_u), Some(left_v), Some(right_u), Some(right_v)] =
+            columns.map(|column| column.get(range.start..)?.get(..n))
+        else {
+            return 0;
+        };
         let mut state = 0;
         for i in 0..n {
             let error = view.error([x[i], y[i], z[i]], [left_u[i], left_v[i]], [right_u[i], right_v[i]]);

@@ -8,7 +8,7 @@ use crate::image::{DISPARITY_ONE_PX, View, ViewMut};
 pub fn depth_from_disparity(rig: &StereoRig, near_m: f32, far_m: f32, disparity_q8: View<'_, u16>, depth_m: &mut ViewMut<'_, f32>) {
     let scale = (rig.focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX)) as f32;
     let width = depth_m.width();
-    for (depths, disparities) in depth_m.pixels_mut().chunks_exact_mut(width).zip(disparity_q8.rows()) {
+    for (depths, disparities) in depth_m.pixels_mut().chunks_exact_mut(width.max(1)).zip(disparity_q8.rows()) {
         for (depth, &disparity) in depths.iter_mut().zip(disparities) {
             // Disparity 0 gives infinity, which is beyond far.
             let value = scale / f32::from(disparity);

@@ -17,6 +17,11 @@ fn span(width: usize, height: usize, stride: usize) -> Option<usize> {
     (height - 1).checked_mul(stride)?.checked_add(width)
 }
 
+impl View<'_, u16> {
+    /// One pixel, 0.
+    pub(crate) const ONE_ZERO: Self = Self { data: &[0], width: 1, height: 1, stride: 1 };
+}
+
 impl<'a, T> View<'a, T> {
     /// Views `data` as `width` x `height`, rows `width` apart. `None` when empty or when `data` is too short.
     pub fn new(data: &'a [T], width: usize, height: usize) -> Option<Self> {

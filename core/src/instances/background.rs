@@ -11,7 +11,7 @@ impl<'s> Instances<'s> {
         let mut cleared = 0;
         for detection in self.detections.all() {
             let mask = detection.delete(masks);
-            let rows = depth_m.pixels_mut().chunks_exact_mut(width);
+            let rows = depth_m.pixels_mut().chunks_exact_mut(width.max(1));
             let (skip, take) = (mask.pixels.top.max(0), (mask.pixels.top + mask.pixels.height).max(0));
             for (v, row) in (0..).zip(rows).take(take as usize).skip(skip as usize) {
                 mask.row(v, width as i32, |u| {

@@ -147,15 +147,15 @@ impl<'s> Crops<'s> {
             let overlaps = (old.start as usize) < room.end && (old.start + old.len) as usize > room.start;
             overlaps || count >= CROPS_MAX
         });
-        let width = crop.pixels.width as usize;
+        let width = (crop.pixels.width as usize).max(1);
         self.disparity_q8.get_mut(room.clone())?.iter_mut().zip(disparity_q8).for_each(|(to, from)| *to = *from);
         for (to, from) in self.grey.get_mut(room.clone())?.chunks_exact_mut(width).zip(picture.grey.rows()) {
-            to.copy_from_slice(from);
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
         }
         let coloured = picture.colour.filter(|_| !self.colour.is_empty());
         if let Some(image) = coloured {
             for (to, from) in self.colour.get_mut(room.clone())?.chunks_exact_mut(width).zip(image.rows()) {
-                to.copy_from_slice(from);
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
             }
         }
         *self.entries.get_mut(self.len)? = Crop {

@@ -129,25 +129,38 @@ impl Filter {
         noise_px: f64,
         sightings: impl Iterator<Item = Sighting> + Clone,
     ) -> bool {
+        if self.contradictions == 0 || self.frames == 0 {
+            return self.take(config, rig, t_world_camera, interval_s, noise_px, sightings);
+        }
+        let mut kept = Self { contradictions: 0, ..*self };
+        let mut anew = Self { contradictions: 0, frames: 0, ..*self };
+        anew.predict(config, interval_s);
+        let fits = kept.take(config, rig, t_world_camera, interval_s, noise_px, sightings.clone());
+        let taken = fits || anew.take(config, rig, t_world_camera, interval_s, noise_px, sightings);
+        *self = if fits {
+            kept
+        } else if taken {
+            anew
+        } else {
+            *self
+        };
+        taken
+    }
+
+    /// As [`Filter::update`], where nothing contradicted before.
+    fn take(
+        &mut self,
+        config: &MotionConfig,
+        rig: &StereoRig,
+        t_world_camera: &Transform,
+        interval_s: f64,
+        noise_px: f64,
+        sightings: impl Iterator<Item = Sighting> + Clone,
+    ) -> bool {
         let (mut sum, mut count) = (Vector3::zeros(), 0.0);
         for sighting in sightings.clone() {
             sum += sighting.standing.coords;
             count += 1.0;
-        }
-        if self.contradictions > 0 && self.frames > 0 {
-            let mut kept = Self { contradictions: 0, ..*self };
-            let mut anew = Self { contradictions: 0, frames: 0, ..*self };
-            anew.predict(config, interval_s);
-            let fits = kept.update(config, rig, t_world_camera, interval_s, noise_px, sightings.clone());
-            let taken = fits || anew.update(config, rig, t_world_camera, interval_s, noise_px, sightings);
-            *self = if fits {
-                kept
-            } else if taken {
-                anew
-            } else {
-                *self
-            };
-            return taken;
         }
         let Some(information) = Cholesky::new(Matrix6::from(self.covariance)).map(|factor| factor.inverse()) else { return false };
         let center = sum / count;

@@ -166,9 +166,7 @@ impl<'s> Objects<'s> {
         let mut objects = Vec::new();
         // One region in the footprint for all: so many volumes would have too many names.
         let mut rest = carver.cut::<u8>("instances.volumes", Self::room(capacity))?;
-        while rest.len() >= one && one > 0 {
-            let (room, behind) = rest.split_at_mut(one);
-            rest = behind;
+        while let Some(room) = rest.split_off_mut(..one).filter(|_| one > 0) {
             let volume = Volume::carve(&bounds, &config.volume(), &mut Carver::new(room, one)?)?;
             let _ = objects.push(Object { volume, summary: None });
         }

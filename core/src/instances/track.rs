@@ -205,7 +205,7 @@ impl<'s> Tracks<'s> {
 
     fn join(&mut self, d: usize, t: usize, detections: &mut [Taken], frame: u32) {
         let width = self.tracks.len().max(1);
-        for (row_index, row) in self.scores.chunks_exact_mut(width).take(detections.len()).enumerate() {
+        for (row_index, row) in self.scores.chunks_exact_mut(width.max(1)).take(detections.len()).enumerate() {
             if row_index == d {
                 row.fill(0.0);
             } else if let Some(score) = row.get_mut(t) {
@@ -214,7 +214,7 @@ impl<'s> Tracks<'s> {
         }
         let (Some(detection), Some(track)) = (detections.get_mut(d), self.tracks.get_mut(t)) else { return };
         detection.track = t as u32 + 1;
-        let gap = frame.wrapping_sub(track.last_frame).max(1) as i32;
+        let gap = frame.wrapping_sub(track.last_frame).clamp(1, 1 << 16) as i32;
         let middle = |place: &MaskPlace| [2 * place.pixels.left + place.pixels.width, 2 * place.pixels.top + place.pixels.height];
         let ([u, v], [u_before, v_before]) = (middle(&detection.place), middle(&track.place));
         track.drift = [(u - u_before) / (2 * gap), (v - v_before) / (2 * gap)];
@@ -249,7 +249,9 @@ impl<'s> Tracks<'s> {
         let Some((oldest, _)) = unseen.max_by_key(|&(at, track)| (frame.wrapping_sub(track.last_frame), usize::MAX - at)) else {
             return false;
         };
-        self.tracks.copy_within(oldest + 1..self.len, oldest);
+        let Some(from_oldest) = self.tracks.get_mut(oldest..self.len) else { return false };
+        let Some(mut moved) = from_oldest.last().copied() else { return false };
+        from_oldest.iter_mut().rev().for_each(|place| core::mem::swap(place, &mut moved));
         self.len -= 1;
         // Those behind it moved up.
         for detection in detections.iter_mut().filter(|detection| detection.track as usize > oldest + 1) {

@@ -66,15 +66,16 @@ impl<'s> Carver<'s> {
     /// a slab much larger than the map costs neither time nor resident memory.
     pub fn cut_as_found<T: Pod>(&mut self, name: &'static str, count: usize) -> Result<&'s mut [T], SlabError> {
         let bytes = region_bytes::<T>(count);
-        let rest = core::mem::take(&mut self.rest);
-        if rest.len() < bytes {
-            return Err(SlabError::TooSmall { missing: bytes - rest.len() });
-        }
-        let (region, rest) = rest.split_at_mut(bytes);
-        self.rest = rest;
+        let missing = bytes.saturating_sub(self.rest.len());
+        let region = self.rest.split_off_mut(..bytes).ok_or(SlabError::TooSmall { missing })?;
         self.footprint.add(Region { name, bytes, used: bytes, peak: bytes }).map_err(|_| SlabError::TooManyRegions)?;
-        let (items, _) = region.split_at_mut(count * size_of::<T>());
+        let items = region.get_mut(..count * size_of::<T>()).unwrap_or_default();
         bytemuck::try_cast_slice_mut(items).map_err(|_| SlabError::Misaligned)
+    }
+
+    /// Ends the cutting; what was cut.
+    pub fn into_footprint(self) -> Footprint {
+        self.footprint
     }
 
     /// What has been cut so far.

@@ -21,10 +21,19 @@ pub(super) fn select(
     let score = |index: u32| score.get(index as usize).copied().unwrap_or(0.0);
     for (&from, &to) in start.iter().zip(start.iter().skip(1)) {
         let Some(cell) = order.get_mut(from as usize..to as usize) else { continue };
-        cell.sort_unstable_by(|&a, &b| score(b).total_cmp(&score(a)).then(a.cmp(&b)));
-        for (&index, slot) in cell.iter().take(per_cell).zip(&mut slots) {
-            *slot = index;
+        let mut rest = cell;
+        for _ in 0..per_cell {
+            let Some((best, others)) = rest.split_first_mut() else { break };
+            let Some(slot) = slots.next() else { return selected };
+            // Few are wanted of a cell, so each is sought among what is left: no sort, whose depth would depend on the matches.
+            for other in &mut *others {
+                if score(*other).total_cmp(&score(*best)).reverse().then((*other).cmp(best)).is_lt() {
+                    core::mem::swap(other, best);
+                }
+            }
+            *slot = *best;
             selected += 1;
+            rest = others;
         }
     }
     selected

@@ -123,8 +123,8 @@ impl<'s> Camera<'s> {
             frame.sparse.clear();
             return FeatureCount::default();
         };
-        for (kept, row) in frame.pixels.chunks_exact_mut(width).zip(image.rows()) {
-            kept.copy_from_slice(row);
+        for (kept, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
+            kept.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
         }
         filter(image, Responses { gradient, blob, corner }, self.sums);
         let mut found = 0;

@@ -25,13 +25,14 @@ pub(super) struct Shape {
 
 impl Shape {
     pub(super) fn new(width: usize, height: usize, cell_px: usize) -> Self {
+        let cell_px = cell_px.max(1);
         Self { cell_px, columns: width.div_ceil(cell_px), rows: height.div_ceil(cell_px) }
     }
 
     /// Column and row of the cell a match lies in.
     pub(super) fn cell(&self, m: &Match) -> [usize; 2] {
         // Previous left positions are inside the image, so the cast is exact.
-        let [column, row] = m.previous_left.map(|x| x as usize / self.cell_px);
+        let [column, row] = m.previous_left.map(|x| (x as usize).checked_div(self.cell_px).unwrap_or(0));
         [column.min(self.columns.saturating_sub(1)), row.min(self.rows.saturating_sub(1))]
     }
 }

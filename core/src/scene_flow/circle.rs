@@ -50,9 +50,9 @@ impl Corners<'_, '_> {
         let len = self.previous_left.len();
         let Some(traced) = traced.get_mut(..len) else { return };
         let quarter = len / 4;
-        let (a, rest) = traced.split_at_mut(quarter);
-        let (b, rest) = rest.split_at_mut(quarter);
-        let (c, d) = rest.split_at_mut(quarter);
+        let (a, rest) = traced.split_at_mut_checked(quarter).unwrap_or_default();
+        let (b, rest) = rest.split_at_mut_checked(quarter).unwrap_or_default();
+        let (c, d) = rest.split_at_mut_checked(quarter).unwrap_or_default();
         let band = |first: usize, traced: &mut [[u32; 3]]| {
             for (index, partners) in (first..).zip(traced) {
                 *partners = self.circle(index, &reach).unwrap_or(NONE);

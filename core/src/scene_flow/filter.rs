@@ -47,17 +47,17 @@ pub(super) fn filter(image: View<'_, u8>, out: Responses<'_>, sums: &mut [i16]) 
     }
 }
 
-/// Sums each column's five pixels in the five ways the filters need.
+/// Sums each column's five pixels in the five ways the filters need. Nothing where the rows or `sums` are too short.
 #[expect(clippy::indexing_slicing, reason = "all slices are cut to the same length first")]
-fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) {
+fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) -> Option<()> {
     let [a, b, c, d, e] = rows;
     let width = a.len();
-    let (five, rest) = sums.split_at_mut(width);
-    let (three, rest) = rest.split_at_mut(width);
-    let (halves, rest) = rest.split_at_mut(width);
-    let (smooth, rest) = rest.split_at_mut(width);
-    let step = &mut rest[..width];
-    let (b, c, d, e) = (&b[..width], &c[..width], &d[..width], &e[..width]);
+    let (five, rest) = sums.split_at_mut_checked(width)?;
+    let (three, rest) = rest.split_at_mut_checked(width)?;
+    let (halves, rest) = rest.split_at_mut_checked(width)?;
+    let (smooth, rest) = rest.split_at_mut_checked(width)?;
+    let step = rest.get_mut(..width)?;
+    let (b, c, d, e) = (b.get(..width)?, c.get(..width)?, d.get(..width)?, e.get(..width)?);
     for u in 0..width {
         let [a, b, c, d, e] = [a[u], b[u], c[u], d[u], e[u]].map(i16::from);
         five[u] = a + b + c + d + e;
@@ -66,20 +66,21 @@ fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) {
         smooth[u] = b + 2 * c + d;
         step[u] = d - b;
     }
+    Some(())
 }
 
-/// Finishes the filters along one row, border columns excluded.
+/// Finishes the filters along one row, border columns excluded. Nothing where a row is too short.
 #[expect(clippy::indexing_slicing, reason = "the outputs are 4 shorter than a row of sums; all slices are cut to their length first")]
-fn sum_rows(sums: &[i16], pixels: &[u8], gradient: &mut [u16], blob: &mut [i16], corner: &mut [i16]) {
+fn sum_rows(sums: &[i16], pixels: &[u8], gradient: &mut [u16], blob: &mut [i16], corner: &mut [i16]) -> Option<()> {
     let n = gradient.len();
     let width = n + 2 * FILTER_MARGIN;
-    let at = |row: usize, shift: usize| &sums[row * width + shift..][..n];
-    let five = [at(0, 0), at(0, 1), at(0, 2), at(0, 3), at(0, 4)];
-    let three = [at(1, 1), at(1, 2), at(1, 3)];
-    let halves = [at(2, 0), at(2, 1), at(2, 3), at(2, 4)];
-    let smooth = [at(3, 1), at(3, 3)];
-    let step = [at(4, 1), at(4, 2), at(4, 3)];
-    let (pixels, blob, corner) = (&pixels[FILTER_MARGIN..][..n], &mut blob[..n], &mut corner[..n]);
+    let at = |row: usize, shift: usize| sums.get(row * width + shift..)?.get(..n);
+    let five = [at(0, 0)?, at(0, 1)?, at(0, 2)?, at(0, 3)?, at(0, 4)?];
+    let three = [at(1, 1)?, at(1, 2)?, at(1, 3)?];
+    let halves = [at(2, 0)?, at(2, 1)?, at(2, 3)?, at(2, 4)?];
+    let smooth = [at(3, 1)?, at(3, 3)?];
+    let step = [at(4, 1)?, at(4, 2)?, at(4, 3)?];
+    let (pixels, blob, corner) = (pixels.get(FILTER_MARGIN..)?.get(..n)?, blob.get_mut(..n)?, corner.get_mut(..n)?);
     for u in 0..n {
         let square = five[0][u] + five[1][u] + five[2][u] + five[3][u] + five[4][u];
         blob[u] = 2 * (three[0][u] + three[1][u] + three[2][u]) - square + 7 * i16::from(pixels[u]);
@@ -88,6 +89,7 @@ fn sum_rows(sums: &[i16], pixels: &[u8], gradient: &mut [u16], blob: &mut [i16],
         let down = (step[0][u] + 2 * step[1][u] + step[2][u]) >> 2;
         gradient[u] = (along.clamp(-127, 127) + 128) as u16 | ((down.clamp(-127, 127) + 128) as u16) << 8;
     }
+    Some(())
 }
 
 #[cfg(test)]

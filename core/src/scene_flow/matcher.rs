@@ -272,12 +272,20 @@ impl<'s> FlowMatcher<'s> {
         let mut len = 0;
         for index in 0..closed {
             if self.keep.get(index) == Some(&1) {
-                self.refined.copy_within(index..=index, len);
-                self.score.copy_within(index..=index, len);
+                keep(self.refined, index, len);
+                keep(self.score, index, len);
                 len += 1;
             }
         }
         self.refined_len = len;
+    }
+}
+
+/// Copies an item to an earlier place.
+fn keep<T: Copy>(items: &mut [T], from: usize, to: usize) {
+    let item = items.get(from).copied();
+    if let (Some(item), Some(place)) = (item, items.get_mut(to)) {
+        *place = item;
     }
 }
 

@@ -127,7 +127,7 @@ impl Template {
         if left + SIDE + 1 > image.width {
             return None;
         }
-        let mut rows = image.data.get(top * image.width + left..)?.chunks(image.width);
+        let mut rows = image.data.get(top * image.width + left..)?.chunks(image.width.max(1));
         let mut blend = || -> Option<[u16; SIDE]> {
             let row = rows.next()?.get(..SIDE + 1)?;
             let mut out = [0; SIDE];

@@ -48,8 +48,8 @@ pub(super) fn suppress(blob: Field<'_>, corner: Field<'_>, response_min: i16, ex
         return;
     }
     let end = (blob.response.len() / width).saturating_sub(FEATURE_MARGIN);
-    let Some(extremes) = extremes.get_mut(..2 * width) else { return };
-    let (low, high) = extremes.split_at_mut(width);
+    let Some((low, high)) = extremes.split_at_mut_checked(width) else { return };
+    let Some(high) = high.get_mut(..width) else { return };
     for top in (FEATURE_MARGIN..end).step_by(BLOCK) {
         let rows = if end - top < BLOCK { end - top } else { BLOCK };
         for (class, field) in [(0, blob), (2, corner)] {
@@ -101,7 +101,7 @@ fn strongest<const SIGN: i16>(extremes: &[i16; AROUND], columns: usize, response
 fn column_extremes(field: Field<'_>, top: usize, rows: usize, low: &mut [i16], high: &mut [i16]) {
     low.fill(i16::MAX);
     high.fill(i16::MIN);
-    for row in field.response.chunks_exact(field.width).skip(top).take(rows) {
+    for row in field.response.chunks_exact(field.width.max(1)).skip(top).take(rows) {
         for ((low, high), &x) in low.iter_mut().zip(high.iter_mut()).zip(row) {
             *low = if x < *low { x } else { *low };
             *high = if x > *high { x } else { *high };

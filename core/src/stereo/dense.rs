@@ -45,7 +45,7 @@ pub(super) struct DenseBand<'a> {
 impl DenseMatching<'_> {
     /// Matches a band.
     pub fn match_band(&self, band: &mut DenseBand<'_>) {
-        let width = self.gradients[0].width;
+        let width = self.gradients[0].width.max(1);
         let Some((left_row, right_row)) = band.scratch.split_at_mut_checked(width) else { return };
         let Some(right_row) = right_row.get_mut(..width) else { return };
         let rows = band.left.chunks_exact_mut(width).zip(band.right.chunks_exact_mut(width));
@@ -69,7 +69,7 @@ impl DenseMatching<'_> {
         let (first, end) = (MARGIN, here.len().saturating_sub(MARGIN));
         let [left_cells, right_cells] = &self.cells;
         let grid = if LEFT { left_cells } else { right_cells };
-        let size = self.config.grid_size;
+        let size = self.config.grid_size.max(1);
         let sets = grid.cells.get(v / size * grid.columns..).unwrap_or(&[]);
         let least_texture = u32::from(self.config.match_texture);
         let most = usize::from(self.config.disparity_max);
@@ -164,18 +164,20 @@ fn least_key<const LEFT: bool>(
 }
 
 /// The members of a set, ascending.
-#[expect(clippy::indexing_slicing, reason = "a set has at most 256 members, and n counts them")]
 fn list_disparities<'l>(set: &DisparitySet, list: &'l mut [u8; 256]) -> &'l [u8] {
-    let mut n = 0;
+    // As many members as bits, at most.
+    let mut slots = list.iter_mut();
     for (i, &word) in set.iter().enumerate() {
         let mut rest = word;
         while rest != 0 {
-            list[n] = (i as u32 * 64 + rest.trailing_zeros()) as u8;
-            n += 1;
+            if let Some(slot) = slots.next() {
+                *slot = (i as u32 * 64 + rest.trailing_zeros()) as u8;
+            }
             rest &= rest - 1;
         }
     }
-    &list[..n]
+    let free = slots.len();
+    list.get(..list.len() - free).unwrap_or(&[])
 }
 
 /// Takes from the left row, in working units, what the right row, in px, contradicts. Returns how many matches there were and how many

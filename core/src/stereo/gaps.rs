@@ -24,7 +24,7 @@ impl Filling {
 /// Fills the gaps of each row; returns the pixels filled.
 pub(super) fn fill_rows(disparity: &mut [i16], width: usize, filling: Filling) -> u32 {
     let mut filled = 0;
-    for row in disparity.chunks_exact_mut(width) {
+    for row in disparity.chunks_exact_mut(width.max(1)) {
         let mut start = 0;
         // Runs of pixels with and without disparity take turns.
         while let Some(gap) = row.get(start..).and_then(|rest| rest.iter().position(|&d| d == NONE)).map(|i| start + i) {
@@ -45,25 +45,28 @@ pub(super) fn fill_rows(disparity: &mut [i16], width: usize, filling: Filling) -
 /// Fills the gaps of each column; `last_row` has an entry a column. Returns the pixels filled.
 ///
 /// Columns are walked side by side, row by row: an image is read as it lies in memory.
-#[expect(clippy::indexing_slicing, reason = "last row numbers are rows already walked, and u < width")]
 pub(super) fn fill_columns(disparity: &mut [i16], width: usize, filling: Filling, last_row: &mut [u32]) -> u32 {
     let Some(last_row) = last_row.get_mut(..width) else { return 0 };
     let never = u32::MAX;
     last_row.fill(never);
     let mut filled = 0;
+    let width = width.max(1);
     for v in 0..disparity.len() / width {
-        for u in 0..width {
-            let here = disparity[v * width + u];
+        let (above, here) = disparity.split_at_mut_checked(v * width).unwrap_or_default();
+        for (u, (&here, last)) in here.iter().zip(last_row.iter_mut()).enumerate() {
             if here == NONE {
                 continue;
             }
-            let last = core::mem::replace(&mut last_row[u], v as u32);
+            let last = core::mem::replace(last, v as u32);
             if last == never || last as usize + 1 == v || v - last as usize - 1 > filling.width {
                 continue;
             }
-            let value = filling.value(disparity[last as usize * width + u], here);
-            for w in last as usize + 1..v {
-                disparity[w * width + u] = value;
+            // This column of the rows above, from the last one with a disparity on.
+            let mut column = above.get_mut(last as usize * width + u..).unwrap_or_default().iter_mut().step_by(width);
+            let Some(end) = column.next() else { continue };
+            let value = filling.value(*end, here);
+            for pixel in column {
+                *pixel = value;
                 filled += 1;
             }
         }

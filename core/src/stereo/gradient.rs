@@ -9,7 +9,7 @@ pub(super) const FLAT: u8 = 128;
 
 /// Fills the rows of `du` and `dv` (`width` wide) that begin at image row `first`.
 pub(super) fn gradients(image: View<'_, u8>, first: usize, du: &mut [u8], dv: &mut [u8]) {
-    let width = image.width();
+    let width = image.width().max(1);
     for (i, (du, dv)) in du.chunks_exact_mut(width).zip(dv.chunks_exact_mut(width)).enumerate() {
         let v = first + i;
         du.fill(FLAT);
@@ -24,13 +24,14 @@ fn quarter(response: i16) -> u8 {
     ((response >> 2) + 128).clamp(0, 255) as u8
 }
 
+/// The gradients of an inner row. None where a row is too short.
 #[expect(clippy::indexing_slicing, reason = "every slice is cut to n = width - 2 items, and i < n")]
-fn row(above: &[u8], here: &[u8], below: &[u8], du: &mut [u8], dv: &mut [u8]) {
-    let Some(n) = du.len().checked_sub(2) else { return };
-    let (a0, a1, a2) = (&above[..n], &above[1..][..n], &above[2..][..n]);
-    let (h0, h2) = (&here[..n], &here[2..][..n]);
-    let (b0, b1, b2) = (&below[..n], &below[1..][..n], &below[2..][..n]);
-    let (du, dv) = (&mut du[1..][..n], &mut dv[1..][..n]);
+fn row(above: &[u8], here: &[u8], below: &[u8], du: &mut [u8], dv: &mut [u8]) -> Option<()> {
+    let n = du.len().checked_sub(2)?;
+    let (a0, a1, a2) = (above.get(..n)?, above.get(1..)?.get(..n)?, above.get(2..)?.get(..n)?);
+    let (h0, h2) = (here.get(..n)?, here.get(2..)?.get(..n)?);
+    let (b0, b1, b2) = (below.get(..n)?, below.get(1..)?.get(..n)?, below.get(2..)?.get(..n)?);
+    let (du, dv) = (du.get_mut(1..)?.get_mut(..n)?, dv.get_mut(1..)?.get_mut(..n)?);
     let wide = i16::from;
     for i in 0..n {
         let (right, left) = (wide(a2[i]) + 2 * wide(h2[i]) + wide(b2[i]), wide(a0[i]) + 2 * wide(h0[i]) + wide(b0[i]));
@@ -38,6 +39,7 @@ fn row(above: &[u8], here: &[u8], below: &[u8], du: &mut [u8], dv: &mut [u8]) {
         let (down, up) = (wide(b0[i]) + 2 * wide(b1[i]) + wide(b2[i]), wide(a0[i]) + 2 * wide(a1[i]) + wide(a2[i]));
         dv[i] = quarter(down - up);
     }
+    Some(())
 }
 
 #[cfg(test)]

@@ -126,9 +126,9 @@ impl<'s> StereoMatcher<'s> {
 
     /// Disparities of the left image, of the last pair given to [`StereoMatcher::compute`]: 1/256 px, 0 = none, exactly as large as the
     /// image (as much of it as the capacity holds, all none, where the pair was refused).
-    #[expect(clippy::expect_used, reason = "both sides are at least 1 and their product is at most the region's length, by `begin`")]
     pub fn disparity_q8(&self) -> View<'_, u16> {
-        View::new(self.disparity, self.width, self.height).expect("the disparity region holds the image")
+        // Both sides are at least 1 and their product is at most the region's length, by `begin`.
+        View::new(self.disparity, self.width, self.height).unwrap_or(View::ONE_ZERO)
     }
 
     /// Computes the disparities of a rectified pair.
@@ -188,7 +188,7 @@ impl<'s> StereoMatcher<'s> {
         };
         // A match this far to the left lies outside the right image, whatever the column.
         let absurd = self.width as u32 * u32::from(DISPARITY_ONE_PX);
-        for (to, from) in self.disparity.chunks_exact_mut(self.width).zip(disparity_q8.rows()) {
+        for (to, from) in self.disparity.chunks_exact_mut(self.width.max(1)).zip(disparity_q8.rows()) {
             for (to, &given) in to.iter_mut().zip(from) {
                 let taken = u32::from(given) < absurd;
                 *to = if taken { given } else { 0 };
@@ -249,7 +249,7 @@ impl<'s> StereoMatcher<'s> {
         report.redundant = plausible::remove_redundant(config, grid, columns);
         self.left_mesh.clear();
         self.right_mesh.clear();
-        for (j, row) in grid.chunks_exact(columns).enumerate() {
+        for (j, row) in grid.chunks_exact(columns.max(1)).enumerate() {
             for (i, &disparity) in row.iter().enumerate().filter(|(_, d)| **d != NO_MATCH) {
                 let (u, v, disparity) = ((i * step) as u16, (j * step) as u16, disparity as u16);
                 self.left_mesh.add(SupportPoint { u, v, disparity });
@@ -329,7 +329,7 @@ impl<'s> StereoMatcher<'s> {
             bands::each(executor, columns, |(first, to, ())| smooth::mean_along_columns(other, width, first, to));
         }
         if config.median {
-            other.copy_from_slice(image);
+            other.iter_mut().zip(&*image).for_each(|(to, from)| *to = *from);
             let rows = zip3(bands.first(), bands.split(image, width), [(); BANDS]);
             bands::each(executor, rows, |(first, to, ())| median::median(other, width, first, to));
         }
@@ -358,13 +358,13 @@ fn image_of(disparity: &mut [u16], pixels: usize) -> &mut [i16] {
 
 /// The gradient region as four images: horizontal and vertical gradient of the left image, then of the right one.
 fn split_planes(gradients: &mut [u32], pixels: usize) -> [&mut [u8]; 4] {
-    let mut planes = bytemuck::cast_slice_mut::<u32, u8>(gradients).chunks_exact_mut(pixels);
+    let mut planes = bytemuck::cast_slice_mut::<u32, u8>(gradients).chunks_exact_mut(pixels.max(1));
     [(); 4].map(|()| planes.next().unwrap_or(&mut []))
 }
 
 /// The gradients of both images.
 fn gradients(region: &[u32], width: usize, height: usize) -> [Gradients<'_>; 2] {
-    let mut planes = bytemuck::cast_slice::<u32, u8>(region).chunks_exact(width * height);
+    let mut planes = bytemuck::cast_slice::<u32, u8>(region).chunks_exact((width * height).max(1));
     [(); 2].map(|()| Gradients {
         du: planes.next().unwrap_or(&[]),
         dv: planes.next().unwrap_or(&[]),

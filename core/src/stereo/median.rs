@@ -3,20 +3,29 @@
 use super::dense::NONE;
 
 /// Filters `from`, whose row `first` is the first one of `to`.
-#[expect(clippy::indexing_slicing, reason = "rows first + i - 1 ..= first + i + 1 are in the image; each slice is cut to n = width - 2")]
 pub(super) fn median(from: &[i16], width: usize, first: usize, to: &mut [i16]) {
-    let height = from.len() / width;
-    for (i, to) in to.chunks_exact_mut(width).enumerate() {
-        let v = first + i;
-        to.copy_from_slice(&from[v * width..][..width]);
-        let Some(n) = width.checked_sub(2).filter(|_| v > 0 && v + 1 < height) else { continue };
-        let taps: [&[i16]; 9] = core::array::from_fn(|k| &from[(v + k / 3 - 1) * width + k % 3..][..n]);
-        for (u, to) in to[1..][..n].iter_mut().enumerate() {
-            let window = taps.map(|tap| tap[u]);
-            let least = window.iter().fold(i16::MAX, |a, &b| a.min(b));
-            *to = if least == NONE { *to } else { middle_of_nine(window) };
-        }
+    let width = width.max(1);
+    for (v, to) in (first..).zip(to.chunks_exact_mut(width)) {
+        to.iter_mut().zip(from.get(v * width..).unwrap_or(&[])).for_each(|(to, from)| *to = *from);
+        median_row(from, width, v, to);
     }
+}
+
+/// Filters row `v`. Nothing where it is the first or the last.
+fn median_row(from: &[i16], width: usize, v: usize, to: &mut [i16]) -> Option<()> {
+    let n = width.checked_sub(2)?;
+    let mut taps: [&[i16]; 9] = [&[]; 9];
+    for (k, tap) in taps.iter_mut().enumerate() {
+        *tap = from.get((v + k / 3).checked_sub(1)? * width + k % 3..)?.get(..n)?;
+    }
+    let [a, b, c, d, e, f, g, h, i] = taps;
+    let rows = (a.iter().zip(b).zip(c)).zip(d.iter().zip(e).zip(f)).zip(g.iter().zip(h).zip(i));
+    for (((((&a, &b), &c), ((&d, &e), &f)), ((&g, &h), &i)), to) in rows.zip(to.get_mut(1..)?) {
+        let window = [a, b, c, d, e, f, g, h, i];
+        let least = window.iter().fold(i16::MAX, |a, &b| a.min(b));
+        *to = if least == NONE { *to } else { middle_of_nine(window) };
+    }
+    Some(())
 }
 
 /// The median of nine by exchanges (Smith 1996): columns sorted, then the middle of (largest low, middle middle, smallest high).

@@ -6,7 +6,8 @@ use super::{StereoConfig, support::NO_MATCH};
 /// is as long as `grid`. Returns how many were removed.
 pub(super) fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, scratch: &mut [i16]) -> u32 {
     let (Some(before), window) = (scratch.get_mut(..grid.len()), config.plausible_window) else { return 0 };
-    before.copy_from_slice(grid);
+    let width = width.max(1);
+    before.iter_mut().zip(&*grid).for_each(|(to, from)| *to = *from);
     let threshold = config.plausible_threshold.min(i16::MAX as u16);
     let mut removed = 0;
     for (v, row) in grid.chunks_exact_mut(width).enumerate() {
@@ -32,7 +33,7 @@ pub(super) fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width:
 /// Removes the points that lie between two alike ones on their column, then on their row; in scan order, each judged by what is left.
 /// Returns how many were removed.
 pub(super) fn remove_redundant(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 {
-    let height = grid.len() / width;
+    let height = grid.len() / width.max(1);
     let mut removed = 0;
     for (stride, length, lines, line_stride) in [(width, height, width, 1), (1, width, height, width)] {
         for line in 0..lines {

@@ -19,6 +19,7 @@ pub(super) const STEEP: i16 = 256;
 /// Triangles are drawn to the pixels beyond their edges; the later one wins.
 pub(super) fn draw_planes(mesh: &Triangulation<'_>, slope_max: f32, first: usize, width: usize, out: &mut [i16]) {
     out.fill(NO_PLANE);
+    let width = width.max(1);
     let rows = out.len() / width;
     // A slope of 1000 fits.
     let slope_max = (slope_max * ONE as f32) as i64;
@@ -113,14 +114,15 @@ pub(super) struct CellGrid<'a> {
 
 /// Cells along `length` px.
 pub(super) const fn cells(length: usize, size: usize) -> usize {
-    length.div_ceil(size)
+    if size == 0 { 0 } else { length.div_ceil(size) }
 }
 
 /// Marks each support point's disparity and the two beside it in its cell and the eight about it. `out` is `columns` wide.
 pub(super) fn mark_cells(config: &StereoConfig, points: &[SupportPoint], columns: usize, out: &mut [DisparitySet]) {
     out.fill([0; 4]);
+    let (size, columns) = (config.grid_size.max(1), columns.max(1));
     for point in points {
-        let (cu, cv) = (usize::from(point.u) / config.grid_size, usize::from(point.v) / config.grid_size);
+        let (cu, cv) = (usize::from(point.u) / size, usize::from(point.v) / size);
         let (low, high) = (point.disparity.saturating_sub(1), (point.disparity + 1).min(config.disparity_max));
         for row in out.chunks_exact_mut(columns).skip(cv.saturating_sub(1)).take(cv.min(1) + 2) {
             for cell in row.iter_mut().skip(cu.saturating_sub(1)).take(cu.min(1) + 2) {

@@ -45,24 +45,26 @@ fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
 }
 
 /// Smooths along the rows of `from` into `to`. Pixels nearer than four to an end stay as they are.
-#[expect(clippy::indexing_slicing, reason = "each slice is cut to n = width - 8 items")]
 pub(super) fn mean_along_rows(from: &[i16], width: usize, to: &mut [i16]) {
+    let width = width.max(1);
     for (from, to) in from.chunks_exact(width).zip(to.chunks_exact_mut(width)) {
-        to.copy_from_slice(from);
-        let Some(n) = width.checked_sub(2 * REACH) else { continue };
-        mean(&from[REACH..][..n], window().map(|k| &from[k..][..n]), &mut to[REACH..][..n]);
+        to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+        let n = width.saturating_sub(2 * REACH);
+        let taps = window().map(|k| from.get(k..).and_then(|tap| tap.get(..n)).unwrap_or(&[]));
+        if let (Some(centre), Some(to)) = (from.get(REACH..), to.get_mut(REACH..)) {
+            mean(centre.get(..n).unwrap_or(&[]), taps, to.get_mut(..n).unwrap_or_default());
+        }
     }
 }
 
 /// Smooths along the columns of `from`, whose row `first` is the first one of `to`.
-#[expect(clippy::indexing_slicing, reason = "rows first + i - 4 ..= first + i + 4 are in the image, each cut to its width")]
 pub(super) fn mean_along_columns(from: &[i16], width: usize, first: usize, to: &mut [i16]) {
+    let width = width.max(1);
     let height = from.len() / width;
-    for (i, to) in to.chunks_exact_mut(width).enumerate() {
-        let v = first + i;
-        let row = |v: usize| &from[v * width..][..width];
+    for (v, to) in (first..).zip(to.chunks_exact_mut(width)) {
+        let row = |v: usize| from.get(v * width..).and_then(|row| row.get(..width)).unwrap_or(&[]);
         if v < REACH || v + REACH >= height {
-            to.copy_from_slice(row(v));
+            to.iter_mut().zip(row(v)).for_each(|(to, from)| *to = *from);
         } else {
             mean(row(v), window().map(|k| row(v + k - REACH)), to);
         }

@@ -19,13 +19,24 @@ pub(super) struct Scratch<'a> {
 /// A root's size is kept as its negative; others point at a run nearer to the root.
 struct Runs<'a>(&'a mut [i32]);
 
-#[expect(clippy::indexing_slicing, reason = "runs are numbered below the number of pixels, and as many entries there are")]
 impl Runs<'_> {
+    /// A run's entry. Runs are numbered below the number of pixels, and as many entries there are: beyond them it is an empty root.
+    fn get(&self, run: usize) -> i32 {
+        self.0.get(run).copied().unwrap_or(-1)
+    }
+
+    fn set(&mut self, run: usize, entry: i32) {
+        if let Some(slot) = self.0.get_mut(run) {
+            *slot = entry;
+        }
+    }
+
     fn root(&mut self, mut run: usize) -> usize {
-        while let Ok(parent) = usize::try_from(self.0[run]) {
+        while let Ok(parent) = usize::try_from(self.get(run)) {
             // Halve the path, so that no chain gets long.
-            if self.0[parent] >= 0 {
-                self.0[run] = self.0[parent];
+            let above = self.get(parent);
+            if above >= 0 {
+                self.set(run, above);
             }
             run = parent;
         }
@@ -37,8 +48,8 @@ impl Runs<'_> {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
             let (keep, drop) = (a.min(b), a.max(b));
-            self.0[keep] += self.0[drop];
-            self.0[drop] = keep as i32;
+            self.set(keep, self.get(keep) + self.get(drop));
+            self.set(drop, keep as i32);
         }
     }
 }
@@ -46,7 +57,7 @@ impl Runs<'_> {
 /// Blanks segments of fewer than `smallest` pixels in an image `width` wide; neighbours differ by at most `similarity`, in the unit of
 /// the pixels and less than NONE is away from any. Returns the pixels blanked.
 pub(super) fn remove_speckles(disparity: &mut [i16], width: usize, similarity: i16, smallest: u32, scratch: Scratch<'_>) -> u32 {
-    let (pixels, Scratch { runs, ends, flags }) = (disparity.len(), scratch);
+    let (pixels, width, Scratch { runs, ends, flags }) = (disparity.len(), width.max(1), scratch);
     if smallest <= 1 || runs.len() < pixels || ends.len() < pixels || flags.len() < 2 * width {
         return 0;
     }
@@ -75,53 +86,58 @@ pub(super) fn remove_speckles(disparity: &mut [i16], width: usize, similarity: i
 }
 
 /// Finds the runs of all rows, numbered in scan order, those without disparity included, and unites them.
-#[expect(
-    clippy::indexing_slicing,
-    reason = "flags has two rows of width; runs are numbered below the number of pixels; ends rise to width"
-)]
 fn find_segments(disparity: &[i16], width: usize, similarity: u16, runs: &mut Runs<'_>, ends: &mut [u16], flags: &mut [u8]) {
-    let (breaks, touches) = flags.split_at_mut(width);
+    let width = width.max(1);
+    let Some((breaks, touches)) = flags.split_at_mut_checked(width) else { return };
     let (mut above, mut above_run): (&[i16], usize) = (&[], 0);
     let mut here_run = 0;
-    for (v, here) in disparity.chunks_exact(width).enumerate() {
-        let (ends_before, ends_here) = ends.split_at_mut(v * width);
+    let mut ends_above: &[u16] = &[];
+    for (here, ends_here) in disparity.chunks_exact(width).zip(ends.chunks_exact_mut(width)) {
         let mut start = 0;
         let mut count = 0;
+        let mut slots = ends_here.iter_mut();
         break_up(here, similarity, breaks, |end| {
-            runs.0[here_run + count] = start - i32::from(end);
-            ends_here[count] = end;
+            runs.set(here_run + count, start - i32::from(end));
+            if let Some(slot) = slots.next() {
+                *slot = end;
+            }
             start = i32::from(end);
             count += 1;
         });
-        if let Some(ends_above) = ends_before.len().checked_sub(width).map(|from| &ends_before[from..]) {
+        let ends_here: &[u16] = ends_here;
+        if !ends_above.is_empty() {
             for (touch, (&up, &here)) in touches.iter_mut().zip(above.iter().zip(here)) {
                 *touch = u8::from(up.abs_diff(here) <= similarity) & u8::from(here != NONE);
             }
             // Both rows' runs side by side, by the pieces on which they overlap.
             let (mut a, mut b, mut start) = (0, 0, 0);
-            while start < width {
-                let (end_above, end_here) = (usize::from(ends_above[a]), usize::from(ends_here[b]));
-                let end = end_above.min(end_here);
-                if here[start] != NONE && touches[start..end].contains(&1) {
+            while let (Some(&end_above), Some(&end_here)) = (ends_above.get(a), ends_here.get(b)) {
+                let end = usize::from(end_above.min(end_here));
+                let touched = || touches.get(start..end).is_some_and(|touches| touches.contains(&1));
+                if here.get(start).is_some_and(|&pixel| pixel != NONE) && touched() {
                     runs.unite(above_run + a, here_run + b);
                 }
                 start = end;
-                a += usize::from(end == end_above);
-                b += usize::from(end == end_here);
+                a += usize::from(end_above <= end_here);
+                b += usize::from(end_here <= end_above);
+                if start >= width {
+                    break;
+                }
             }
         }
-        (above, above_run) = (here, here_run);
+        (above, above_run, ends_above) = (here, here_run, ends_here);
         here_run += count;
     }
 }
 
 /// Calls `run` with the end of each run of a row.
-#[expect(clippy::indexing_slicing, reason = "breaks has as many bytes as the row has pixels, one at least")]
 fn break_up(row: &[i16], similarity: u16, breaks: &mut [u8], mut run: impl FnMut(u16)) {
-    for (flag, (&a, &b)) in breaks.iter_mut().zip(row.iter().zip(&row[1..])) {
+    for (flag, (&a, &b)) in breaks.iter_mut().zip(row.iter().zip(row.iter().skip(1))) {
         *flag = u8::from(a.abs_diff(b) > similarity);
     }
-    breaks[row.len() - 1] = 1;
+    if let Some(last) = breaks.last_mut() {
+        *last = 1;
+    }
     // Most pixels break nothing: eight at a time.
     let (eights, rest) = breaks.as_chunks::<8>();
     for (i, eight) in eights.iter().enumerate() {

@@ -24,7 +24,7 @@ const NEIGHBOURHOOD: usize = 1;
 
 /// Candidates along `length` px.
 pub(super) const fn candidates(length: usize, step: usize) -> usize {
-    length.div_ceil(step)
+    if step == 0 { 0 } else { length.div_ceil(step) }
 }
 
 /// Costs looked through at once.
@@ -63,7 +63,7 @@ impl SupportMatching<'_> {
         grid.fill(NO_MATCH);
         let Some((left, right)) = scratch.split_at_mut_checked(2 * width) else { return };
         let (Some((l0, l1)), Some((r0, r1))) = (left.split_at_mut_checked(width), right.split_at_mut_checked(width)) else { return };
-        for (j, out) in grid.chunks_exact_mut(candidates(width, step)).enumerate() {
+        for (j, out) in grid.chunks_exact_mut(candidates(width, step).max(1)).enumerate() {
             let v = (first + j) * step;
             let Some(above) = v.checked_sub(CORNER) else { continue };
             let ready = self.left.describe_row(above, l0)

@@ -160,7 +160,7 @@ impl Volume<'_> {
             }
         }
         self.keep_in_view(view, &mut report);
-        self.visible.sort();
+        self.visible.sort(self.pool.high_water());
         report
     }
 

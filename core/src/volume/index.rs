@@ -78,6 +78,10 @@ impl<'s> BlockIndex<'s> {
     pub fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32) -> Result<(), Full> {
         let rehash = |&slot: &u32| coord_of(coords, slot).map_or(0, hash);
         self.table.try_reserve(1, rehash).map_err(|_| Full)?;
+        // Known from the line above to the table, but not to the compiler, which else keeps the way to a panic.
+        if self.table.capacity() == self.table.len() {
+            return Err(Full);
+        }
         self.table.insert_unique(hash(coord), slot, rehash);
         Ok(())
     }

@@ -14,6 +14,12 @@ pub(super) struct Band<'b> {
     pub(super) faintest: &'b mut [u8],
 }
 
+/// Splits at `at`, or at the end where there is less.
+fn parts<T>(items: &mut [T], at: usize) -> (&mut [T], &mut [T]) {
+    let at = at.min(items.len());
+    items.split_at_mut_checked(at).unwrap_or_default()
+}
+
 impl<'b> Band<'b> {
     /// All listed blocks.
     pub(super) fn whole(slots: &'b [u32], blocks: &'b mut Blocks<'_>) -> Self {
@@ -31,15 +37,14 @@ impl<'b> Band<'b> {
 
     /// Splits before the block in the middle of the list.
     pub(super) fn halves(self) -> (Self, Self) {
-        let (low, high) = self.slots.split_at(self.slots.len() / 2);
+        let (low, high) = self.slots.split_at_checked(self.slots.len() / 2).unwrap_or_default();
         let border = high.first().map_or(self.first, |&slot| slot as usize);
-        let at = (border - self.first).min(self.sdf.len());
-        let coloured = at.min(self.colour.len());
-        let (sdf, sdf_high) = self.sdf.split_at_mut(at);
-        let (weight, weight_high) = self.weight.split_at_mut(at);
-        let (colour, colour_high) = self.colour.split_at_mut(coloured);
-        let (digest, digest_high) = self.digest.split_at_mut(at);
-        let (faintest, faintest_high) = self.faintest.split_at_mut(at);
+        let at = border - self.first;
+        let (sdf, sdf_high) = parts(self.sdf, at);
+        let (weight, weight_high) = parts(self.weight, at);
+        let (colour, colour_high) = parts(self.colour, at);
+        let (digest, digest_high) = parts(self.digest, at);
+        let (faintest, faintest_high) = parts(self.faintest, at);
         (
             Band {
                 slots: low,

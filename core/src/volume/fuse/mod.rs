@@ -45,7 +45,8 @@ pub struct Observation<'a> {
 impl Observation<'_> {
     /// The colour to fuse at a pixel, counted row by row.
     fn colour_at(&self, pixel: usize) -> [u8; 3] {
-        let (u, v) = (pixel % self.grey.width(), pixel / self.grey.width());
+        let width = self.grey.width().max(1);
+        let (u, v) = (pixel % width, pixel / width);
         let colour = match self.colour {
             Some(image) => image.get(u, v).unwrap_or_default(),
             None => [self.grey.get(u, v).unwrap_or_default(); 3],
@@ -85,8 +86,8 @@ impl<'a> Fusion<'a> {
         let voxel_m = f64::from(config.voxel_size_m);
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         let mut shares = [0; SHARES];
-        for (sum, share) in (0i32..).zip(&mut shares).skip(1) {
-            *share = ((1 << 23) + sum / 2) / sum;
+        for (sum, share) in (0i32..).zip(&mut shares) {
+            *share = ((1i32 << 23) + sum / 2).checked_div(sum).unwrap_or(0);
         }
         Self {
             seen,
@@ -110,7 +111,8 @@ impl<'a> Fusion<'a> {
 
     /// Weight of an observation at a pixel, counted row by row, of that depth; 0 keeps it out.
     fn observation_weight(&self, pixel: usize, depth_m: f32) -> i32 {
-        let (u, v) = (pixel % self.seen.grey.width(), pixel / self.seen.grey.width());
+        let width = self.seen.grey.width().max(1);
+        let (u, v) = (pixel % width, pixel / width);
         let by_depth = match self.config.observation_weight {
             ObservationWeight::One => 1,
             ObservationWeight::Depth => ((100.0 / depth_m) as i32).clamp(1, 10),

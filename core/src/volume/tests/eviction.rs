@@ -171,7 +171,7 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
                     model.insert(coord, old.saturating_add(1));
                 }
             }
-            volume.visible.sort();
+            volume.visible.sort(volume.pool.high_water());
             volume.prune();
             model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || shelf.blocks.contains_key(coord));
             assert_eq!(volume.pool.len(), volume.index.len());

@@ -25,7 +25,7 @@ fn plant(volume: &mut Volume<'_>, coord: BlockCoord, weight: impl Fn(usize) -> u
 fn frame(volume: &mut Volume<'_>, slots: &[u32]) -> PruneReport {
     volume.visible.begin_frame();
     slots.iter().for_each(|&slot| volume.visible.mark(slot).unwrap());
-    volume.visible.sort();
+    volume.visible.sort(volume.pool.high_water());
     volume.prune()
 }
 
@@ -41,7 +41,7 @@ fn frees_faint_blocks_lag_frames_after_they_were_seen_and_leaves_the_others_alon
         let firm: Vec<u32> = coords(100, 40).into_iter().map(|coord| plant(volume, coord, |_| 5)).collect();
         let before: Vec<_> = firm.iter().map(|&slot| (volume.blocks.sdf[slot as usize], volume.blocks.weight[slot as usize])).collect();
         faint.iter().chain(&firm).for_each(|&slot| volume.visible.mark(slot).unwrap());
-        volume.visible.sort();
+        volume.visible.sort(volume.pool.high_water());
         assert_eq!(volume.prune(), PruneReport::default());
         for _ in 1..10 {
             assert_eq!(frame(volume, &[]), PruneReport::default(), "nothing changes within the lag");
@@ -218,7 +218,7 @@ fn yields_exactly_the_blocks_visible_lag_frames_ago_through_frees_and_reuse() {
                     seen.insert((coord, born));
                 }
             }
-            volume.visible.sort();
+            volume.visible.sort(volume.pool.high_water());
             model.seen.insert(now, seen);
             // What leaves the window now, of the blocks that are still the same.
             let expected: BTreeSet<BlockCoord> = now
