@@ -1,9 +1,10 @@
 //! The one configuration, and what can be wrong with it.
 
 use crate::{
-    egomotion::EgomotionConfig,
+    egomotion::{EgomotionConfig, icp::IcpConfig},
     geometry::{RigProblem, StereoRig},
     instances::InstancesConfig,
+    mapper::MapperConfig,
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
     volume::{MeshConfig, RaycastConfig, VolumeConfig},
@@ -43,6 +44,10 @@ pub struct Config {
     pub scene_flow: SceneFlowConfig,
     /// The camera's motion.
     pub egomotion: EgomotionConfig,
+    /// The camera's motion from depth, where that is asked for.
+    pub icp: IcpConfig,
+    /// What the loop does, and when.
+    pub mapper: MapperConfig,
     /// What moves or could.
     pub instances: InstancesConfig,
     /// The map.
@@ -61,6 +66,8 @@ impl Config {
             stereo: StereoConfig::default(),
             scene_flow: SceneFlowConfig::default(),
             egomotion: EgomotionConfig::default(),
+            icp: IcpConfig::default(),
+            mapper: MapperConfig::default(),
             instances: InstancesConfig::default(),
             volume: VolumeConfig::default(),
             raycast: RaycastConfig::default(),
@@ -78,6 +85,8 @@ impl Config {
         self.stereo.validate(&mut problems);
         self.scene_flow.validate(&mut problems);
         self.egomotion.validate(&mut problems);
+        self.icp.validate(&mut problems);
+        self.mapper.validate(&mut problems);
         self.instances.validate(&mut problems);
         self.volume.validate(&mut problems);
         self.raycast.validate(&mut problems);

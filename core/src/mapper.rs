@@ -1,6 +1,10 @@
 //! The loop of the paper (Section III), one line per stage.
 
+mod camera;
+mod config;
 mod look;
+
+pub use config::{MapperConfig, MotionSource};
 
 use crate::{
     Capacity, Executor, Footprint, Stage,
@@ -170,23 +174,22 @@ impl<'s> Mapper<'s> {
         });
         // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
         let matched = scene_flow.status == FlowStatus::Matched;
-        let (pose, egomotion) = executor.stage(Stage::Egomotion, || self.move_camera(frame, matched, [width, height]));
-        let fused = pose != PoseOrigin::Held;
+        let (pose, egomotion, icp) = executor.stage(Stage::Egomotion, || self.move_camera(frame, matched, [width, height], executor));
+        let known = pose != PoseOrigin::Held;
+        let fused = known && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
         let moved = matches!(pose, PoseOrigin::Estimated | PoseOrigin::Given).then(|| *self.camera.t_current_previous());
-        let camera = CameraMotion {
-            t_world_camera: *self.camera.t_world_camera(),
-            t_current_previous: moved,
-            known: fused,
-        };
+        let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous: moved, known };
         // (D) The objects' motions.
         executor.stage(Stage::Instances, || {
             self.instances.follow(&config.rig, self.scene_flow.refined(), self.scene_flow.sparse(), &camera, &mut self.estimator);
         });
-        // (E) What the camera sees goes into the map, but for what might move, which has maps of its own; unless the pose is a guess.
+        // (E) What the camera sees goes into the map, but for what might move, which has maps of its own; unless the pose is a guess
+        // or the frame's turn has not come.
         let view = Viewpoint { rig: config.rig, width, height, t_world_camera: camera.t_world_camera };
         let allocation = if fused { self.fuse(frame, &view, executor, store) } else { AllocationReport::default() };
         executor.stage(Stage::Instances, || {
             let (picture, disparity) = (Picture { grey: left, colour: frame.colour }, self.stereo.disparity_q8());
+            let camera = CameraMotion { known: fused, ..camera };
             self.instances.reconstruct(&self.config.rig, &picture, disparity, &camera, executor, objects);
         });
         // (F) Noise last seen a fixed lag ago goes.
@@ -200,6 +203,7 @@ impl<'s> Mapper<'s> {
             scene_flow,
             pose,
             egomotion,
+            icp,
             instances: *self.instances.report(),
             fused,
             allocation,
@@ -241,36 +245,6 @@ impl<'s> Mapper<'s> {
         }
         self.size = Some(size);
         Ok(size)
-    }
-
-    /// Moves the camera: to where it is said to be, or as its matches say, `matched` telling whether there was a frame to match with.
-    fn move_camera(&mut self, frame: &StereoFrame<'_>, matched: bool, size: [usize; 2]) -> (PoseOrigin, Option<MotionEstimate>) {
-        if let Some(t_world_camera) = &frame.t_world_camera {
-            self.camera.place(t_world_camera);
-            // There is no way to the first place.
-            return (if self.frame == 0 { PoseOrigin::First } else { PoseOrigin::Given }, None);
-        }
-        let estimate = matched.then(|| self.follow_matches(size));
-        let pose = match (estimate, self.camera.held_frames()) {
-            (None, _) => PoseOrigin::First,
-            (_, 0) => PoseOrigin::Estimated,
-            _ => PoseOrigin::Held,
-        };
-        (pose, estimate)
-    }
-
-    /// Moves the camera by the matches that lie on nothing that moves.
-    fn follow_matches(&mut self, size: [usize; 2]) -> MotionEstimate {
-        let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
-        let (estimate, withheld) = {
-            let guides = self.instances.guides_camera(size);
-            let guiding = selection.iter().filter(|&&index| guides(index));
-            let withheld = selection.len() - guiding.clone().count();
-            let matches = guiding.filter_map(|&index| refined.get(index as usize));
-            (self.camera.step(&self.config.egomotion, &self.config.rig, matches, &mut self.estimator), withheld)
-        };
-        self.instances.note_withheld(withheld as u32);
-        estimate
     }
 
     /// Turns the disparity into depth, makes blocks around it and averages it in.

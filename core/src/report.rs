@@ -1,7 +1,7 @@
 //! What one step did, as plain values.
 
 use crate::{
-    egomotion::MotionEstimate,
+    egomotion::{MotionEstimate, icp::IcpReport},
     geometry::Transform,
     instances::InstancesReport,
     scene_flow::FlowReport,
@@ -75,9 +75,12 @@ pub struct Report {
     pub pose: PoseOrigin,
     /// The camera's motion from matches; none was looked for in the first frame, nor where the pose was given.
     pub egomotion: Option<MotionEstimate>,
+    /// The camera's motion from depth, where that is asked for; none in the first frame.
+    pub icp: Option<IcpReport>,
     /// What moves or could; [`crate::Mapper::tracks`] has the tracks one by one.
     pub instances: InstancesReport,
-    /// Whether the frame was fused. One whose pose had to be guessed is not: it would smear the map.
+    /// Whether the frame was fused. One whose pose had to be guessed is not: it would smear the map. Nor is one between two turns of
+    /// `mapper.fuse_every`.
     pub fused: bool,
     /// Blocks made and refused.
     pub allocation: AllocationReport,

@@ -312,3 +312,89 @@ fn what_moves_is_kept_apart_unless_no_masks_are_taken_or_all_goes_into_one_map()
         assert!(without["map"]["triangles"].as_u64() > with["map"]["triangles"].as_u64(), "{out}: cars are part of the one map");
     }
 }
+
+#[test]
+fn the_depth_tracker_follows_a_slow_camera_and_says_so_when_it_is_lost() {
+    let root = TempDir::new().unwrap();
+    let street =
+        ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=5", "--set", "street.traffic.mode=none"];
+    let run = |speed: &str, more: &[&str]| {
+        let speed = format!("street.speed_m_s={speed}");
+        let args =
+            [&["run", "--profile", "small", "--out", "result", "--overwrite", "--egomotion", "icp", "--set", &speed], &street[..], more];
+        let run = dynvox(root.path(), &args.concat());
+        assert!(run.status.success(), "{}", said(&run));
+        let read = |name: &str| fs::read_to_string(root.path().join("result").join(name)).unwrap();
+        let summary: serde_json::Value = serde_json::from_str(&read("summary.json")).unwrap();
+        let csv = read("frames.csv");
+        let at = csv.lines().next().unwrap().split(',').position(|column| column == "motion").unwrap();
+        let motions = csv.lines().skip(1).map(|line| line.split(',').nth(at).unwrap().to_owned()).collect::<Vec<_>>();
+        (summary["egomotion"].clone(), motions, String::from_utf8_lossy(&run.stdout).into_owned(), read("report.html"))
+    };
+    let (slow, motions, ..) = run("0.4", &["--quiet"]);
+    assert_eq!((&slow["source"], &slow["status"], &slow["tracking_failures"]), (&"icp".into(), &"ok".into(), &0.into()));
+    assert_eq!(motions, ["first", "tracked", "tracked", "tracked", "tracked"]);
+    assert!(slow["ate_m"].as_f64().unwrap() < 0.05, "{slow}");
+    let (fast, motions, told, report) = run("9", &[]);
+    assert_eq!(fast["status"], "tracking failure");
+    assert_eq!(fast["tracking_failures"], motions.iter().filter(|motion| motion.starts_with("tracking_failure_")).count());
+    assert_eq!(fast["first_failure"], motions.iter().position(|motion| motion.starts_with("tracking_failure_")).unwrap());
+    assert!(told.contains("tracking failure") && told.contains("--egomotion stereo"), "{told}");
+    assert!(report.contains("Tracking failure in"));
+}
+
+#[test]
+fn poses_of_a_file_take_the_place_of_egomotion_and_must_cover_the_frames() {
+    let root = TempDir::new().unwrap();
+    let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=4", "--profile", "small", "--json"];
+    let run = |out: &str, more: &[&str]| dynvox(root.path(), &[&["run", "--out", out], &street[..], more].concat());
+    let summary = |output: Output| -> serde_json::Value {
+        assert!(output.status.success(), "{}", said(&output));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let stereo = summary(run("stereo", &[]));
+    for file in ["trajectory_kitti.txt", "trajectory_tum.txt"] {
+        let given = summary(run(file, &["--egomotion", &format!("file:stereo/{file}")]));
+        assert_eq!((&given["egomotion"]["source"], &given["egomotion"]["held_frames"]), (&"file".into(), &0.into()));
+        let [there, here] = [&given, &stereo].map(|summary| summary["egomotion"]["ate_m"].as_f64().unwrap());
+        assert!((there - here).abs() < 1e-9, "{there} {here}");
+        let poses = fs::read_to_string(root.path().join("stereo").join(file)).unwrap();
+        fs::write(root.path().join("short.txt"), poses.lines().take(3).collect::<Vec<_>>().join("\n")).unwrap();
+        let refused = run("x", &["--egomotion", "file:short.txt"]);
+        assert!(
+            !refused.status.success() && said(&refused).contains("frame 3") && said(&refused).contains("short.txt"),
+            "{}",
+            said(&refused)
+        );
+    }
+    fs::write(root.path().join("odd.txt"), "1 2 3\n").unwrap();
+    assert!(said(&run("x", &["--egomotion", "file:odd.txt"])).contains("line 1 holds neither 12 numbers (KITTI) nor 8 (TUM)"));
+    assert!(said(&run("x", &["--egomotion", "file:nowhere.txt"])).contains("nowhere.txt cannot be read"));
+    assert!(said(&run("x", &["--egomotion", "imu"])).contains("one of stereo, icp, file:POSES"));
+    assert!(!root.path().join("x").exists());
+}
+
+#[test]
+fn every_kth_frame_alone_is_fused_and_that_harms_nothing() {
+    let root = TempDir::new().unwrap();
+    let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=5", "--profile", "small", "--json"];
+    let run = |every: &str| {
+        let run = dynvox(root.path(), &[&["run", "--out", every, "--fuse-every", every, "--strict"], &street[..]].concat());
+        assert!(run.status.success(), "{}", said(&run));
+        let csv = fs::read_to_string(root.path().join(every).join("frames.csv")).unwrap();
+        let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+        let column = |name: &str| header.iter().position(|column| *column == name).unwrap();
+        let [motion, visible] = ["motion", "fuse_ms"].map(column);
+        csv.lines()
+            .skip(1)
+            .map(|line| line.split(',').collect::<Vec<_>>())
+            .map(|row| (row[motion].to_owned(), row[visible] != "0.0000"))
+            .collect::<Vec<_>>()
+    };
+    let (all, second) = (run("1"), run("2"));
+    assert!(all.iter().all(|(_, fused)| *fused));
+    assert_eq!(second.iter().map(|(_, fused)| *fused).collect::<Vec<_>>(), [true, false, true, false, true]);
+    assert!(second.iter().skip(1).all(|(motion, _)| motion == "estimated"), "the camera is followed in every frame");
+    let refused = dynvox(root.path(), &[&["run", "--out", "x", "--fuse-every", "0"], &street[..]].concat());
+    assert!(said(&refused).contains("mapper.fuse_every must be 1 or more"), "{}", said(&refused));
+}

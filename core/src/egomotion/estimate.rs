@@ -145,6 +145,19 @@ impl<'s> Estimator<'s> {
         MotionEstimate { status: MotionStatus::Estimated, t_current_previous: Some(motion), ..estimate }
     }
 
+    /// How many of the matches that can be triangulated a motion explains within `within_px`, and how many those are.
+    pub fn explained<'m>(
+        &mut self,
+        rig: &StereoRig,
+        matches: impl IntoIterator<Item = &'m Match>,
+        motion: &Transform,
+        within_px: f32,
+    ) -> [u32; 2] {
+        self.inlier_len = 0;
+        self.points.fill(matches, rig);
+        [self.points.score(motion, rig, within_px, 0), self.points.len() as u32]
+    }
+
     /// The hypothesis that explains most points, the first of equals, and how many were drawn.
     fn draw(&self, config: &EgomotionConfig, rig: &StereoRig, random: &mut Random, start: &Transform) -> (Transform, u32) {
         let mut best = *start;

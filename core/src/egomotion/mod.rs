@@ -6,7 +6,7 @@
 //! less, because what rectification leaves of the lenses' errors grows steeply there.
 //!
 //! [`Estimator`] holds the room and estimates any set of matches; [`Egomotion`] follows the camera and holds its motion where the
-//! estimate fails.
+//! estimate fails. [`icp`] is another way, from depth alone.
 //!
 //! **Memory.** 36 bytes per match.
 //!
@@ -31,6 +31,7 @@
 
 mod config;
 mod estimate;
+pub mod icp;
 mod normal;
 mod points;
 mod track;

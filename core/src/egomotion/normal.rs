@@ -82,9 +82,41 @@ impl Normal {
         self.weight += weight;
     }
 
+    /// Adds one row: how a residual changes with the step, the residual, its weight.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "both indices run below N, the length of every row")]
+    pub(super) fn add_row(&mut self, row: [f64; N], residual: f64, weight: f64) {
+        for i in 0..N {
+            self.vector[i] += weight * row[i] * residual;
+            for j in 0..=i {
+                self.matrix[i][j] += weight * row[i] * row[j];
+            }
+        }
+        self.error += weight * residual * residual;
+        self.weight += weight;
+    }
+
+    /// How well the translation held worst is held, as a share of what rows that all point its way would do; a bound from below, from the
+    /// trace of the translation's covariance. 0 where the rows do not determine a motion.
+    pub(super) fn held_share(&self) -> f64 {
+        let variance = |axis: usize| {
+            let unit = core::array::from_fn(|at| if at == axis { 1.0 } else { 0.0 });
+            self.solve_for(unit).and_then(|solution| solution.get(axis).copied())
+        };
+        match (variance(3), variance(4), variance(5)) {
+            (Some(x), Some(y), Some(z)) if self.weight > 0.0 => 1.0 / ((x + y + z) * self.weight),
+            _ => 0.0,
+        }
+    }
+
     /// The step (rotation vector, translation) to the minimum, by LDL'; `None` where the points do not determine one.
-    #[expect(clippy::indexing_slicing, reason = "all indices run below N, the length of every row")]
     pub(super) fn solve(&self) -> Option<[f64; N]> {
+        self.solve_for(self.vector.map(|x| -x))
+    }
+
+    /// What the sums' matrix turns into `right`.
+    #[expect(clippy::indexing_slicing, reason = "all indices run below N, the length of every row")]
+    fn solve_for(&self, right: [f64; N]) -> Option<[f64; N]> {
         let mut lower = self.matrix;
         let mut pivot = [0.0; N];
         for j in 0..N {
@@ -105,7 +137,7 @@ impl Normal {
                 lower[i][j] = sum / d;
             }
         }
-        let mut step = self.vector.map(|x| -x);
+        let mut step = right;
         for i in 0..N {
             for k in 0..i {
                 step[i] -= lower[i][k] * step[k];

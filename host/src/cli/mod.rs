@@ -1,6 +1,7 @@
 //! The command line. Errors become sentences here and nowhere else.
 
 mod budget;
+mod egomotion;
 mod evaluate;
 mod fixtures;
 mod inspect;

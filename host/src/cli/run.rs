@@ -1,5 +1,6 @@
 //! `dynvox run`.
 
+use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
 use crate::depth::{self, DepthChoice};
@@ -55,6 +56,13 @@ pub struct RunArgs {
     /// Whether what moves is kept out of the static map and reconstructed apart; off fuses everything into one map [default: on]
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     dynamic: Option<bool>,
+    /// Where the camera's motion comes from: stereo (matches over two pairs), icp (depth against the map, the baseline of hand-held mappers:
+    /// expected to fail on a drive), or file:POSES (KITTI or TUM) [default: stereo]
+    #[arg(long, value_name = "SOURCE")]
+    egomotion: Option<EgomotionChoice>,
+    /// Fuse every K-th frame; the camera is followed in all [default: 1]
+    #[arg(long, value_name = "K")]
+    fuse_every: Option<u32>,
     /// Settings from a file; config.toml of an earlier run is one
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -149,8 +157,16 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     if let Some(dynamic) = args.dynamic {
         settings.set_dynamic(dynamic);
     }
+    if let Some(fuse_every) = args.fuse_every {
+        settings.set_fuse_every(fuse_every);
+    }
+    let poses = match &args.egomotion {
+        Some(choice) => choice.apply(&mut settings, dataset.as_ref(), &indices)?,
+        None => None,
+    };
     let plan = Plan {
         indices,
+        poses,
         profile: args.profile.clone(),
         capacity,
         config: settings.config(dataset.rig()),
@@ -258,7 +274,10 @@ fn conclude(run: &RunRecord, place: &Path) {
     if run.blocks_lost() > 0 {
         line("", format!("{} blocks are lost: {}", run.blocks_lost(), lost_because(run)));
     }
-    if run.held_frames() > 0 {
+    if let Some((failures, first, cause)) = run.tracking_failures() {
+        line("tracking failure", format!("in {failures} of {} frames, first in frame {first}: {cause}", run.rows.len()));
+        line("", "the poses of these frames are guesses, and they are not in the map. --egomotion stereo follows a drive".to_owned());
+    } else if run.held_frames() > 0 {
         line("held motion", format!("{} frames had too few matches", run.held_frames()));
     }
     line("digest", format!("{:016x}", run.digest()));

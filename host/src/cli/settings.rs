@@ -3,8 +3,10 @@
 use crate::synth::StreetConfig;
 use anyhow::{Context, bail};
 use dynvox_core::egomotion::EgomotionConfig;
+use dynvox_core::egomotion::icp::IcpConfig;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::instances::InstancesConfig;
+use dynvox_core::mapper::{MapperConfig, MotionSource};
 use dynvox_core::scene_flow::SceneFlowConfig;
 use dynvox_core::stereo::StereoConfig;
 use dynvox_core::volume::{MeshConfig, RaycastConfig, VolumeConfig};
@@ -20,6 +22,8 @@ pub struct Settings {
     stereo: StereoConfig,
     scene_flow: SceneFlowConfig,
     egomotion: EgomotionConfig,
+    icp: IcpConfig,
+    mapper: MapperConfig,
     instances: InstancesConfig,
     volume: VolumeConfig,
     raycast: RaycastConfig,
@@ -55,12 +59,25 @@ impl Settings {
 
     /// The mapper's configuration for a rig.
     pub fn config(&self, rig: StereoRig) -> Config {
-        let Self { stereo, scene_flow, egomotion, instances, volume, raycast, mesh, street: _ } = self;
+        let Self {
+            stereo,
+            scene_flow,
+            egomotion,
+            icp,
+            mapper,
+            instances,
+            volume,
+            raycast,
+            mesh,
+            street: _,
+        } = self;
         Config {
             rig,
             stereo: *stereo,
             scene_flow: *scene_flow,
             egomotion: *egomotion,
+            icp: *icp,
+            mapper: *mapper,
             instances: *instances,
             volume: *volume,
             raycast: *raycast,
@@ -79,6 +96,16 @@ impl Settings {
     /// Sets the time between two frames, which comes with the data set.
     pub fn set_frame_interval_s(&mut self, interval_s: f64) {
         self.instances.frame_interval_s = interval_s as f32;
+    }
+
+    /// Says where the camera's motion comes from.
+    pub fn set_motion_source(&mut self, source: MotionSource) {
+        self.mapper.egomotion = source;
+    }
+
+    /// Says how many frames lie from one that is fused to the next.
+    pub fn set_fuse_every(&mut self, frames: u32) {
+        self.mapper.fuse_every = frames;
     }
 
     /// Says whether what moves is kept apart.

@@ -59,6 +59,13 @@ struct EgomotionSummary {
     #[serde(skip_serializing_if = "Option::is_none")]
     ate_m: Option<f64>,
     held_frames: usize,
+    /// `stereo`, `icp` or `file`.
+    source: &'static str,
+    /// `ok`, or `tracking failure` where the depth tracker was lost in a frame.
+    status: &'static str,
+    tracking_failures: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    first_failure: Option<usize>,
 }
 
 #[derive(Debug, Serialize)]
@@ -163,6 +170,7 @@ impl Summary {
         let sum = |of: fn(&Report) -> u32| run.rows.iter().map(|row| u64::from(of(&row.report))).sum::<u64>();
         let errors = run.errors.as_ref();
         let stages = run.stage_statistics();
+        let failures = run.tracking_failures();
         Self {
             dataset: run.name.clone(),
             profile: run.profile.clone(),
@@ -184,6 +192,10 @@ impl Summary {
                 rpe_r_deg: errors.map(|errors| errors.rpe_r_deg),
                 ate_m: errors.map(|errors| errors.ate_m),
                 held_frames: run.held_frames(),
+                source: run.motion_source,
+                status: if failures.is_some() { "tracking failure" } else { "ok" },
+                tracking_failures: failures.map_or(0, |(count, ..)| count),
+                first_failure: failures.map(|(_, first, _)| first),
             },
             exact: run.exact.map(|still| ExactSummary { still }),
             lidar: run.lidar.as_ref().and_then(|lidar| lidar.figures.clone()),

@@ -5,6 +5,7 @@ use crate::evaluation::{exact::ExactFigures, trajectory::TrajectoryErrors};
 use crate::export::Mesh;
 use crate::segmentation::Refusals;
 use dynvox_core::egomotion::MotionStatus;
+use dynvox_core::egomotion::icp::IcpStatus;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::instances::State;
 use dynvox_core::memory::Region;
@@ -39,6 +40,16 @@ pub struct FrameRow {
 impl FrameRow {
     /// How the camera's motion was found, in one word.
     pub fn motion(&self) -> &'static str {
+        if let Some(icp) = &self.report.icp {
+            return match icp.status {
+                IcpStatus::Tracked => "tracked",
+                IcpStatus::TooFewPairs => "tracking_failure_too_few_pairs",
+                IcpStatus::NotHeld => "tracking_failure_direction_not_held",
+                IcpStatus::OffTheMap => "tracking_failure_off_the_map",
+                IcpStatus::TooFar => "tracking_failure_too_far",
+                IcpStatus::Contradicted => "tracking_failure_contradicted_by_the_images",
+            };
+        }
         match self.report.egomotion.map(|motion| motion.status) {
             None if self.report.pose == PoseOrigin::Given => "given",
             None => "first",
@@ -55,8 +66,12 @@ impl FrameRow {
         self.report.pose == PoseOrigin::Held
     }
 
-    /// Matches the estimate was made of, inliers among them, and their root mean square error in px.
+    /// Matches the estimate was made of, inliers among them, and their root mean square error in px; for the depth tracker those asked, and
+    /// those that agree.
     pub fn matches(&self) -> (u32, u32, f64) {
+        if let Some(icp) = &self.report.icp {
+            return (icp.matches[1], icp.matches[0], 0.0);
+        }
         self.report.egomotion.map_or((0, 0, 0.0), |motion| (motion.matches, motion.inliers, motion.residual_rms_px))
     }
 
@@ -121,6 +136,8 @@ pub struct RunRecord {
     pub name: String,
     /// What the data set's loader assumed.
     pub notes: Vec<String>,
+    /// Where the camera's motion came from: `stereo`, `icp` or `file`.
+    pub motion_source: &'static str,
     /// Name of the profile.
     pub profile: String,
     /// Its bounds.
@@ -184,6 +201,17 @@ impl RunRecord {
     /// Frames whose motion was held.
     pub fn held_frames(&self) -> usize {
         self.rows.iter().filter(|row| row.held()).count()
+    }
+
+    /// Frames the depth tracker lost, the number of the first of them and why it was lost; none where it was not used or lost none.
+    pub fn tracking_failures(&self) -> Option<(usize, usize, &'static str)> {
+        let mut failures = self
+            .rows
+            .iter()
+            .filter_map(|row| Some((row.frame, row.report.icp?.status)))
+            .filter(|(_, status)| *status != IcpStatus::Tracked);
+        let (first, status) = failures.next()?;
+        Some((1 + failures.count(), first, status.name()))
     }
 
     /// Estimated poses.

@@ -10,6 +10,7 @@ use crate::evaluation::exact::ExactErrors;
 use crate::export::RunFolder;
 use crate::segmentation::Sighting;
 use dynvox_core::geometry::{Transform, exp};
+use dynvox_core::mapper::MotionSource;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Capacity, Config, Mapper, Severity, Stage, StereoFrame};
@@ -37,6 +38,8 @@ pub struct Plan {
     pub dataset: Box<dyn Dataset>,
     /// Numbers of the frames to take.
     pub indices: Vec<usize>,
+    /// Poses of these frames to take in place of the camera's own motion.
+    pub poses: Option<Vec<Transform>>,
     /// Name of the profile.
     pub profile: String,
     /// Its bounds.
@@ -104,6 +107,11 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> Result<RunRecord, RunError> {
     Ok(RunRecord {
         name: plan.dataset.name().to_owned(),
         notes: plan.dataset.notes().to_vec(),
+        motion_source: match (&plan.poses, plan.config.mapper.egomotion) {
+            (Some(_), _) => "file",
+            (None, MotionSource::Stereo) => "stereo",
+            (None, MotionSource::Icp) => "icp",
+        },
         profile: plan.profile.clone(),
         capacity: plan.capacity,
         threads: plan.threads,
@@ -158,6 +166,7 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
         mapper: Mapper::new(&plan.capacity, &plan.config, slab).map_err(|error| refused(&plan.profile, error))?,
         threads: Threads::new(plan.threads).map_err(|source| RunError::Threads { count: plan.threads, source })?,
         shelf: Shelf::begin(plan.streaming, folder, &plan.config)?,
+        poses: plan.poses.as_ref().map(|poses| from_first(poses, &(0..poses.len()).collect::<Vec<_>>())),
         rows: Vec::new(),
         keyframes: Vec::new(),
         exact: ExactErrors::default(),
@@ -259,6 +268,8 @@ struct Course<'p, 's> {
     mapper: Mapper<'s>,
     threads: Threads,
     shelf: Shelf,
+    /// Given poses, the first at the origin.
+    poses: Option<Vec<Transform>>,
     rows: Vec<FrameRow>,
     keyframes: Vec<Keyframe>,
     exact: ExactErrors,
@@ -323,7 +334,7 @@ impl Course<'_, '_> {
             colour: images.colour.as_ref().and_then(|colour| colour.view()),
             class: None,
             disparity_q8: images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()),
-            t_world_camera: None,
+            t_world_camera: self.poses.as_ref().and_then(|poses| poses.get(self.rows.len()).copied()),
             detections: &detections,
         };
         self.threads.take_times();

@@ -95,6 +95,14 @@ fn trajectory(run: &RunRecord) -> String {
         run.rows.len(),
         chart::from_above(&paths)
     );
+    if let Some((failures, first, cause)) = run.tracking_failures() {
+        let _ = write!(
+            html,
+            "<p><b>Tracking failure in {failures} of {} frames</b>, first in frame {first}: {cause}. Their poses are guesses, and they are not in \
+             the map.</p>",
+            run.rows.len()
+        );
+    }
     if let Some(errors) = &run.errors {
         let _ = write!(
             html,

@@ -1,0 +1,249 @@
+//! The camera's motion from depth alone, against what the map shows from where the camera was: the tracker that voxel-hash mappers for
+//! hand-held depth cameras come with, kept here as the baseline they are.
+//!
+//! Projective data association and point-to-plane distance (Newcombe et al., *KinectFusion*, ISMAR 2011, Section 3.5), coarse to fine, as
+//! in InfiniTAM (Kähler et al., *Very High Frame Rate Volumetric Integration of Depth Images on Mobile Devices*, TVCG 2015; Prisacariu et
+//! al., *InfiniTAM v3*, 2017): a measured point is carried by the motion so far into the picture of the map, paired with the surface at the
+//! pixel it falls on, and the motion is moved to bring points onto their partners' planes. Every frame begins from standing still.
+//!
+//! On a street this is expected to fail: at 1 m a frame partners are wrong from the start, and a road between façades holds nothing along
+//! itself, so that standing still fits well. Such a motion must not pass for an estimate. KinectFusion's own tests are made (enough
+//! pairs, every direction held, a small motion); and since those do not see a slide along the street, the images' matches, which the
+//! tracker does not use, are asked whether they agree ([`IcpStatus::Contradicted`]).
+//!
+//! **Memory.** None of its own: the pyramid takes a third of a depth image that is lent. **Time.** Pixels / 4 x steps, on one thread.
+//!
+//! **What can go wrong.** [`IcpStatus`] says it; a failed motion is not handed out. Sums run row by row.
+
+mod config;
+mod pyramid;
+#[cfg(test)]
+mod tests;
+
+pub use config::{IcpConfig, MAX_LEVELS};
+
+use super::normal::{Normal, moved};
+use crate::{
+    geometry::{StereoRig, Transform},
+    image::View,
+};
+use nalgebra::{Point3, Vector3};
+use pyramid::Pyramid;
+
+/// Fewest pairs a motion is sought with.
+const PAIRS_MIN: u32 = 100;
+/// Step below which a level is done, rad and m: a tenth of a voxel at most.
+const STEP_MIN: f64 = 1e-4;
+/// Noise of a point beside that of its disparity, m.
+const NOISE_M: f64 = 0.02;
+/// Units of a normal's components.
+const NORMAL_ONE: f64 = 127.0;
+
+/// How tracking went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum IcpStatus {
+    /// There is a motion, and nothing speaks against it.
+    #[default]
+    Tracked,
+    /// The map shows too little, or the frame has too little depth.
+    TooFewPairs,
+    /// What is paired leaves a direction free.
+    NotHeld,
+    /// Most points in view of the map lie off it.
+    OffTheMap,
+    /// The motion is larger than it may be.
+    TooFar,
+    /// The matches of the images say otherwise.
+    Contradicted,
+}
+
+impl IcpStatus {
+    /// Name in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tracked => "tracked",
+            Self::TooFewPairs => "too few pairs",
+            Self::NotHeld => "direction not held",
+            Self::OffTheMap => "off the map",
+            Self::TooFar => "too far",
+            Self::Contradicted => "contradicted by the images",
+        }
+    }
+}
+
+/// What the tracker made of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct IcpReport {
+    /// How it went.
+    pub status: IcpStatus,
+    /// Maps previous camera coordinates to current ones; what was found, even where the status says that it is no motion to follow.
+    pub t_current_previous: Transform,
+    /// Points of the finest level that fall on a surface of the map.
+    pub points: u32,
+    /// Of these, within the distance of it.
+    pub pairs: u32,
+    /// Root mean square distance of the pairs from their planes, m.
+    pub residual_rms_m: f64,
+    /// Share of the pairs that hold the direction held worst.
+    pub held: f64,
+    /// Steps, over all levels.
+    pub steps: u32,
+    /// Matches of the images that agree, and how many were asked.
+    pub matches: [u32; 2],
+}
+
+impl IcpReport {
+    /// Asks the matches counted in `matches`; where there are none, they cannot speak against anything.
+    pub(crate) fn ask_matches(&mut self, config: &IcpConfig) {
+        let [explained, all] = self.matches.map(f64::from);
+        if self.status == IcpStatus::Tracked && explained < f64::from(config.explained_min) * all {
+            self.status = IcpStatus::Contradicted;
+        }
+    }
+
+    /// The motion, where there is one to follow.
+    pub fn motion(&self) -> Option<Transform> {
+        (self.status == IcpStatus::Tracked).then_some(self.t_current_previous)
+    }
+}
+
+/// What the map shows from where the camera was.
+#[derive(Clone, Copy, Debug)]
+pub struct MapPicture<'a> {
+    /// Depth, m, 0 none.
+    pub depth_m: View<'a, f32>,
+    /// Normals in that camera's axes, in 1/127.
+    pub normal: View<'a, [i8; 3]>,
+}
+
+/// Tracks one frame: `disparity_q8` measured now, `map` as seen from where the camera was. `memory` is overwritten; it needs a third of the
+/// image's pixels. The matches are not asked here.
+pub fn track(
+    config: &IcpConfig,
+    rig: &StereoRig,
+    limits_m: [f32; 2],
+    disparity_q8: View<'_, u16>,
+    map: &MapPicture<'_>,
+    memory: &mut [f32],
+) -> IcpReport {
+    let pyramid = Pyramid::build(rig, limits_m, disparity_q8, config.levels, memory);
+    let mut t_previous_current = Transform::identity();
+    let mut report = IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() };
+    for (level, depth_m) in pyramid.coarse_to_fine() {
+        let pairing = Pairing::new(config, rig, level);
+        for _ in 0..config.steps {
+            report.steps += 1;
+            let sums = pairing.sums(&t_previous_current, depth_m, map);
+            let Some(step) = sums.normal.solve().filter(|_| sums.pairs >= PAIRS_MIN) else { break };
+            t_previous_current = moved(&t_previous_current, step);
+            if step.iter().all(|part| part.abs() < STEP_MIN) {
+                break;
+            }
+        }
+        if level == 0 {
+            let sums = pairing.sums(&t_previous_current, depth_m, map);
+            (report.points, report.pairs) = (sums.points, sums.pairs);
+            report.residual_rms_m = libm::sqrt(sums.squared_m2 / f64::from(sums.pairs.max(1)));
+            report.held = sums.normal.held_share();
+            report.t_current_previous = t_previous_current.inverse();
+            report.status = judge(config, &report);
+        }
+    }
+    report
+}
+
+/// KinectFusion's tests of a motion.
+fn judge(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
+    let motion = &report.t_current_previous;
+    let (way_m, turn_rad) = (motion.translation.vector.norm(), 2.0 * motion.rotation.coords.xyz().norm());
+    if report.pairs < PAIRS_MIN {
+        IcpStatus::TooFewPairs
+    } else if report.held < f64::from(config.held_min) {
+        IcpStatus::NotHeld
+    } else if f64::from(report.pairs) < f64::from(config.pairs_min) * f64::from(report.points) {
+        IcpStatus::OffTheMap
+    } else if !(way_m <= f64::from(config.step_max_m) && turn_rad <= f64::from(config.step_max_rad)) {
+        IcpStatus::TooFar
+    } else {
+        IcpStatus::Tracked
+    }
+}
+
+/// How points of one level are paired.
+struct Pairing<'c> {
+    rig: &'c StereoRig,
+    /// Px of the image between two points.
+    stride_px: f64,
+    /// Factor on the distance.
+    widening: f64,
+    distance_m: f64,
+    /// Noise of a depth: its square times this, m.
+    noise_per_m: f64,
+}
+
+/// Sums over the pairs of a level.
+struct Sums {
+    normal: Normal,
+    points: u32,
+    pairs: u32,
+    squared_m2: f64,
+}
+
+impl<'c> Pairing<'c> {
+    fn new(config: &IcpConfig, rig: &'c StereoRig, level: usize) -> Self {
+        let stride_px = Pyramid::stride_px(level);
+        Self {
+            rig,
+            stride_px,
+            widening: 0.5 * stride_px,
+            distance_m: f64::from(config.distance_m),
+            noise_per_m: f64::from(config.noise_px) / rig.focal_baseline_px_m(),
+        }
+    }
+
+    /// Sums of the point-to-plane error's normal equations, row by row.
+    fn sums(&self, t_previous_current: &Transform, depth_m: View<'_, f32>, map: &MapPicture<'_>) -> Sums {
+        let rig = self.rig;
+        let mut sums = Sums { normal: Normal::ZERO, points: 0, pairs: 0, squared_m2: 0.0 };
+        let middle = |at: usize| (at as f64 + 0.5) * self.stride_px - 0.5;
+        for (v, row) in depth_m.rows().enumerate() {
+            let slope_v = (middle(v) - rig.center_v_px) / rig.focal_px;
+            for (u, &depth) in row.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+                let depth = f64::from(depth);
+                let slope_u = (middle(u) - rig.center_u_px) / rig.focal_px;
+                let carried = t_previous_current.transform_point(&Point3::new(slope_u * depth, slope_v * depth, depth));
+                let Some((surface, normal)) = self.partner(&carried.coords, map) else { continue };
+                sums.points += 1;
+                let away = carried.coords - surface;
+                let noise_m = self.noise_per_m * depth * depth;
+                let reach_m = (self.distance_m + 3.0 * noise_m) * self.widening;
+                if away.dot(&away) > reach_m * reach_m {
+                    continue;
+                }
+                let distance_m = normal.dot(&away);
+                let turn = carried.coords.cross(&normal);
+                let weight = 1.0 / (NOISE_M * NOISE_M + noise_m * noise_m);
+                sums.pairs += 1;
+                sums.squared_m2 += distance_m * distance_m;
+                sums.normal.add_row([turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], distance_m, weight);
+            }
+        }
+        sums
+    }
+
+    /// The map's surface at the pixel a point falls on, and its normal.
+    fn partner(&self, point: &Vector3<f64>, map: &MapPicture<'_>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let rig = self.rig;
+        let positive = point.z > 0.0;
+        let (u, v) = (rig.focal_px * point.x / point.z + rig.center_u_px, rig.focal_px * point.y / point.z + rig.center_v_px);
+        // Rounded down half a pixel further on: the nearest pixel. Casts hold at the ends, and a negative one is none.
+        if !(positive && u >= -0.5 && v >= -0.5) {
+            return None;
+        }
+        let (u, v) = ((u + 0.5) as usize, (v + 0.5) as usize);
+        let depth = f64::from(map.depth_m.get(u, v).filter(|depth| *depth > 0.0)?);
+        let normal = map.normal.get(u, v)?.map(|part| f64::from(part) / NORMAL_ONE);
+        let slopes = [(u as f64 - rig.center_u_px) / rig.focal_px, (v as f64 - rig.center_v_px) / rig.focal_px];
+        Some((Vector3::new(slopes[0] * depth, slopes[1] * depth, depth), Vector3::from(normal)))
+    }
+}
