@@ -129,11 +129,11 @@ pub fn track(
     let pyramid = Pyramid::build(rig, limits_m, disparity_q8, config.levels, memory);
     let mut t_previous_current = Transform::identity();
     let mut report = IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() };
-    for (level, depth_m) in pyramid.coarse_to_fine() {
+    for (level, disparity_px) in pyramid.coarse_to_fine() {
         let pairing = Pairing::new(config, rig, level);
         for _ in 0..config.steps {
             report.steps += 1;
-            let sums = pairing.sums(&t_previous_current, depth_m, map);
+            let sums = pairing.sums(&t_previous_current, disparity_px, map);
             let Some(step) = sums.normal.solve().filter(|_| sums.pairs >= PAIRS_MIN) else { break };
             t_previous_current = moved(&t_previous_current, step);
             if step.iter().all(|part| part.abs() < STEP_MIN) {
@@ -141,7 +141,7 @@ pub fn track(
             }
         }
         if level == 0 {
-            let sums = pairing.sums(&t_previous_current, depth_m, map);
+            let sums = pairing.sums(&t_previous_current, disparity_px, map);
             (report.points, report.pairs) = (sums.points, sums.pairs);
             report.residual_rms_m = libm::sqrt(sums.squared_m2 / f64::from(sums.pairs.max(1)));
             report.held = sums.normal.held_share();
@@ -202,14 +202,14 @@ impl<'c> Pairing<'c> {
     }
 
     /// Sums of the point-to-plane error's normal equations, row by row.
-    fn sums(&self, t_previous_current: &Transform, depth_m: View<'_, f32>, map: &MapPicture<'_>) -> Sums {
+    fn sums(&self, t_previous_current: &Transform, disparity_px: View<'_, f32>, map: &MapPicture<'_>) -> Sums {
         let rig = self.rig;
         let mut sums = Sums { normal: Normal::ZERO, points: 0, pairs: 0, squared_m2: 0.0 };
         let middle = |at: usize| (at as f64 + 0.5) * self.stride_px - 0.5;
-        for (v, row) in depth_m.rows().enumerate() {
+        for (v, row) in disparity_px.rows().enumerate() {
             let slope_v = (middle(v) - rig.center_v_px) / rig.focal_px;
-            for (u, &depth) in row.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
-                let depth = f64::from(depth);
+            for (u, &disparity) in row.iter().enumerate().filter(|(_, disparity)| **disparity > 0.0) {
+                let depth = rig.focal_baseline_px_m() / f64::from(disparity);
                 let slope_u = (middle(u) - rig.center_u_px) / rig.focal_px;
                 let carried = t_previous_current.transform_point(&Point3::new(slope_u * depth, slope_v * depth, depth));
                 let Some((surface, normal)) = self.partner(&carried.coords, map) else { continue };

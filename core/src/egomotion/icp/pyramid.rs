@@ -1,4 +1,5 @@
-//! The measured depth at half, a quarter and an eighth of its size, in memory lent for the purpose.
+//! The measured disparity at half, a quarter and an eighth of its size, in memory lent for the purpose. Disparities are averaged, not depths: on a
+//! plane their mean is that of the middle.
 
 use super::config::MAX_LEVELS;
 use crate::{
@@ -6,12 +7,14 @@ use crate::{
     image::{DISPARITY_ONE_PX, View},
 };
 
-/// Disparities within this of a block's first one are averaged with it, 1/256 px: means never bridge an edge.
-const SAME_Q8: u16 = 256;
-/// The same of depths, as a share.
-const SAME_SHARE: f32 = 0.05;
+/// Disparities within this of a block's first one are averaged with it, px: means never bridge an edge.
+const SAME_PX: f32 = 1.0;
+/// Least size of a level beyond the finest, px: on smaller ones most points lie on edges, and lead astray.
+const MIN_WIDTH: usize = 64;
+/// Its least height.
+const MIN_HEIGHT: usize = 20;
 
-/// Depth images, finest first; 0 where there is none.
+/// Disparity in px of the full image, finest first; 0 where there is none or its depth is beyond the limits.
 pub(super) struct Pyramid<'a> {
     levels: [Option<View<'a, f32>>; MAX_LEVELS as usize],
 }
@@ -22,17 +25,19 @@ impl<'a> Pyramid<'a> {
         let mut pyramid = Self { levels: [None; MAX_LEVELS as usize] };
         let (mut width, mut height) = (disparity_q8.width() / 2, disparity_q8.height() / 2);
         let mut rest = memory;
+        let limits_px = [limits_m[1], limits_m[0]].map(|depth_m| (rig.focal_baseline_px_m() / f64::from(depth_m)) as f32);
         let mut finer: Option<View<'a, f32>> = None;
         for slot in pyramid.levels.iter_mut().take(usize::from(levels)) {
             let pixels = width * height;
-            if pixels == 0 || rest.len() < pixels {
+            let coarse = finer.is_some() && (width < MIN_WIDTH || height < MIN_HEIGHT);
+            if coarse || pixels == 0 || rest.len() < pixels {
                 break;
             }
             let (level, after) = rest.split_at_mut(pixels);
             rest = after;
             match finer {
-                None => halve_disparity(rig, limits_m, disparity_q8, level, width),
-                Some(finer) => halve_depth(finer, level, width),
+                None => halve_given(limits_px, disparity_q8, level, width),
+                Some(finer) => halve(finer, level, width),
             }
             finer = View::new(level, width, height);
             *slot = finer;
@@ -52,35 +57,34 @@ impl<'a> Pyramid<'a> {
     }
 }
 
-/// Mean disparity of each 2 x 2 px, as depth.
-fn halve_disparity(rig: &StereoRig, [near_m, far_m]: [f32; 2], disparity_q8: View<'_, u16>, level: &mut [f32], width: usize) {
-    let px_m = (rig.focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX)) as f32;
+/// Mean of the given disparities of each 2 x 2 px within the limits, px.
+fn halve_given(limits_px: [f32; 2], disparity_q8: View<'_, u16>, level: &mut [f32], width: usize) {
+    let px = |value: u16| {
+        let px = f32::from(value) / f32::from(DISPARITY_ONE_PX);
+        if px >= limits_px[0] && px <= limits_px[1] { px } else { 0.0 }
+    };
     for (v, row) in level.chunks_exact_mut(width).enumerate() {
         for (to, four) in row.iter_mut().zip(blocks(disparity_q8.row(2 * v), disparity_q8.row(2 * v + 1))) {
-            let mut sum = 0u32;
-            let mut count = 0u32;
-            let first = four.into_iter().find(|&value| value > 0).unwrap_or(0);
-            for value in four.into_iter().filter(|&value| value > 0 && value.abs_diff(first) <= SAME_Q8) {
-                (sum, count) = (sum + u32::from(value), count + 1);
-            }
-            let depth_m = px_m * count as f32 / sum as f32;
-            // False where there is none: 0 / 0 is no number.
-            *to = if depth_m >= near_m && depth_m <= far_m { depth_m } else { 0.0 };
+            *to = mean(four.map(px));
         }
     }
 }
 
-/// Mean depth of each 2 x 2 px.
-fn halve_depth(finer: View<'_, f32>, level: &mut [f32], width: usize) {
+/// Mean of each 2 x 2 px of a finer level.
+fn halve(finer: View<'_, f32>, level: &mut [f32], width: usize) {
     for (v, row) in level.chunks_exact_mut(width).enumerate() {
         for (to, four) in row.iter_mut().zip(blocks(finer.row(2 * v), finer.row(2 * v + 1))) {
-            let first = four.into_iter().find(|&value| value > 0.0).unwrap_or(0.0);
-            let near = |value: f32| value > 0.0 && (value - first).abs() <= SAME_SHARE * first;
-            let (sum, count) =
-                four.into_iter().filter(|&value| near(value)).fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
-            *to = if count > 0.0 { sum / count } else { 0.0 };
+            *to = mean(four);
         }
     }
+}
+
+/// Mean of the disparities close to the first one there is.
+fn mean(four: [f32; 4]) -> f32 {
+    let first = four.into_iter().find(|&value| value > 0.0).unwrap_or(0.0);
+    let near = four.into_iter().filter(|&value| value > 0.0 && (value - first).abs() <= SAME_PX);
+    let (sum, count) = near.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 /// 2 x 2 px after 2 x 2 px of two rows.

@@ -8,9 +8,9 @@ use crate::{
 };
 use std::{vec, vec::Vec};
 
-const WIDTH: usize = 320;
-const HEIGHT: usize = 96;
-const RIG: StereoRig = StereoRig { focal_px: 180.0, center_u_px: 159.5, center_v_px: 47.5, baseline_m: 0.5 };
+const WIDTH: usize = 640;
+const HEIGHT: usize = 192;
+const RIG: StereoRig = StereoRig { focal_px: 360.0, center_u_px: 319.5, center_v_px: 95.5, baseline_m: 0.5 };
 const LIMITS_M: [f32; 2] = [0.5, 20.0];
 
 /// A plane: normal towards the camera, and where it cuts the axis along it.
@@ -69,7 +69,6 @@ fn small_motions_in_a_room_are_found() {
     for (turn, way_m) in [([0.0; 3], [0.0; 3]), ([0.0, 0.01, 0.0], [0.02, 0.0, 0.08]), ([0.004, -0.012, 0.003], [-0.05, 0.02, 0.05])] {
         let motion = walk(turn, way_m);
         let report = tracked(&IcpConfig::default(), &ROOM, &motion);
-        std::eprintln!("{report:?}");
         assert_eq!(report.status, IcpStatus::Tracked, "{report:?}");
         let error = report.t_current_previous * motion;
         assert!(error.translation.vector.norm() < 0.005 && error.rotation.angle() < 0.001, "{way_m:?}: {error:?}");
