@@ -65,11 +65,15 @@ impl Drive {
     }
 
     /// Runs all frames; `look` sees the mapper after each.
-    fn run(&self, dynamic: bool, backwards: bool, mut look: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
+    fn run(&self, dynamic: bool, backwards: bool, look: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
+        self.run_within(&CAPACITY, dynamic, backwards, look);
+    }
+
+    fn run_within(&self, capacity: &Capacity, dynamic: bool, backwards: bool, mut look: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
         let mut config = Config::for_rig(self.street.rig());
         config.instances.dynamic = dynamic;
-        let mut slab = HeapSlab::of(&CAPACITY);
-        let mut mapper = Mapper::new(&CAPACITY, &config, slab.bytes()).unwrap();
+        let mut slab = HeapSlab::of(capacity);
+        let mut mapper = Mapper::new(capacity, &config, slab.bytes()).unwrap();
         for (index, (frame, seen)) in self.frames.iter().enumerate() {
             let mut detections: Vec<_> = seen.iter().map(Seen::detection).collect();
             if backwards {
@@ -238,4 +242,23 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
         }
     });
     assert!(cars.contains(&"static") && cars.contains(&"dynamic"), "{cars:?}");
+}
+
+#[test]
+fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
+    let drive = Drive::new();
+    for (tracks, objects, object_blocks) in [(1, 1, 17), (1, 1, 1), (1, 0, 0)] {
+        let capacity = Capacity { tracks, objects, object_blocks, ..CAPACITY };
+        let (mut begun, mut refused, mut blocks) = (0, 0, 0);
+        drive.run_within(&capacity, true, false, |_, report, mapper| {
+            let seen = &report.instances;
+            assert!(seen.tracks.tracks <= 1 && mapper.tracks().count() <= 1 && seen.objects.objects as usize <= objects);
+            assert!(seen.objects.blocks as usize <= objects * object_blocks);
+            refused += seen.tracks.refused;
+            begun += seen.objects.begun;
+            blocks += seen.objects.blocks_refused;
+        });
+        assert!(refused > 0, "cars beyond the first are counted");
+        assert_eq!((begun > 0, blocks > 0), (objects > 0, objects > 0), "{objects} objects of {object_blocks} blocks");
+    }
 }

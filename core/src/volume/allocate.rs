@@ -32,6 +32,8 @@ pub struct AllocationReport {
     pub beyond: u32,
     /// Visible blocks left out of the list because it was full.
     pub unlisted: u32,
+    /// Most blocks the index had to compare to find one, or to find it missing.
+    pub probes_most: u32,
     /// Blocks that left to make room, and such that came back.
     pub eviction: EvictionReport,
 }
@@ -170,7 +172,11 @@ impl Volume<'_> {
             report.beyond += 1;
             return;
         };
-        let slot = match self.index.find(self.blocks.coord, coord) {
+        let (found, probes) = self.index.probe(self.blocks.coord, coord);
+        if probes > report.probes_most {
+            report.probes_most = probes;
+        }
+        let slot = match found {
             Some(slot) => slot,
             None => {
                 if self.pool.is_full() && !self.evict(store, &mut report.eviction) {

@@ -74,6 +74,17 @@ impl<'s> BlockIndex<'s> {
         self.table.find(hash(coord), |&slot| coord_of(coords, slot) == Some(coord)).copied()
     }
 
+    /// As [`BlockIndex::find`], and with how many blocks' coordinates were compared: 1 where nothing collides.
+    #[inline]
+    pub fn probe(&self, coords: &[[i16; 4]], coord: BlockCoord) -> (Option<u32>, u32) {
+        let mut compared = 0;
+        let same = |&slot: &u32| {
+            compared += 1;
+            coord_of(coords, slot) == Some(coord)
+        };
+        (self.table.find(hash(coord), same).copied(), compared)
+    }
+
     /// Enters `slot`, which must hold the coordinates `coord` in `coords` and not be entered yet.
     pub fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32) -> Result<(), Full> {
         let rehash = |&slot: &u32| coord_of(coords, slot).map_or(0, hash);
@@ -129,6 +140,9 @@ mod tests {
                 index.insert(&coords, coord, slot).unwrap();
                 model.insert(coord, slot);
             }
+            let (found, compared) = index.probe(&coords, coord);
+            assert_eq!(found, model.get(&coord).copied());
+            assert!(compared >= u32::from(found.is_some()) && compared < 64, "{compared} blocks compared");
             assert_eq!(index.len(), model.len());
         }
         for (&coord, &slot) in &model {

@@ -11,7 +11,8 @@ pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
         out,
         "frame,time_s,digest,step_ms,severity,motion,matches,inliers,residual_px,icp_points,icp_pairs,icp_residual_m,icp_held,features_dropped,stereo_density,depth_refused"
     )?;
-    write!(out, ",blocks_used,blocks_peak,blocks_visible,blocks_made,blocks_refused,blocks_out,blocks_lost,blocks_empty,blocks_back")?;
+    write!(out, ",blocks_used,blocks_peak,blocks_visible,blocks_made,blocks_refused,blocks_out,blocks_lost")?;
+    write!(out, ",blocks_empty,blocks_back,probes_most")?;
     write!(out, ",prune_visited,prune_voxels_reset,prune_blocks_freed,prune_carried_over,prune_early,history_frames,rss_bytes")?;
     write!(
         out,
@@ -36,7 +37,8 @@ pub fn write_frames(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
         }
         write!(out, ",{},{:.4},{}", report.dropped_features(), report.stereo.density(), row.depth_refused)?;
         write!(out, ",{},{},{},{}", blocks.used, blocks.peak, blocks.visible, allocation.made)?;
-        write!(out, ",{},{},{},{},{}", row.blocks_refused(), eviction.kept, eviction.lost, eviction.empty, eviction.returned)?;
+        write!(out, ",{},{},{}", row.blocks_refused(), eviction.kept, eviction.lost)?;
+        write!(out, ",{},{},{}", eviction.empty, eviction.returned, allocation.probes_most)?;
         write!(out, ",{},{},{},{}", prune.visited, prune.voxels_reset, prune.blocks_freed, prune.carried_over)?;
         write!(out, ",{},{}", prune.early, row.history_frames)?;
         write!(out, ",{}", row.rss_bytes.map(|bytes| bytes.to_string()).unwrap_or_default())?;

@@ -154,6 +154,7 @@ struct HealthSummary {
     blocks_lost: u64,
     blocks_unreadable: u64,
     matches_dropped: u64,
+    probes_most: u32,
     history_frames_most: usize,
     rss_limit_bytes: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -227,6 +228,7 @@ impl Summary {
                 blocks_refused: run.blocks_refused(),
                 blocks_lost: run.blocks_lost(),
                 blocks_unreadable: run.shelf.unreadable,
+                probes_most: run.rows.iter().map(|row| row.report.allocation.probes_most).max().unwrap_or_default(),
                 history_frames_most: run.rows.iter().map(|row| row.history_frames).max().unwrap_or_default(),
                 rss_limit_bytes: run.rss_limit_bytes,
                 disk_failure: run.shelf_failure.clone(),

@@ -278,6 +278,7 @@ fn counters(run: &RunRecord) -> String {
         ("blocks that left the pool and were kept", sum(|row| row.report.allocation.eviction.kept)),
         ("blocks that left with nothing in them", sum(|row| row.report.allocation.eviction.empty)),
         ("blocks brought back", run.blocks_back()),
+        ("blocks compared in one lookup of the index at most", most(|row| u64::from(row.report.allocation.probes_most))),
         ("blocks lost", run.blocks_lost()),
         ("blocks written at the end", u64::from(run.shelf.end.kept)),
         ("records on disk, replaced ones included", run.shelf.records),
