@@ -212,6 +212,9 @@ fn write(folder: &RunFolder, run: &RunRecord, summary: &Summary) -> Result<(), F
     folder.write("trajectory_tum.txt", |out| export::write_tum(out, &times, &poses))?;
     folder.write("frames.csv", |out| export::write_frames(out, &run.rows))?;
     folder.write("tracks.csv", |out| export::write_tracks(out, &run.rows))?;
+    if !run.objects.judged.is_empty() {
+        folder.write("tracks_truth.csv", |out| export::write_tracks_truth(out, &run.rows, &run.objects.judged))?;
+    }
     if let Some(lidar) = &run.lidar {
         folder.write("lidar.csv", |out| export::write_lidar(out, &lidar.frames))?;
     }

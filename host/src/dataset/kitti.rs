@@ -78,7 +78,7 @@ pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, Da
     let scaled = split.join("poses").join(format!("{name}.scaled.txt"));
     let labels_poses = [&scaled, &poses].into_iter().find(|path| path.is_file() && labels.is_file());
     let objects = match labels_poses {
-        Some(path) => labels::read_labels(&labels, &table::read_poses(path)?, LABELS_INTERVAL_S)?,
+        Some(path) => labels::read_labels(&labels, &table::read_poses(path)?, calibration.offset_m(2)?, LABELS_INTERVAL_S)?,
         None => Vec::new(),
     };
     Sequence::from_parts(Parts {

@@ -28,6 +28,8 @@ pub struct ObjectsTruth {
     pub t_world_camera: Transform,
     /// One by one.
     pub objects: Vec<TrueObject>,
+    /// Regions of which nothing is said: things there are neither known nor unknown.
+    pub unlabelled: Vec<PixelBox>,
 }
 
 impl ObjectsTruth {
@@ -52,15 +54,19 @@ impl ObjectsTruth {
                 speed_m_s: object.speed_m_s,
             })
         });
-        Self { t_world_camera: frame.t_world_camera, objects: seen.collect() }
+        Self {
+            t_world_camera: frame.t_world_camera,
+            objects: seen.collect(),
+            unlabelled: Vec::new(),
+        }
     }
 
     /// The same in an image scaled by `scale`.
     pub(super) fn scaled(mut self, scale: f64) -> Self {
         let of = |px: i32| (f64::from(px) * scale) as i32;
-        for object in &mut self.objects {
-            let PixelBox { left, top, width, height } = object.pixels;
-            object.pixels = PixelBox { left: of(left), top: of(top), width: of(width).max(1), height: of(height).max(1) };
+        for pixels in self.objects.iter_mut().map(|object| &mut object.pixels).chain(&mut self.unlabelled) {
+            let PixelBox { left, top, width, height } = *pixels;
+            *pixels = PixelBox { left: of(left), top: of(top), width: of(width).max(1), height: of(height).max(1) };
         }
         self
     }

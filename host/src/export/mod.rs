@@ -18,5 +18,5 @@ pub use lidar::write_lidar;
 pub use ply::{Mesh, PlyWriter};
 pub use portrait::portrait;
 pub use summary::Summary;
-pub use tracks::{state_name, write_tracks};
+pub use tracks::{state_name, write_tracks, write_tracks_truth};
 pub use trajectory::{write_kitti, write_numbered, write_tum};

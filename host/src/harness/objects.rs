@@ -4,11 +4,11 @@ use super::kept::{Kept, KeptObject};
 use super::tracks::{TrackRecord, TrackRow, track_records};
 use super::{FrameRow, Plan};
 use crate::dataset::StereoImages;
-use crate::evaluation::objects::{ObjectErrors, ObjectFigures};
+use crate::evaluation::objects::{Judged, ObjectErrors, ObjectFigures};
 use crate::evaluation::swept::Swept;
 use crate::export::{FolderError, RunFolder};
 use crate::segmentation::Refusals;
-use dynvox_core::instances::{DetectionCount, TrackReport};
+use dynvox_core::instances::{DetectionCount, InstancesConfig, TrackReport};
 use dynvox_core::{Mapper, Report};
 use std::path::Path;
 
@@ -21,6 +21,8 @@ pub struct ObjectsRecord {
     pub kept: Vec<KeptObject>,
     /// Tracks against truth.
     pub figures: Option<ObjectFigures>,
+    /// Every track of every frame that was compared with a true thing.
+    pub judged: Vec<(u32, Judged)>,
     /// Triangles of the static map where something drove; known where the truth is exact.
     pub swept_triangles: Option<u64>,
     /// What the source of masks said and could not be used.
@@ -35,13 +37,19 @@ pub struct ObjectsAtWork {
     pub sink: Kept,
     errors: ObjectErrors,
     swept: Option<Swept>,
+    instances: InstancesConfig,
 }
 
 impl ObjectsAtWork {
     /// Objects go into `objects` of the run folder; it is made with the first.
     pub fn new(folder: &RunFolder, plan: &Plan) -> Self {
         let sink = Kept::new(folder.file("objects"), plan.config.mesh);
-        Self { sink, errors: ObjectErrors::default(), swept: None }
+        Self {
+            sink,
+            errors: ObjectErrors::default(),
+            swept: None,
+            instances: plan.config.instances,
+        }
     }
 
     /// Notes a frame; returns the tracks seen in it.
@@ -51,7 +59,8 @@ impl ObjectsAtWork {
             self.sink.follow(frame, summary.id, summary.chain, summary.t_world_object);
         }
         if let Some(truth) = &images.objects {
-            self.errors.add(&tracks, &report.t_world_camera, truth);
+            let width = images.left.width();
+            self.errors.add(&tracks, &report.t_world_camera, truth, |pixels| self.instances.large_enough(pixels.area(), width));
             if images.exact.is_some() {
                 let t_map_world = report.t_world_camera * truth.t_world_camera.inverse();
                 let swept = self.swept.get_or_insert_default();
@@ -70,6 +79,7 @@ impl ObjectsAtWork {
             tracks: track_records(rows, &self.errors.tracks()),
             kept,
             figures: self.errors.figures(),
+            judged: self.errors.rows(),
             swept_triangles: None,
             refusals,
             detections: rows.iter().fold(DetectionCount::default(), |sum, row| summed(sum, &row.report.instances.detections)),

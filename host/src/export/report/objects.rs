@@ -30,7 +30,7 @@ pub fn section(run: &RunRecord) -> String {
     let mut html = format!(
         "<section><h2>What moves, or could</h2><p class=\"soft small\">{} detections, {} taken, {} too small, {} of classes left to the map, {} \
          refused; {} tracks{}. A bar is a track, its colour the state in each frame, the number its speed over ground in m/s, paler where the \
-         motion was not measured.</p>",
+         motion was not measured; the line below it is the truth, where it is known.</p>",
         grouped(u64::from(seen.given)),
         grouped(u64::from(seen.taken)),
         grouped(u64::from(seen.too_small)),
@@ -70,6 +70,29 @@ fn truth(run: &RunRecord) -> String {
             errors("moving at 20 to 32 m", &figures.moving_far),
             errors("standing within 20 m", &figures.standing_near)
         );
+        let [still, moving] = figures.confusion;
+        let cells = |counts: [u32; 3]| counts.map(|count| format!("<td class=n>{count}")).concat();
+        let _ = write!(
+            html,
+            "<table class=\"small\" style=\"width:auto\"><tr><th>frames<th class=n>called uncertain<th class=n>static<th class=n>dynamic</tr>\
+             <tr><td>standing{}</tr><tr><td>moving{}</tr></table>",
+            cells(still),
+            cells(moving)
+        );
+        if let Some(of) = &figures.association {
+            let _ = write!(
+                html,
+                "<p class=\"small\">Tracks and things, paired by boxes that overlap by 0.4: HOTA at that threshold {:.3} (detection {:.3}, association \
+                 {:.3}); {} pairs, {} things missed, {} tracks of nothing, {} changes of track.</p>",
+                of.hota,
+                of.deta,
+                of.assa,
+                grouped(of.matched),
+                grouped(of.missed),
+                grouped(of.spurious),
+                of.switches
+            );
+        }
     }
     if let Some(count) = run.objects.swept_triangles {
         let _ = write!(html, "<p class=\"small\">Triangles of the static map where something drove: <b>{}</b>.</p>", grouped(count));
@@ -129,6 +152,16 @@ fn lanes(run: &RunRecord, shown: &[&TrackRecord]) -> String {
                 let _ = write!(svg, r#"<text class="on" x="{:.1}" y="{:.1}">{speed:.1} m/s</text>"#, from + 4.0, y + 13.5);
             }
         }
+        for &(at, moving) in track.errors.iter().flat_map(|errors| &errors.moving) {
+            let state = state_name(if moving { State::Dynamic } else { State::Static });
+            let _ = write!(
+                svg,
+                r#"<rect class="{state}" x="{:.1}" y="{:.1}" width="{:.1}" height="2"/>"#,
+                x(at),
+                y + ROW - 3.0,
+                (x(at + 1) - x(at)).max(1.0)
+            );
+        }
     }
     let base = ROW * shown.len() as f64 + 16.0;
     for tick in 0..=6 {
@@ -144,18 +177,22 @@ fn lanes(run: &RunRecord, shown: &[&TrackRecord]) -> String {
 }
 
 fn table(shown: &[&TrackRecord]) -> String {
-    let mut html = "<details><summary class=\"small\">Track by track</summary><div class=\"scroll\"><table><tr><th>track<th>class<th class=n>frames\
-                    <th>state<th class=n>uncertain<th class=n>static<th class=n>dynamic<th class=n>m/s<th class=n>true m/s<th class=n>motion error, cm\
-                    <th class=n>°<th class=n>blocks</tr>"
-        .to_owned();
+    let mut html =
+        "<details><summary class=\"small\">Track by track</summary><div class=\"scroll\"><table><tr><th>track<th>class<th class=n>frames\
+                    <th>state<th class=n>uncertain<th class=n>static<th class=n>dynamic<th class=n>m/s<th class=n>true m/s<th class=n>thing\
+                    <th class=n>nearest, m<th class=n>motions<th class=n>median error, cm<th class=n>°<th class=n>RMS, cm<th class=n>°\
+                    <th class=n>late<th class=n>blocks</tr>"
+            .to_owned();
     let number = |value: Option<f64>, digits: usize| value.map_or(String::new(), |value| format!("{value:.digits$}"));
+    let whole = |value: Option<u64>| value.map_or(String::new(), |value| value.to_string());
     for track in shown {
         let errors = track.errors.as_ref();
         let [uncertain, still, moving] = track.states;
         let _ = write!(
             html,
             "<tr><td>{}<td>{}<td class=n>{} ({} to {})<td>{}<td class=n>{uncertain}<td class=n>{still}<td class=n>{moving}<td class=n>{}\
-             <td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}</tr>",
+             <td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}\
+             <td class=n>{}</tr>",
             track.id,
             track.class.name(),
             track.frames,
@@ -164,8 +201,14 @@ fn table(shown: &[&TrackRecord]) -> String {
             state_name(track.state),
             number(track.speed_m_s, 2),
             number(errors.map(|errors| errors.true_speed_m_s), 2),
+            whole(errors.map(|errors| u64::from(errors.truth))),
+            number(errors.map(|errors| errors.nearest_m), 1),
+            whole(errors.map(|errors| errors.motions as u64)),
             number(errors.and_then(|errors| errors.me_t_m).map(|error| 100.0 * error), 1),
             number(errors.and_then(|errors| errors.me_r_deg), 3),
+            number(errors.and_then(|errors| errors.me_t_rms_m).map(|error| 100.0 * error), 1),
+            number(errors.and_then(|errors| errors.me_r_rms_deg), 3),
+            whole(errors.map(|errors| u64::from(errors.late_frames))),
             track.blocks
         );
     }

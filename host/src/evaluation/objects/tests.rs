@@ -1,0 +1,122 @@
+use super::*;
+use crate::dataset::TrueObject;
+use dynvox_core::geometry::exp;
+use dynvox_core::instances::{Class, PixelBox};
+use nalgebra::Vector3;
+
+const PIXELS: PixelBox = PixelBox { left: 100, top: 50, width: 80, height: 40 };
+
+fn truth(frame: u32, moving: bool) -> ObjectsTruth {
+    // The camera drives and turns; the car drives 1 m a frame and turns by 0.02 rad.
+    let f = f64::from(frame);
+    let along = if moving { exp(Vector3::new(0.0, 0.02, 0.0) * f, Vector3::new(0.0, 0.0, 1.0) * f) } else { Transform::identity() };
+    let object = TrueObject {
+        id: 7,
+        pixels: PIXELS,
+        t_world_object: Transform::translation(3.0, 1.6, 12.0) * along,
+        dimensions_m: [1.8, 1.5, 4.0],
+        moving,
+        speed_m_s: if moving { 10.0 } else { 0.0 },
+    };
+    ObjectsTruth {
+        t_world_camera: exp(Vector3::new(0.0, 0.01, 0.0) * f, Vector3::new(0.0, 0.0, 0.8) * f),
+        objects: vec![object],
+        unlabelled: Vec::new(),
+    }
+}
+
+fn track(state: State, motion_world: Transform) -> TrackReport {
+    TrackReport {
+        id: 1,
+        class: Class::Car,
+        state,
+        score: 1.0,
+        seen: true,
+        first_frame: 0,
+        last_frame: 0,
+        sightings: 1,
+        pixels: PIXELS,
+        speed_m_s: Some([10.5, 0.1]),
+        measured: true,
+        center_world_m: [0.0; 3],
+        motion_world,
+        t_world_object: None,
+        matches: 50,
+        inliers: 40,
+        blocks: 0,
+    }
+}
+
+/// Feeds a drive in which the estimated world is the true one moved by `drift`, and each motion is off by `error` in the car's frame.
+fn drive(states: &[State], moving: &[bool], drift: &Transform, error: &Transform) -> ObjectErrors {
+    let mut errors = ObjectErrors::default();
+    for (at, (&state, &moving)) in states.iter().zip(moving).enumerate() {
+        let frame = at as u32;
+        let now = truth(frame, moving);
+        let before = truth(frame.saturating_sub(1), moving).objects[0].t_world_object;
+        let motion = before * (before.inverse() * now.objects[0].t_world_object * error) * before.inverse();
+        errors.add(&[track(state, drift * motion * drift.inverse())], &(drift * now.t_world_camera), &now, |_| true);
+    }
+    errors
+}
+
+#[test]
+fn a_motion_off_by_two_centimetres_has_that_error_wherever_the_camera_believes_to_be() {
+    let drift = exp(Vector3::new(0.1, -0.4, 0.05), Vector3::new(30.0, -2.0, 11.0));
+    let off = exp(Vector3::new(0.0, 0.001, 0.0), Vector3::new(0.02, 0.0, 0.0));
+    let errors = drive(&[State::Dynamic; 8], &[true; 8], &drift, &off).tracks()[&1].clone();
+    assert!((errors.me_t_m.unwrap() - 0.02).abs() < 1e-4, "{errors:?}");
+    assert!((errors.me_r_deg.unwrap() - 0.001f64.to_degrees()).abs() < 1e-6);
+    assert!((errors.speed_error_m_s.unwrap() - 0.5).abs() < 1e-5);
+    assert_eq!((errors.truth, errors.frames, errors.confusion), (7, 8, [[0; 3], [0, 0, 8]]));
+}
+
+#[test]
+fn a_state_may_take_five_frames_and_no_more() {
+    use State::{Dynamic as D, Static as S, Uncertain as U};
+    let of = |states: &[State], moving: &[bool]| drive(states, moving, &Transform::identity(), &Transform::identity()).tracks()[&1].clone();
+    let (m, s) = (true, false);
+    assert_eq!(of(&[U, U, U, U, U, D, D], &[m; 7]).late_frames, 0);
+    assert_eq!(of(&[U, U, U, U, U, U, D], &[m; 7]).late_frames, 1);
+    let starting = of(&[S, S, S, S, S, S, S, U, D, D], &[s, s, s, s, s, m, m, m, m, m]);
+    assert_eq!((starting.late_frames, starting.flips), (0, 0), "{starting:?}");
+    let flickering = of(&[S, S, S, S, S, S, D, S, U, D], &[s; 10]);
+    assert_eq!((flickering.late_frames, flickering.flips, flickering.confusion[0]), (3, 3, [1, 7, 2]));
+}
+
+#[test]
+fn what_overlaps_nothing_true_is_not_compared() {
+    let mut errors = ObjectErrors::default();
+    let elsewhere = TrackReport { pixels: PIXELS.moved([70, 0]), ..track(State::Dynamic, Transform::identity()) };
+    let unseen = TrackReport { seen: false, ..track(State::Dynamic, Transform::identity()) };
+    errors.add(&[elsewhere, unseen], &Transform::identity(), &truth(0, true), |_| true);
+    assert!(errors.tracks().is_empty() && errors.figures().is_none());
+}
+
+#[test]
+fn a_turning_car_is_judged_as_a_rigid_body() {
+    // Twenty metres ahead a car turns by a degree on the spot. A right motion has no error; the difference of the two places in the camera, taken for a
+    // motion with the same turn, would be off by 35 cm.
+    let before = Transform::translation(0.0, 1.6, 20.0);
+    let turn = exp(Vector3::new(0.0, 1f64.to_radians(), 0.0), Vector3::zeros());
+    let now = before * turn;
+    let motion_world = now * before.inverse();
+    let [metres, degrees] = motion_error(&before, &now, &motion_world);
+    assert!(metres < 1e-12 && degrees < 1e-6, "{metres} {degrees}");
+    let places = now.translation.vector - before.translation.vector;
+    let shortcut = Transform::from_parts(places.into(), turn.rotation);
+    assert!((motion_error(&before, &now, &shortcut)[0] - 20.0 * 1f64.to_radians()).abs() < 1e-3);
+}
+
+#[test]
+fn every_comparison_is_a_row_in_the_order_of_frames() {
+    let errors = drive(&[State::Uncertain, State::Dynamic, State::Dynamic], &[true; 3], &Transform::identity(), &Transform::identity());
+    let rows = errors.rows();
+    assert_eq!(
+        rows.iter().map(|(id, one)| (*id, one.at, one.error.is_some())).collect::<Vec<_>>(),
+        [(1, 0, false), (1, 1, true), (1, 2, true)]
+    );
+    let figures = errors.figures().unwrap();
+    assert_eq!((figures.association.unwrap().hota, figures.tracks), (1.0, 1));
+    assert_eq!((errors.tracks()[&1].motions, errors.tracks()[&1].moving.len()), (2, 3));
+}

@@ -1,0 +1,88 @@
+//! Errors of one track.
+
+use super::{FAR_M, Judged, SETTLING_FRAMES, median, rms};
+use dynvox_core::instances::State;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A track's errors.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrackErrors {
+    /// The true thing it belongs to in most frames.
+    pub truth: u32,
+    /// Frames compared.
+    pub frames: usize,
+    /// Frames by truth (static, dynamic) and state (uncertain, static, dynamic).
+    pub confusion: [[u32; 3]; 2],
+    /// Frames in which the state was not the true one although it had time to settle, within [`FAR_M`].
+    pub late_frames: u32,
+    /// Changes from static to dynamic or back while the truth stayed the same.
+    pub flips: u32,
+    /// Motions compared.
+    pub motions: usize,
+    /// Median translation error of the motion of a frame, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub me_t_m: Option<f64>,
+    /// Median rotation error, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub me_r_deg: Option<f64>,
+    /// Root mean square of the same, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub me_t_rms_m: Option<f64>,
+    /// Root mean square of the same, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub me_r_rms_deg: Option<f64>,
+    /// Median true speed, m/s.
+    pub true_speed_m_s: f64,
+    /// Median of the speed's error over the frames in which it is called dynamic, m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_error_m_s: Option<f64>,
+    /// Least distance, m.
+    pub nearest_m: f64,
+    /// Frames compared, by position in the run, and whether the thing moved.
+    #[serde(skip)]
+    pub moving: Vec<(usize, bool)>,
+}
+
+impl TrackErrors {
+    pub(super) fn of(judged: &[Judged]) -> Self {
+        let mut confusion = [[0; 3]; 2];
+        let mut votes = BTreeMap::<u32, usize>::new();
+        let (mut late_frames, mut flips) = (0, 0);
+        let mut last: Option<&Judged> = None;
+        for one in judged {
+            let state = match one.state {
+                State::Uncertain => 0,
+                State::Static => 1,
+                State::Dynamic => 2,
+            };
+            confusion[usize::from(one.moving)][state] += 1;
+            *votes.entry(one.truth).or_default() += 1;
+            let right = one.state == if one.moving { State::Dynamic } else { State::Static };
+            late_frames += u32::from(!right && one.settled >= SETTLING_FRAMES && one.distance_m < FAR_M);
+            if one.state != State::Uncertain {
+                let same = |before: &&Judged| before.truth == one.truth && before.moving == one.moving && one.settled >= SETTLING_FRAMES;
+                flips += u32::from(last.filter(same).is_some_and(|before| before.state != one.state));
+                last = Some(one);
+            }
+        }
+        let dynamic = judged.iter().filter(|one| one.state == State::Dynamic);
+        let errors = |at: usize| judged.iter().filter_map(move |one| Some(one.error?[at]));
+        Self {
+            truth: votes.into_iter().max_by_key(|&(_, count)| count).map_or(0, |(truth, _)| truth),
+            frames: judged.len(),
+            confusion,
+            late_frames,
+            flips,
+            motions: errors(0).count(),
+            me_t_m: median(errors(0)),
+            me_r_deg: median(errors(1)),
+            me_t_rms_m: rms(errors(0)),
+            me_r_rms_deg: rms(errors(1)),
+            true_speed_m_s: median(judged.iter().map(|one| one.true_speed_m_s)).unwrap_or_default(),
+            speed_error_m_s: median(dynamic.filter_map(|one| Some(one.speed_m_s? - one.true_speed_m_s))),
+            nearest_m: judged.iter().map(|one| one.distance_m).fold(f64::MAX, f64::min),
+            moving: judged.iter().map(|one| (one.at, one.moving)).collect(),
+        }
+    }
+}
