@@ -1,6 +1,7 @@
 //! The host of dynvox: feeds the core, watches its ceilings, shows what it made.
 
 pub mod cli;
+pub mod compare;
 pub mod dataset;
 pub mod depth;
 pub mod evaluation;

@@ -1,6 +1,7 @@
 //! The command line. Errors become sentences here and nowhere else.
 
 mod budget;
+mod diff;
 mod egomotion;
 mod evaluate;
 mod fixtures;
@@ -26,6 +27,7 @@ Examples:
   dynvox run ~/kitti --sequence 06 --evaluate lidar     accuracy and completeness of input and map
   dynvox evaluate trajectory out/kitti-odometry-06-001 ~/kitti/poses/06.txt
   dynvox synth --out street --set street.frames=50
+  dynvox diff out/a out/b                       the first frame and stage in which two runs part
 
 A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open the last in a browser.";
 
@@ -49,6 +51,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArgs),
     /// Write the synthetic street in KITTI's layout, with all its truth
     Synth(synth::SynthArgs),
+    /// Name the first frame and the first stage in which two runs part
+    Diff(diff::DiffArgs),
     /// Replay small clips against the digests on file
     Fixtures(fixtures::FixturesArgs),
 }
@@ -64,6 +68,7 @@ pub fn main() -> ExitCode {
         Some(Command::Budget(args)) => budget::run(&args),
         Some(Command::Evaluate(args)) => evaluate::run(&args),
         Some(Command::Synth(args)) => synth::run(&args),
+        Some(Command::Diff(args)) => return diff::main(&args),
         Some(Command::Fixtures(args)) => fixtures::run(&args),
     };
     match done {

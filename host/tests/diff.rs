@@ -1,0 +1,100 @@
+//! `dynvox diff` as a user meets it: one pixel, one setting, one frame fewer, and folders that are none.
+#![allow(missing_docs)]
+
+use image::{GrayImage, Luma};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+fn dynvox(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(folder).output().unwrap()
+}
+
+/// Four textured pairs of a plane, and a run of them named `clean`.
+fn prepared() -> TempDir {
+    let root = TempDir::new().unwrap();
+    for (side, shift) in [("left", 0), ("right", 10)] {
+        fs::create_dir_all(root.path().join("rig").join(side)).unwrap();
+        for at in 0..4 {
+            let texture = |u: u32, v: u32| Luma([((u / 3).wrapping_mul(2_654_435_761) ^ (v / 3).wrapping_mul(40_503_777) >> 7) as u8]);
+            let image = GrayImage::from_fn(160, 64, |u, v| texture(u + shift, v));
+            image.save(root.path().join(format!("rig/{side}/{at:03}.png"))).unwrap();
+        }
+    }
+    fs::write(root.path().join("rig/calib.txt"), "focal_px 90\ncenter_u_px 79.5\ncenter_v_px 31.5\nbaseline_m 0.5\n").unwrap();
+    run(root.path(), "clean", &[]);
+    root
+}
+
+fn run(root: &Path, out: &str, more: &[&str]) {
+    let output = dynvox(root, &[&["run", "rig", "--profile", "tiny", "--quiet", "--out", out], more].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Exit code and everything said.
+fn diff(root: &Path, args: &[&str]) -> (i32, String) {
+    let output = dynvox(root, &[&["diff"], args].concat());
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    (output.status.code().unwrap(), said)
+}
+
+#[test]
+fn one_bit_of_one_pixel_is_found_as_input_of_its_frame() {
+    let root = prepared();
+    run(root.path(), "again", &["--threads", "2"]);
+    let (code, said) = diff(root.path(), &["clean", "again"]);
+    assert_eq!((code, said.as_str()), (0, "equal in all 4 frames\n"));
+    let path = root.path().join("rig/left/002.png");
+    let mut image = image::open(&path).unwrap().into_luma8();
+    image.get_pixel_mut(80, 40).0[0] ^= 1;
+    image.save(&path).unwrap();
+    run(root.path(), "dirty", &[]);
+    let (code, said) = diff(root.path(), &["clean", "dirty"]);
+    assert_eq!((code, said.as_str()), (1, "the runs part at frame 2, first in: input\n"));
+}
+
+#[test]
+fn a_setting_is_named_beside_the_stage_it_reaches_first() {
+    let root = prepared();
+    run(root.path(), "coarse", &["--set", "volume.voxel_size_m=0.1"]);
+    let (code, said) = diff(root.path(), &["clean", "coarse"]);
+    assert_eq!(code, 1);
+    assert!(said.contains("setting volume.voxel_size_m: 0.05 in clean, 0.1 in coarse"), "{said}");
+    assert!(said.ends_with("the runs part at frame 0, first in: background\n"), "{said}");
+    run(root.path(), "sparse", &["--set", "scene_flow.bucket_matches=1"]);
+    let (code, said) = diff(root.path(), &["clean", "sparse"]);
+    assert!(code == 1 && said.ends_with("the runs part at frame 1, first in: matches\n"), "{said}");
+}
+
+#[test]
+fn a_shorter_run_is_the_beginning_of_a_longer_one() {
+    let root = prepared();
+    run(root.path(), "short", &["--frames", "3"]);
+    let (code, said) = diff(root.path(), &["clean", "short"]);
+    assert_eq!((code, said.as_str()), (1, "short is the beginning of clean: equal in its 3 frames, 1 more follow\n"));
+    assert_eq!(diff(root.path(), &["clean", "short", "--shared"]).0, 0);
+    run(root.path(), "first", &["--frames", "1"]);
+    run(root.path(), "rest", &["--start", "1"]);
+    let (code, said) = diff(root.path(), &["first", "rest"]);
+    assert!(code == 2 && said.contains("the runs share no frame"), "{said}");
+}
+
+#[test]
+fn what_is_no_run_folder_or_an_old_or_damaged_one_is_told_with_what_to_do() {
+    let root = prepared();
+    let trouble = |name: &str, sentence: &str| {
+        let (code, said) = diff(root.path(), &["clean", name]);
+        assert!(code == 2 && said.contains("error: ") && said.contains(sentence), "{said}");
+    };
+    trouble("rig", "rig is no run folder: it has no frames.csv");
+    trouble("rig", "Give a folder that `dynvox run` wrote");
+    trouble("nowhere", "nowhere is no run folder");
+    run(root.path(), "old", &[]);
+    let csv = root.path().join("old/frames.csv");
+    let text = fs::read_to_string(&csv).unwrap();
+    fs::write(&csv, text.replace("disparity_digest", "other")).unwrap();
+    trouble("old", "has no column disparity_digest: it is of an older dynvox");
+    fs::write(&csv, &text[..text.len() - 30]).unwrap();
+    trouble("old", "line 5 cannot be read");
+}
