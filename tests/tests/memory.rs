@@ -39,3 +39,18 @@ fn use_grows_with_the_map_and_never_beyond_what_was_cut() {
         assert!(last > 0);
     });
 }
+
+#[test]
+fn a_block_takes_the_bytes_promised_and_finding_and_remembering_it_little_beside_them() {
+    let clip = Clip::street(320, 96, 1);
+    for (capacity, voxel_bytes) in [(Capacity::ONBOARD, 3_072), (Capacity { colour: false, ..Capacity::ONBOARD }, 1_536)] {
+        clip.with_mapper(&capacity, |mapper| {
+            let footprint = mapper.footprint();
+            let bytes = |names: &[&str]| names.iter().filter_map(|name| footprint.region(name)).map(|region| region.bytes).sum::<usize>();
+            let voxels = bytes(&["volume.sdf", "volume.weight", "volume.colour"]);
+            assert_eq!(voxels, voxel_bytes * capacity.blocks);
+            let beside = bytes(&["volume.index", "volume.history", "volume.history_due", "volume.born"]);
+            assert!(beside > 0 && 20 * beside <= voxels, "{beside} bytes beside {voxels}");
+        });
+    }
+}

@@ -1,0 +1,170 @@
+//! The block index against a plain table: linear probes and deletion by shifting back, at no more bytes. A drive's churn: blocks ahead are
+//! entered, those behind struck, and around each there are lookups. Besides the mean it prints how long single insertions take: cleaning in
+//! place must not become a spike.
+
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a bench may stop at what it does not expect")]
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use dynvox_core::{
+    memory::Carver,
+    volume::{BlockCoord, BlockIndex},
+};
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+/// Blocks of the `onboard` profile.
+const BLOCKS: usize = 53_000;
+/// Blocks across the street: a slice of it enters while another is struck.
+const SLICE: usize = 1_000;
+const SLOTS: usize = 1 << 17;
+
+/// What a table has to do.
+trait Table {
+    fn find(&self, coords: &[[i16; 4]], coord: BlockCoord) -> Option<u32>;
+    fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32);
+    fn remove(&mut self, coords: &[[i16; 4]], coord: BlockCoord);
+}
+
+impl Table for BlockIndex<'_> {
+    fn find(&self, coords: &[[i16; 4]], coord: BlockCoord) -> Option<u32> {
+        self.find(coords, coord)
+    }
+
+    fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32) {
+        self.insert(coords, coord, slot).unwrap();
+    }
+
+    fn remove(&mut self, coords: &[[i16; 4]], coord: BlockCoord) {
+        assert!(self.remove(coords, coord));
+    }
+}
+
+/// Slots + 1 by hash; 0 is none.
+struct Plain(Vec<u32>);
+
+fn place(coord: [i16; 4]) -> usize {
+    let [x, y, z, _] = coord.map(|c| i64::from(c) as u64);
+    let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
+    let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    (mixed ^ (mixed >> 29)) as usize & (SLOTS - 1)
+}
+
+fn packed(coord: BlockCoord) -> [i16; 4] {
+    [coord.x, coord.y, coord.z, 0]
+}
+
+impl Plain {
+    fn seek(&self, coords: &[[i16; 4]], coord: [i16; 4]) -> Result<usize, usize> {
+        let mut at = place(coord);
+        while self.0[at] != 0 {
+            if coords[self.0[at] as usize - 1] == coord {
+                return Ok(at);
+            }
+            at = (at + 1) & (SLOTS - 1);
+        }
+        Err(at)
+    }
+}
+
+impl Table for Plain {
+    fn find(&self, coords: &[[i16; 4]], coord: BlockCoord) -> Option<u32> {
+        self.seek(coords, packed(coord)).ok().map(|at| self.0[at] - 1)
+    }
+
+    fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32) {
+        let mut at = place(packed(coord));
+        while self.0[at] != 0 {
+            at = (at + 1) & (SLOTS - 1);
+        }
+        let _ = coords;
+        self.0[at] = slot + 1;
+    }
+
+    fn remove(&mut self, coords: &[[i16; 4]], coord: BlockCoord) {
+        let mut hole = self.seek(coords, packed(coord)).unwrap();
+        let mut at = hole;
+        loop {
+            at = (at + 1) & (SLOTS - 1);
+            let Some(slot) = self.0[at].checked_sub(1) else { break };
+            // It may move into the hole unless its own place lies behind the hole.
+            if (at.wrapping_sub(place(coords[slot as usize])) & (SLOTS - 1)) >= (at.wrapping_sub(hole) & (SLOTS - 1)) {
+                self.0[hole] = self.0[at];
+                hole = at;
+            }
+        }
+        self.0[hole] = 0;
+    }
+}
+
+/// The `number`th block of the street: 25 across, 8 high, 5 deep a slice.
+fn block(number: usize) -> BlockCoord {
+    let (slice, within) = (number / SLICE, number % SLICE);
+    BlockCoord::new((within % 25) as i32 - 12, (within / 25 % 8) as i32 - 4, (slice * 5 + within / 200) as i32 % 30_000).unwrap()
+}
+
+struct Drive<T> {
+    table: T,
+    coords: Vec<[i16; 4]>,
+    /// Blocks entered so far; the oldest of those in the table is `BLOCKS` behind.
+    entered: usize,
+    insertions_ns: Vec<u32>,
+}
+
+impl<T: Table> Drive<T> {
+    fn new(table: T) -> Self {
+        let mut drive = Self { table, coords: vec![[0; 4]; BLOCKS], entered: 0, insertions_ns: Vec::new() };
+        (0..40 * BLOCKS / SLICE).for_each(|_| drop(drive.slice()));
+        drive.insertions_ns.clear();
+        drive
+    }
+
+    /// One slice ahead: strikes the oldest blocks, enters new ones, looks each up four times.
+    fn slice(&mut self) -> Duration {
+        let begin = Instant::now();
+        for number in self.entered..self.entered + SLICE {
+            let slot = number % BLOCKS;
+            if number >= BLOCKS {
+                self.table.remove(&self.coords, block(number - BLOCKS));
+            }
+            self.coords[slot] = packed(block(number));
+            let one = Instant::now();
+            self.table.insert(&self.coords, block(number), slot as u32);
+            self.insertions_ns.push(one.elapsed().as_nanos() as u32);
+            for back in 0..4 {
+                let number = number - (number % BLOCKS).min(back * 777);
+                black_box(self.table.find(&self.coords, block(number)));
+            }
+        }
+        self.entered += SLICE;
+        begin.elapsed()
+    }
+
+    fn bench(mut self, criterion: &mut Criterion, name: &str) {
+        criterion.bench_function(&format!("index_1000_in_and_out/{name}"), |bencher| {
+            bencher.iter_custom(|iterations| (0..iterations).map(|_| self.slice()).sum());
+        });
+        self.insertions_ns.sort_unstable();
+        let share = |share: f64| self.insertions_ns[(share * (self.insertions_ns.len() - 1) as f64) as usize];
+        println!(
+            "{name}: {} insertions, ns: median {}, p99.9 {}, p99.999 {}, worst {}",
+            self.insertions_ns.len(),
+            share(0.5),
+            share(0.999),
+            share(0.999_99),
+            share(1.0)
+        );
+    }
+}
+
+fn bench(criterion: &mut Criterion) {
+    let bytes = BlockIndex::bytes(BLOCKS);
+    assert!(SLOTS * size_of::<u32>() <= bytes, "the plain table has no more bytes");
+    let mut slab = vec![0u8; bytes + 64];
+    let start = slab.as_ptr().align_offset(64);
+    let index = BlockIndex::carve(BLOCKS, &mut Carver::new(&mut slab[start..], bytes).unwrap()).unwrap();
+    Drive::new(index).bench(criterion, "hashbrown");
+    Drive::new(Plain(vec![0; SLOTS])).bench(criterion, "plain");
+}
+
+criterion_group! { name = benches; config = Criterion::default().sample_size(50); targets = bench }
+criterion_main!(benches);
