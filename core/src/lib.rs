@@ -25,6 +25,7 @@ pub mod memory;
 pub mod random;
 pub mod report;
 pub mod scene_flow;
+pub mod snapshot;
 pub mod stage_digests;
 pub mod stereo;
 pub mod volume;

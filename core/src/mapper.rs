@@ -3,6 +3,7 @@
 mod camera;
 mod config;
 mod look;
+mod resume;
 
 pub use config::{MapperConfig, MotionSource};
 

@@ -1,5 +1,7 @@
 //! Seeded random numbers: one generator per purpose, handed in, so that one user's draws never shift another's.
 
+use crate::snapshot::Archive;
+
 /// PCG-XSH-RR 64/32 (O'Neill, *PCG: A Family of Simple Fast Space-Efficient Statistically Good Algorithms*, 2014): 8 bytes of state,
 /// integers only.
 #[derive(Clone, Debug)]
@@ -11,6 +13,11 @@ impl Random {
     /// A generator for one purpose. Equal seeds give equal draws on every machine.
     pub const fn new(seed: u64) -> Self {
         Self { state: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0xD1B5_4A32_D192_ED03 }
+    }
+
+    /// Writes or reads the state.
+    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+        archive.u64(&mut self.state);
     }
 
     /// 32 uniform bits.

@@ -6,6 +6,7 @@ use crate::{
     geometry::{StereoRig, Transform, renormalised},
     random::Random,
     scene_flow::Match,
+    snapshot::Archive,
 };
 
 /// Seed of the camera's own draws.
@@ -81,6 +82,16 @@ impl Egomotion {
             digest.f64(estimate.residual_rms_px);
         }
         digest.finish()
+    }
+
+    /// Writes or reads all of it.
+    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+        for transform in [&mut self.t_world_camera, &mut self.t_current_previous] {
+            archive.f64s(transform.rotation.as_mut_unchecked().coords.as_mut_slice());
+            archive.f64s(transform.translation.vector.as_mut_slice());
+        }
+        archive.u32(&mut self.held);
+        self.random.archive(archive);
     }
 
     /// Maps camera coordinates to world coordinates, which are the first camera's.

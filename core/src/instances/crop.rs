@@ -11,6 +11,7 @@ use crate::{
     geometry::StereoRig,
     image::View,
     memory::{Capacity, Carver, SlabError, region_bytes},
+    snapshot::Archive,
 };
 use bytemuck::{Pod, Zeroable};
 
@@ -209,6 +210,30 @@ impl<'s> Crops<'s> {
         };
         let grey = View::new(self.grey.get(room.clone())?, width, height)?;
         Some((self.disparity_q8.get(room)?, Picture { grey, colour }))
+    }
+
+    /// Writes or reads the crops that wait, with their pixels.
+    pub fn archive(&mut self, archive: &mut impl Archive) {
+        let (most, pixels) = (self.entries.len(), self.disparity_q8.len());
+        archive.count(&mut self.len, most);
+        archive.count(&mut self.next, pixels);
+        for crop in self.entries.iter_mut().take(self.len) {
+            archive.f64s(&mut crop.t_world_camera);
+            archive.f64s(&mut crop.t_world_object);
+            crop.pixels.archive(archive);
+            [&mut crop.id, &mut crop.start, &mut crop.len, &mut crop.coloured].into_iter().for_each(|number| archive.u32(number));
+            let end = crop.start as usize + crop.len as usize;
+            let room = crop.start as usize..end;
+            if end > pixels || i64::from(crop.len) != crop.pixels.area() {
+                archive.refuse();
+                return;
+            }
+            archive.u16s(self.disparity_q8.get_mut(room.clone()).unwrap_or(&mut []));
+            archive.raw(self.grey.get_mut(room.clone()).unwrap_or(&mut []));
+            if crop.coloured > 0 {
+                archive.raw(self.colour.get_mut(room).unwrap_or(&mut []).as_flattened_mut());
+            }
+        }
     }
 
     /// Takes which crops wait, and from where they were taken, into a digest.

@@ -13,6 +13,7 @@
 use super::config::MotionConfig;
 use crate::digest::Digest;
 use crate::geometry::{StereoRig, Transform, exp};
+use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
 
@@ -46,6 +47,15 @@ pub(super) struct Filter {
 }
 
 impl Filter {
+    /// Writes or reads all of it.
+    pub fn archive(&mut self, archive: &mut impl Archive) {
+        archive.f64s(&mut self.rate);
+        archive.f64s(self.covariance.as_flattened_mut());
+        archive.f64s(&mut self.center_world);
+        archive.u32(&mut self.frames);
+        archive.u32(&mut self.contradictions);
+    }
+
     /// Takes all of it into a digest.
     pub fn enter(&self, digest: &mut Digest) {
         self.rate.iter().chain(self.covariance.as_flattened()).chain(&self.center_world).for_each(|&number| digest.f64(number));

@@ -4,6 +4,7 @@
 //! Memory: 8 bytes for each 64 columns a row of a box touches, out of one bounded buffer.
 
 use crate::digest::Digest;
+use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
 
 /// Pixels in a word.
@@ -24,6 +25,12 @@ pub struct PixelBox {
 }
 
 impl PixelBox {
+    /// Writes or reads the box.
+    pub(super) fn archive(&mut self, archive: &mut impl Archive) {
+        let Self { left, top, width, height } = self;
+        [left, top, width, height].into_iter().for_each(|side| archive.i32(side));
+    }
+
     /// Pixels in the box.
     pub fn area(&self) -> i64 {
         i64::from(self.width.max(0)) * i64::from(self.height.max(0))
@@ -90,6 +97,13 @@ impl MaskPlace {
         Self { pixels, start: 0, stride: 0 }
     }
 
+    /// Writes or reads the place.
+    pub(super) fn archive(&mut self, archive: &mut impl Archive) {
+        self.pixels.archive(archive);
+        archive.u32(&mut self.start);
+        archive.u32(&mut self.stride);
+    }
+
     /// Column at which the words begin.
     fn origin(&self) -> i32 {
         self.pixels.left.div_euclid(WORD) * WORD
@@ -107,6 +121,13 @@ impl<'s> MaskStore<'s> {
     /// A store in `words`.
     pub fn new(words: &'s mut [u64]) -> Self {
         Self { words, used: 0 }
+    }
+
+    /// Writes or reads all masks.
+    pub(super) fn archive(&mut self, archive: &mut impl Archive) {
+        let most = self.words.len();
+        archive.count(&mut self.used, most);
+        archive.u64s(self.words.get_mut(..self.used).unwrap_or(&mut []));
     }
 
     /// Forgets all masks.

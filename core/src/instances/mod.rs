@@ -40,6 +40,7 @@
 //! Everything the detector gets wrong, and all of it is counted. A mask that holds two cars is one track and gets the motion of the one with
 //! more matches.
 
+mod archive;
 mod at;
 mod background;
 mod camera;

@@ -16,6 +16,7 @@
 
 use super::config::StateConfig;
 use crate::digest::Digest;
+use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
 
 /// What is known about a thing's motion.
@@ -41,7 +42,13 @@ impl State {
         }
     }
 
-    fn from_code(code: u32) -> Self {
+    /// The code, as tables keep it.
+    pub(super) const fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// The state of a code; [`State::Uncertain`] for one there is none for.
+    pub(super) fn from_code(code: u32) -> Self {
         match code {
             1 => Self::Static,
             2 => Self::Dynamic,
@@ -91,6 +98,12 @@ pub(super) struct Judgement {
 impl Judgement {
     pub fn state(&self) -> State {
         State::from_code(self.state)
+    }
+
+    /// Writes or reads all of it.
+    pub fn archive(&mut self, archive: &mut impl Archive) {
+        let Self { state, vote, streak, since_motion } = self;
+        [state, vote, streak, since_motion].into_iter().for_each(|number| archive.u32(number));
     }
 
     /// Takes all of it into a digest.

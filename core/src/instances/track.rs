@@ -13,6 +13,7 @@
 use super::{Class, InstancesConfig, MaskPlace, MaskStore, config::Overlap, detection::Taken, filter::Filter, state::Judgement};
 use crate::digest::Digest;
 use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
 
 /// A thing seen over time. Transforms are [x, y, z, w of the rotation, x, y, z of the translation].
@@ -58,6 +59,33 @@ pub(super) struct Track {
 impl Track {
     pub fn class(&self) -> Class {
         Class::from_code(self.class)
+    }
+
+    /// Writes or reads all of it.
+    fn archive(&mut self, archive: &mut impl Archive) {
+        let Self {
+            filter,
+            t_world_object,
+            t_world_origin,
+            place,
+            drift,
+            judgement,
+            score,
+            sigma_m_s,
+            ..
+        } = self;
+        filter.archive(archive);
+        archive.f64s(t_world_object);
+        archive.f64s(t_world_origin);
+        place.archive(archive);
+        drift.iter_mut().for_each(|px| archive.i32(px));
+        judgement.archive(archive);
+        archive.f32(score);
+        archive.f32(sigma_m_s);
+        let Self { id, class, class_lead, first_frame, last_frame, sightings, .. } = self;
+        [id, class, class_lead, first_frame, last_frame, sightings].into_iter().for_each(|number| archive.u32(number));
+        let Self { detection, chain, chains, matches, inliers, measured, .. } = self;
+        [detection, chain, chains, matches, inliers, measured].into_iter().for_each(|number| archive.u32(number));
     }
 
     /// Takes all of it but the place of its mask into a digest.
@@ -129,6 +157,14 @@ impl<'s> Tracks<'s> {
             next_id: 1,
             scores: carver.cut("instances.affinity", capacity.tracks * capacity.detections)?,
         })
+    }
+
+    /// Writes or reads all tracks.
+    pub fn archive(&mut self, archive: &mut impl Archive) {
+        let most = self.tracks.len();
+        archive.count(&mut self.len, most);
+        archive.u32(&mut self.next_id);
+        self.all_mut().iter_mut().for_each(|track| track.archive(archive));
     }
 
     pub fn all(&self) -> &[Track] {

@@ -7,6 +7,7 @@
 //! the next one given out.
 
 use super::{Carver, SlabError, region_bytes};
+use crate::snapshot::Archive;
 
 /// Every slot is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,6 +113,16 @@ impl<'s> SlotPool<'s> {
             return true;
         }
         false
+    }
+
+    /// Writes or reads the pool: which slots are taken, how often each was, and in which order the freed ones will be given out.
+    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+        let capacity = self.capacity();
+        archive.count(&mut self.fresh, capacity);
+        archive.count(&mut self.freed_len, self.fresh);
+        archive.count(&mut self.peak, capacity);
+        archive.u32s(self.generation.get_mut(..self.fresh).unwrap_or(&mut []));
+        archive.u32s(self.freed.get_mut(..self.freed_len).unwrap_or(&mut []));
     }
 
     /// Whether the slot is still the one the handle was made for.

@@ -8,6 +8,7 @@ use super::{
 use crate::{
     image::View,
     memory::{Capacity, Carver, SlabError, region_bytes},
+    snapshot::Archive,
 };
 
 /// Counts of one image.
@@ -115,6 +116,23 @@ impl<'s> Camera<'s> {
         let [a, b] = &mut self.frames;
         let frame = if self.current { b } else { a };
         let (width, height) = (image.width(), image.height());
+        for (kept, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
+            kept.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
+        }
+        self.describe(width, height, response_min)
+    }
+
+    /// Writes or reads the pixels of the current frame; [`Camera::describe`] makes the rest.
+    pub(super) fn archive(&mut self, [width, height]: [usize; 2], archive: &mut impl Archive) {
+        let [a, b] = &mut self.frames;
+        let frame = if self.current { b } else { a };
+        frame.pixels.chunks_mut(width.max(1)).take(height).for_each(|row| archive.raw(row));
+    }
+
+    /// Finds the features of the current frame.
+    pub(super) fn describe(&mut self, width: usize, height: usize, response_min: i16) -> FeatureCount {
+        let [a, b] = &mut self.frames;
+        let frame = if self.current { b } else { a };
         let pixels = width * height;
         let (Some(gradient), Some(blob), Some(corner)) =
             (self.gradient.get_mut(..pixels), self.blob.get_mut(..pixels), self.corner.get_mut(..pixels))
@@ -123,9 +141,7 @@ impl<'s> Camera<'s> {
             frame.sparse.clear();
             return FeatureCount::default();
         };
-        for (kept, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
-            kept.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
-        }
+        let Some(image) = View::new(frame.pixels, width, height) else { return FeatureCount::default() };
         filter(image, Responses { gradient, blob, corner }, self.sums);
         let mut found = 0;
         let mut slots = self.candidates.iter_mut();

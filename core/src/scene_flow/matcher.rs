@@ -17,6 +17,7 @@ use crate::{
     executor::{Executor, join4},
     image::View,
     memory::{Capacity, Carver, SlabError, region_bytes},
+    snapshot::Archive,
 };
 
 /// Cells in which sparse matches look for support, px; those of the dense pass are [`CELL_MIN_PX`].
@@ -67,6 +68,11 @@ const RIGHT: Names = Names {
     sums: "scene_flow.right.sums",
     candidate: "scene_flow.right.candidate",
 };
+
+/// Least response of a feature, as responses are kept.
+fn response_min(config: &SceneFlowConfig) -> i16 {
+    config.response_min.min(i16::MAX as u16) as i16
+}
 
 /// Sparse matches kept.
 const fn sparse_matches(capacity: &Capacity) -> usize {
@@ -156,6 +162,24 @@ impl<'s> FlowMatcher<'s> {
         self.clear();
     }
 
+    /// Writes or reads the last pair; [`FlowMatcher::remake`] must follow a reading. The matches are of that frame alone and not in it.
+    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+        let [mut width, mut height] = self.last.unwrap_or_default();
+        archive.count(&mut width, self.capacity[0]);
+        archive.count(&mut height, self.capacity[1]);
+        self.last = (width * height > 0).then_some([width, height]);
+        self.left.archive([width, height], archive);
+        self.right.archive([width, height], archive);
+    }
+
+    /// Finds the features of the pair that was read.
+    pub(crate) fn remake(&mut self, config: &SceneFlowConfig) {
+        if let Some([width, height]) = self.last {
+            self.left.describe(width, height, response_min(config));
+            self.right.describe(width, height, response_min(config));
+        }
+    }
+
     fn clear(&mut self) {
         (self.sparse_len, self.refined_len, self.selection_len) = (0, 0, 0);
     }
@@ -168,7 +192,7 @@ impl<'s> FlowMatcher<'s> {
             self.last = None;
             return FlowReport { status: FlowStatus::Refused, ..FlowReport::default() };
         }
-        let response_min = config.response_min.min(i16::MAX as u16) as i16;
+        let response_min = response_min(config);
         let (left, right) = executor.join(|| self.left.take(left, response_min), || self.right.take(right, response_min));
         let mut report = FlowReport { left, right, ..FlowReport::default() };
         if self.last.replace(size) != Some(size) {

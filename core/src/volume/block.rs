@@ -4,6 +4,7 @@
 //! weight).
 
 use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::snapshot::Archive;
 
 /// Lattice points along a block's side.
 pub const BLOCK_SIDE: usize = 8;
@@ -90,6 +91,21 @@ impl<'s> Blocks<'s> {
             digest: carver.cut("volume.digest", capacity.blocks)?,
             faintest: carver.cut("volume.faintest", capacity.blocks)?,
         })
+    }
+
+    /// Writes or reads the block in a slot: its place, its voxels and what they were last summed up to. The digest of a block that was made and
+    /// never fused is 0, which its voxels would not tell.
+    pub(super) fn archive(&mut self, slot: usize, archive: &mut impl Archive) {
+        if let (Some(coord), Some(sdf), Some(weight)) = (self.coord.get_mut(slot), self.sdf.get_mut(slot), self.weight.get_mut(slot)) {
+            archive.i16s(coord);
+            archive.i16s(sdf);
+            archive.raw(weight);
+        }
+        if let (Some(digest), Some(faintest)) = (self.digest.get_mut(slot), self.faintest.get_mut(slot)) {
+            archive.u64(digest);
+            archive.u8(faintest);
+        }
+        self.colour.get_mut(slot).into_iter().flatten().for_each(|plane| archive.raw(plane));
     }
 
     /// Makes a slot an empty block at `coord`.

@@ -8,6 +8,7 @@
 //! per visible block to enter a frame; a pass over one set to take one out.
 
 use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::snapshot::Archive;
 
 /// Frames, as bit sets over slots, oldest first out.
 #[derive(Debug)]
@@ -124,6 +125,20 @@ impl<'s> VisibleHistory<'s> {
             }
         }
         Some(frame)
+    }
+
+    /// Writes or reads the ring, in a pool of which `slots` slots were ever given out.
+    pub(super) fn archive(&mut self, slots: usize, archive: &mut impl Archive) {
+        let (capacity, words) = (self.capacity(), slots.div_ceil(64));
+        archive.u32(&mut self.oldest);
+        archive.count(&mut self.len, capacity);
+        archive.count(&mut self.peak, capacity);
+        for age in 0..self.len as u32 {
+            let set = self.set_mut(self.oldest.wrapping_add(age)).and_then(|set| set.get_mut(..words));
+            archive.u64s(set.unwrap_or(&mut []));
+        }
+        archive.u64s(self.due.get_mut(..words).unwrap_or(&mut []));
+        archive.u32s(self.born.get_mut(..slots).unwrap_or(&mut []));
     }
 
     /// The oldest frame in the ring.

@@ -8,6 +8,7 @@
 mod allocate;
 #[cfg(test)]
 mod analytic;
+mod archive;
 mod block;
 mod config;
 mod fuse;

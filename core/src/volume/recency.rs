@@ -3,6 +3,7 @@
 //! Memory: 8 bytes a block.
 
 use crate::memory::{Carver, SlabError, region_bytes};
+use crate::snapshot::Archive;
 
 /// The list. Links are slot + 1; 0 is none.
 #[derive(Debug)]
@@ -54,6 +55,12 @@ impl<'s> Recency<'s> {
         self.set(older, NEWER, newer);
         self.set(newer, OLDER, older);
         self.link(slot + 1, [0; 2]);
+    }
+
+    /// Writes or reads the list, in a pool of which `slots` slots were ever given out.
+    pub(super) fn archive(&mut self, slots: usize, archive: &mut impl Archive) {
+        archive.u32s(&mut self.ends);
+        archive.u32s(self.links.get_mut(..slots).unwrap_or(&mut []).as_flattened_mut());
     }
 
     fn link(&mut self, entry: u32, links: [u32; 2]) {

@@ -6,6 +6,7 @@
 //! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
 
 use crate::memory::{Capacity, Carver, Full, SlabError, region_bytes};
+use crate::snapshot::Archive;
 
 /// This frame's visible slots, each once.
 #[derive(Debug)]
@@ -84,6 +85,17 @@ impl<'s> VisibleList<'s> {
     /// Entry `i` of the last frame's list.
     pub(super) fn before(&self, i: usize) -> Option<u32> {
         self.before.get(..self.before_len)?.get(i).copied()
+    }
+
+    /// Writes or reads who was visible, in a pool of which `slots` slots were ever given out. The list before the last is not needed: the next
+    /// frame begins by forgetting it.
+    pub(super) fn archive(&mut self, slots: usize, archive: &mut impl Archive) {
+        archive.u32(&mut self.frame);
+        let most = self.slots.len();
+        archive.count(&mut self.peak, most);
+        archive.count(&mut self.len, most);
+        archive.u32s(self.slots.get_mut(..self.len).unwrap_or(&mut []));
+        archive.u32s(self.last_visible.get_mut(..slots).unwrap_or(&mut []));
     }
 
     /// Orders the list by slot, which is the order of fusion and of memory; all slots are below `end`. Reads off which slots are

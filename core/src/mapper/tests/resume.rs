@@ -1,0 +1,172 @@
+//! A drive stopped and resumed is the drive that never stopped; what is no whole snapshot of this mapper is refused.
+
+use super::*;
+use crate::snapshot::RestoreError;
+
+const FRAMES: usize = 10;
+/// So few blocks that some must leave.
+const CROWDED: Capacity = Capacity { blocks: 330, ..CAPACITY };
+
+fn saved(mapper: &mut Mapper<'_>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut sink = |piece: &[u8]| -> Result<(), ()> {
+        bytes.extend_from_slice(piece);
+        Ok(())
+    };
+    mapper.save(&mut sink).unwrap();
+    bytes
+}
+
+/// What a source says that has no more bytes.
+#[derive(Debug, PartialEq)]
+struct Ended;
+
+/// Restores a mapper and hands it to `go_on`; a slab full of another's leavings serves as well as a new one.
+fn restored<R>(
+    capacity: &Capacity,
+    config: &Config,
+    bytes: &[u8],
+    go_on: impl FnOnce(&mut Mapper<'_>) -> R,
+) -> Result<R, RestoreError<Ended>> {
+    let mut slab = vec![0xA5u8; capacity.bytes() + SLAB_ALIGN];
+    let start = slab.as_ptr().align_offset(SLAB_ALIGN);
+    let mut rest = bytes;
+    let mut source = |piece: &mut [u8]| {
+        let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(Ended)?;
+        piece.copy_from_slice(taken);
+        rest = behind;
+        Ok(())
+    };
+    let mut mapper = Mapper::restore(capacity, config, &mut slab[start..], &mut source)?;
+    assert!(rest.is_empty(), "all of it is read");
+    Ok(go_on(&mut mapper))
+}
+
+fn uninterrupted(walk: &Walk, capacity: &Capacity, stop: impl Fn(usize) -> bool) -> (Vec<Report>, Vec<(usize, Vec<u8>)>) {
+    let mut slab = vec![0u8; capacity.bytes() + SLAB_ALIGN];
+    let start = slab.as_ptr().align_offset(SLAB_ALIGN);
+    let mut mapper = Mapper::new(capacity, &Walk::config(), &mut slab[start..]).unwrap();
+    let (mut reports, mut snapshots) = (Vec::new(), Vec::new());
+    for at in 0..FRAMES {
+        if stop(at) {
+            snapshots.push((at, saved(&mut mapper)));
+        }
+        reports.push(walk.step(at, &mut mapper));
+    }
+    (reports, snapshots)
+}
+
+#[test]
+fn a_drive_resumed_anywhere_gives_the_digests_of_the_one_that_never_stopped() {
+    let walk = Walk::new(FRAMES);
+    for capacity in [CAPACITY, CROWDED] {
+        let (reports, snapshots) = uninterrupted(&walk, &capacity, |_| true);
+        let last = reports.last().unwrap();
+        assert!(last.instances.objects.objects == 1 && last.prune.visited > 0, "{last:?}");
+        let left: u32 = reports.iter().map(|report| report.allocation.eviction.lost + report.allocation.refused).sum();
+        assert_eq!(left > 0, capacity.blocks == CROWDED.blocks, "the pool is too small where it should be: {:?}", last.blocks);
+        for (at, bytes) in &snapshots {
+            let went_on: Vec<Report> =
+                restored(&capacity, &Walk::config(), bytes, |mapper| (*at..FRAMES).map(|at| walk.step(at, mapper)).collect()).unwrap();
+            for (report, expected) in went_on.iter().zip(&reports[*at..]) {
+                assert_eq!(report.digests.first_difference(&expected.digests), None, "frame {} after stopping before {at}", report.frame);
+                assert_eq!((report.digest, report.frame, report.blocks), (expected.digest, expected.frame, expected.blocks));
+                assert_eq!((report.allocation, report.prune), (expected.allocation, expected.prune));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_restored_mapper_saves_the_bytes_it_was_restored_from_and_saving_changes_nothing() {
+    let walk = Walk::new(FRAMES);
+    let (reports, snapshots) = uninterrupted(&walk, &CAPACITY, |at| at == 6);
+    let (never, _) = uninterrupted(&walk, &CAPACITY, |_| false);
+    assert!(reports.iter().zip(&never).all(|(a, b)| a.digest == b.digest));
+    let again = restored(&CAPACITY, &Walk::config(), &snapshots[0].1, saved).unwrap();
+    assert!(again == snapshots[0].1);
+}
+
+#[test]
+fn the_end_of_a_resumed_drive_prunes_and_hands_over_the_same() {
+    let walk = Walk::new(FRAMES);
+    let (_, snapshots) = uninterrupted(&walk, &CAPACITY, |at| at == 8);
+    let finish = |mapper: &mut Mapper<'_>| (mapper.finish(), mapper.background().digest(), mapper.background().pool().len());
+    let resumed = restored(&CAPACITY, &Walk::config(), &snapshots[0].1, finish).unwrap();
+    assert_eq!(with_mapper(&walk, 8, |mapper, _| finish(mapper)), resumed);
+    assert!(resumed.0.visited > 0);
+}
+
+#[test]
+fn frames_of_another_size_are_refused_after_resuming_as_before() {
+    let walk = Walk::new(2);
+    let bytes = with_mapper(&walk, 2, |mapper, _| saved(mapper));
+    let small = vec![0u8; 64 * 64];
+    let refused = restored(&CAPACITY, &Walk::config(), &bytes, |mapper| {
+        let view = View::new(&small, 64, 64).unwrap();
+        walk.with_frame(0, |frame| mapper.step(&StereoFrame { left: view, right: view, ..*frame }, &Serial).map(|report| report.frame))
+    });
+    assert_eq!(refused.unwrap(), Err(StepError::SizeChanged));
+}
+
+#[test]
+fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
+    let walk = Walk::new(3);
+    let bytes = with_mapper(&walk, 3, |mapper, _| saved(mapper));
+    let refusal = |capacity: &Capacity, config: &Config, bytes: &[u8]| restored(capacity, config, bytes, |_| ()).unwrap_err();
+    let with = |at: usize, byte: u8| {
+        let mut changed = bytes.clone();
+        changed[at] = byte;
+        refusal(&CAPACITY, &Walk::config(), &changed)
+    };
+    assert_eq!(with(0, b'x'), RestoreError::Foreign);
+    assert_eq!(with(8, 0), RestoreError::Version(0), "an older one");
+    assert_eq!(refusal(&Capacity { tracks: 15, ..CAPACITY }, &Walk::config(), &bytes), RestoreError::Capacity);
+    let mut other = Walk::config();
+    other.egomotion.confidence = f64::from_bits(other.egomotion.confidence.to_bits() + 1);
+    assert_eq!(refusal(&CAPACITY, &other, &bytes), RestoreError::Config, "one last bit of one setting");
+    assert_eq!(refusal(&CAPACITY, &Walk::config(), &[]), RestoreError::Source(Ended));
+    for len in [7, 20, 40, bytes.len() / 2, bytes.len() - 1] {
+        assert_eq!(refusal(&CAPACITY, &Walk::config(), &bytes[..len]), RestoreError::Source(Ended), "cut to {len} bytes");
+    }
+    let mut invalid = Walk::config();
+    invalid.volume.voxel_size_m = -1.0;
+    assert!(matches!(refusal(&CAPACITY, &invalid, &bytes), RestoreError::New(NewError::Config(_))));
+}
+
+#[test]
+fn a_flip_of_any_byte_is_refused() {
+    let walk = Walk::new(5);
+    let mut bytes = with_mapper(&walk, 5, |mapper, _| saved(mapper));
+    let len = bytes.len();
+    // Every byte of the head, the tail, and what lies between the big pieces; of these so many.
+    let sampled = (0..200).chain((200..len).step_by(len / 300)).chain(len - 40..len);
+    let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
+    let start = slab.as_ptr().align_offset(SLAB_ALIGN);
+    for (at, bit) in sampled.zip((0..8).cycle()) {
+        bytes[at] ^= 1 << bit;
+        let mut rest = &bytes[..];
+        let mut source = |piece: &mut [u8]| -> Result<(), Ended> {
+            let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(Ended)?;
+            piece.copy_from_slice(taken);
+            rest = behind;
+            Ok(())
+        };
+        assert!(Mapper::restore(&CAPACITY, &Walk::config(), &mut slab[start..], &mut source).is_err(), "byte {at} of {len}, bit {bit}");
+        bytes[at] ^= 1 << bit;
+    }
+    assert!(restored(&CAPACITY, &Walk::config(), &bytes, |_| ()).is_ok(), "and whole it is taken");
+}
+
+#[test]
+fn a_sink_that_fails_is_told_of() {
+    let walk = Walk::new(2);
+    with_mapper(&walk, 2, |mapper, _| {
+        let mut room = 1_000;
+        let full = mapper.save(&mut |piece: &[u8]| {
+            room -= piece.len().min(room);
+            if room > 0 { Ok(()) } else { Err("full") }
+        });
+        assert_eq!(full, Err("full"));
+    });
+}
