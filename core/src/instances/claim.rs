@@ -1,6 +1,6 @@
 //! Which detection each match of the scene flow lies on.
 
-use super::{Instances, MaskStore, PixelBox, detection::Taken};
+use super::{Instances, MaskStore, PixelBox, detection::Taken, track::Track};
 use crate::scene_flow::Match;
 
 /// Owner of a match that may lie on either of two things.
@@ -13,7 +13,12 @@ impl<'s> Instances<'s> {
     /// Finds out which detection each match lies on: under its copy mask or else, for the best, under its delete mask.
     pub fn claim(&mut self, refined: &[Match], sparse: &[Match]) {
         let masks = if self.now == 0 { &self.masks[0] } else { &self.masks[1] };
-        let detections = self.detections.all();
+        let (detections, tracks) = (self.detections.all(), self.tracks.all());
+        // Of two cars parked one behind the other in the distance neither takes the other's matches.
+        let distinct = |other: &Taken| {
+            let moves = || other.track.checked_sub(1).and_then(|at| tracks.get(at as usize)).is_some_and(Track::moves);
+            other.small == 0 || moves()
+        };
         let owners = self.owner.iter_mut().zip(refined).chain(self.sparse_owner.iter_mut().zip(sparse));
         for (owner, m) in owners {
             let (u, v) = pixel(m.current_left);
@@ -21,7 +26,7 @@ impl<'s> Instances<'s> {
             let copy = lies(&mut |detection| masks.contains(&detection.place, u, v));
             let found = copy.or_else(|| lies(&mut |detection| detection.delete(masks).contains(u, v)));
             *owner = match found {
-                Some(at) if between(detections, masks, at, u, v) => AMBIGUOUS,
+                Some(at) if between(detections, distinct, masks, at, u, v) => AMBIGUOUS,
                 Some(at) => at as u8 + 1,
                 None => 0,
             };
@@ -30,8 +35,8 @@ impl<'s> Instances<'s> {
 }
 
 /// Whether a pixel of detection `at` lies beside the copy mask of another: what is seen there may belong to either, for a feature is
-/// several pixels wide, and the silhouette of a thing in front moves with that thing.
-fn between(detections: &[Taken], masks: &MaskStore<'_>, at: usize, u: i32, v: i32) -> bool {
+/// several pixels wide, and the silhouette of a thing in front moves with that thing. Only others that are `distinct` count.
+fn between(detections: &[Taken], distinct: impl Fn(&Taken) -> bool, masks: &MaskStore<'_>, at: usize, u: i32, v: i32) -> bool {
     let around = PixelBox {
         left: u - FEATURE_PX,
         top: v - FEATURE_PX,
@@ -39,7 +44,7 @@ fn between(detections: &[Taken], masks: &MaskStore<'_>, at: usize, u: i32, v: i3
         height: 2 * FEATURE_PX + 1,
     };
     let rim = [-FEATURE_PX, 0, FEATURE_PX];
-    detections.iter().enumerate().filter(|&(other, _)| other != at).any(|(_, other)| {
+    detections.iter().enumerate().filter(|&(other, taken)| other != at && distinct(taken)).any(|(_, other)| {
         around.intersection(&other.place.pixels).area() > 0
             && rim.iter().any(|dv| rim.iter().any(|du| masks.contains(&other.place, u + du, v + dv)))
     })

@@ -30,8 +30,12 @@ pub struct InstancesConfig {
     pub frame_interval_s: f32,
     /// Scores below are ignored; 0 to 1; 0.
     pub score_min: f32,
-    /// A detection's box must be larger than this, px at an image width of 1242, at other widths in proportion to the width squared; 2025.
+    /// A detection's box must be larger than this to be reconstructed and kept out of the static map whatever it does, px at an image width
+    /// of 1242, at other widths in proportion to the width squared; 2025.
     pub area_min_px: u32,
+    /// It must be larger than this to be tracked, and kept out of the static map once it is known to move; 900: the 18 matches a first
+    /// motion takes, 7 px apart. The original: as `area_min_px`.
+    pub track_area_min_px: u32,
     /// Scale of the mask under which nothing enters the static map, 1/1000; 1000 to 4000; 1200.
     pub delete_permille: u16,
     /// Boxes below this many times the least area, 1/1000, are scaled twice; 1375.
@@ -59,6 +63,7 @@ impl Default for InstancesConfig {
             frame_interval_s: 0.1,
             score_min: 0.0,
             area_min_px: 2025,
+            track_area_min_px: 900,
             delete_permille: 1200,
             small_permille: 1375,
             overlap: Overlap::Mask,
@@ -73,19 +78,20 @@ impl Default for InstancesConfig {
 }
 
 impl InstancesConfig {
-    /// Whether a box of `area_px` in an image of that width is a detection: strictly larger than the least area.
+    /// Whether a box of `area_px` in an image of that width can be reconstructed: strictly larger than the least area.
     pub fn large_enough(&self, area_px: i64, width: usize) -> bool {
-        area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > self.least(width)
+        area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > least(self.area_min_px, width)
     }
 
-    /// Least area times the reference width squared.
-    fn least(&self, width: usize) -> u64 {
-        u64::from(self.area_min_px) * (width as u64) * (width as u64)
+    /// Whether it can be tracked.
+    pub(super) fn trackable(&self, area_px: i64, width: usize) -> bool {
+        area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > least(self.track_area_min_px, width)
     }
 
     /// How much the delete mask of a box is scaled, 1/1000.
     pub(super) fn delete_permille(&self, area_px: i64, width: usize) -> u32 {
-        let small = area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000 < self.least(width) * u64::from(self.small_permille);
+        let least = least(self.area_min_px, width);
+        let small = area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000 < least * u64::from(self.small_permille);
         let once = u32::from(self.delete_permille);
         if small { once * once / 1000 } else { once }
     }
@@ -97,6 +103,8 @@ impl InstancesConfig {
         require(problems, positive(self.frame_interval_s), "instances.frame_interval_s", "must be above 0");
         require(problems, share(self.score_min), "instances.score_min", "must be from 0 to 1");
         require(problems, self.area_min_px <= 1 << 20, "instances.area_min_px", "must be at most 1048576");
+        let tracked = self.track_area_min_px <= 1 << 20;
+        require(problems, tracked, "instances.track_area_min_px", "must be at most 1048576");
         require(problems, (1000..=4000).contains(&self.delete_permille), "instances.delete_permille", "must be in 1000..=4000");
         require(problems, share(self.association_min), "instances.association_min", "must be from 0 to 1");
         require(problems, (1..=10_000).contains(&self.forget_frames), "instances.forget_frames", "must be in 1..=10000");
@@ -105,6 +113,11 @@ impl InstancesConfig {
         self.state.validate(problems);
         self.volume.validate(problems);
     }
+}
+
+/// An area at the reference width times that width squared, in an image of another width.
+fn least(area_px: u32, width: usize) -> u64 {
+    u64::from(area_px) * (width as u64) * (width as u64)
 }
 
 /// How an object's motion is estimated and filtered. The original: no filter.
@@ -123,16 +136,22 @@ pub struct MotionConfig {
     pub inlier_px: f32,
     /// Error of a match coordinate at the least, px; above 0.
     pub noise_px: f32,
+    /// How far from the middle one by depth a match may lie and still be on the object, m; what it errs by comes on top; above 0.
+    pub extent_m: f32,
     /// Matches of one object err alike: no more than so many count as independent; 3 to 1000.
     pub independent_matches: u16,
-    /// How fast an object may be turning when it is first seen, one sigma, rad/s; above 0.
+    /// How fast an object may be turning about the vertical when it is first seen, one sigma, rad/s; above 0.
     pub turn_rad_s: f32,
+    /// The same about any other axis: the road lets it do no more; above 0.
+    pub tilt_rad_s: f32,
     /// How fast it may be when first seen, one sigma, m/s; above 0.
     pub speed_m_s: f32,
     /// Change of speed within a second, one sigma, m/s; above 0.
     pub acceleration_m_s2: f32,
-    /// Change of turning within a second, one sigma, rad/s; above 0.
+    /// Change of turning about the vertical within a second, one sigma, rad/s; above 0.
     pub turn_acceleration_rad_s2: f32,
+    /// The same about any other axis; above 0.
+    pub tilt_acceleration_rad_s2: f32,
     /// By how much disparities may be too small throughout, px; at least 0. With a camera in motion a thing that stands then seems to move,
     /// by twice this share of its disparity of the speed it passes by.
     pub bias_px: f32,
@@ -152,11 +171,14 @@ impl Default for MotionConfig {
             samples: 200,
             inlier_px: 2.0,
             noise_px: 0.3,
+            extent_m: 5.0,
             independent_matches: 30,
-            turn_rad_s: 0.1,
+            turn_rad_s: 0.2,
+            tilt_rad_s: 0.03,
             speed_m_s: 20.0,
             acceleration_m_s2: 3.0,
-            turn_acceleration_rad_s2: 0.1,
+            turn_acceleration_rad_s2: 0.4,
+            tilt_acceleration_rad_s2: 0.03,
             bias_px: 0.25,
             lens_px: 3.0,
             camera_rad: 0.0004,
@@ -185,8 +207,12 @@ impl MotionConfig {
         require(problems, (1..=10_000).contains(&self.samples), "instances.motion.samples", "must be in 1..=10000");
         require(problems, positive(self.inlier_px), "instances.motion.inlier_px", "must be above 0");
         require(problems, positive(self.noise_px), "instances.motion.noise_px", "must be above 0");
+        require(problems, positive(self.extent_m), "instances.motion.extent_m", "must be above 0");
         require(problems, (3..=1000).contains(&self.independent_matches), "instances.motion.independent_matches", "must be in 3..=1000");
         require(problems, positive(self.turn_rad_s), "instances.motion.turn_rad_s", "must be above 0");
+        require(problems, positive(self.tilt_rad_s), "instances.motion.tilt_rad_s", "must be above 0");
+        let tilt = positive(self.tilt_acceleration_rad_s2);
+        require(problems, tilt, "instances.motion.tilt_acceleration_rad_s2", "must be above 0");
         require(problems, positive(self.speed_m_s), "instances.motion.speed_m_s", "must be above 0");
         require(problems, positive(self.acceleration_m_s2), "instances.motion.acceleration_m_s2", "must be above 0");
         require(problems, positive(self.turn_acceleration_rad_s2), "instances.motion.turn_acceleration_rad_s2", "must be above 0");
@@ -202,8 +228,11 @@ impl MotionConfig {
 pub struct StateConfig {
     /// Surely faster: moving, m/s; at least `static_m_s`. The published code: 5.5 (0.55 m a frame), its experiments: 2.
     pub dynamic_m_s: f32,
-    /// Perhaps slower than this and likely slower than `dynamic_m_s`: standing, m/s; above 0. The published code: 0.3.
+    /// Perhaps slower than this and likely slower than `slow_m_s`: standing, m/s; above 0. The published code: 0.3.
     pub static_m_s: f32,
+    /// What is not known to move counts as standing only if it is likely slower than this, m/s; at least `static_m_s`; 1.2, slower than
+    /// somebody walking. What is known to move: only if it is likely slower than `dynamic_m_s`.
+    pub slow_m_s: f32,
     /// How many sigmas are "surely"; at least 0. The published code: 0.
     pub sigmas: f32,
     /// How many sigmas are "likely"; at least 0. The published code: 0.
@@ -215,7 +244,8 @@ pub struct StateConfig {
     pub change_frames: u8,
     /// Frames without a motion over which a standing object stays one; 0 to 255; 5.
     pub static_frames: u8,
-    /// Frames without a motion over which a moving object goes on as before; 0 to 255; 1.
+    /// Frames without a motion over which a moving object goes on as before; 0 to 255; 3: the filter knows how it went on. The published
+    /// code: 1, its experiments: 2.
     pub dynamic_frames: u8,
 }
 
@@ -224,12 +254,13 @@ impl Default for StateConfig {
         Self {
             dynamic_m_s: 0.6,
             static_m_s: 0.3,
+            slow_m_s: 1.2,
             sigmas: 2.5,
             static_sigmas: 1.0,
             confirm_frames: 3,
             change_frames: 2,
             static_frames: 5,
-            dynamic_frames: 1,
+            dynamic_frames: 3,
         }
     }
 }
@@ -240,6 +271,8 @@ impl StateConfig {
         require(problems, positive(self.static_m_s), "instances.state.static_m_s", "must be above 0");
         let above = positive(self.dynamic_m_s) && self.dynamic_m_s >= self.static_m_s;
         require(problems, above, "instances.state.dynamic_m_s", "must be at least instances.state.static_m_s");
+        let slow = positive(self.slow_m_s) && self.slow_m_s >= self.static_m_s;
+        require(problems, slow, "instances.state.slow_m_s", "must be at least instances.state.static_m_s");
         require(problems, self.sigmas.is_finite() && self.sigmas >= 0.0, "instances.state.sigmas", "must be at least 0");
         let likely = self.static_sigmas.is_finite() && self.static_sigmas >= 0.0;
         require(problems, likely, "instances.state.static_sigmas", "must be at least 0");

@@ -1,8 +1,12 @@
 //! Detections as they come in, and those of them that are taken.
 //!
 //! A detection is refused, and counted, when its score is not a number in 0..=1, its box is empty or beside the image, or its mask is
-//! shorter than its box or empty. Of more than `capacity.detections` the lowest scores are refused. One that is too small, or of a class that
-//! does not move, is left to the static map. Where masks overlap the higher score is on top: the other loses the pixels.
+//! shorter than its box or empty. Of more than `capacity.detections` the lowest scores are refused. One of a class that does not move is left
+//! to the static map. Where masks overlap the higher score is on top: the other loses the pixels.
+//!
+//! One whose box is not larger than `area_min_px` is too small to be reconstructed, and left to the static map as well; but it may be a car
+//! that drives far ahead. If it is larger than `track_area_min_px` it is tracked, in what room and under what pixels the larger ones leave;
+//! once it is known to move the static map is kept clear of it.
 //!
 //! The order in the caller's list does not matter: detections are taken by score, then class, box and mask; two alike in all of these are
 //! alike. Time: linear in the pixels of the masks.
@@ -67,8 +71,10 @@ pub struct DetectionCount {
     pub bad_mask: u32,
     /// Of a class that is left to the static map.
     pub ignored: u32,
-    /// Box not larger than the least area.
+    /// Box not larger than the least area to be reconstructed, whatever else may be wrong with its mask or the room for it.
     pub too_small: u32,
+    /// How many of these are tracked.
+    pub tracked_only: u32,
     /// Too many: lowest scores.
     pub beyond: u32,
     /// No room for the mask.
@@ -95,6 +101,8 @@ pub(super) struct Taken {
     pub delete_permille: u32,
     /// Position in the track table plus 1; 0 none.
     pub track: u32,
+    /// Whether it is only tracked, 0 or 1.
+    pub small: u32,
 }
 
 impl Taken {
@@ -111,6 +119,7 @@ impl Taken {
 /// A detection on its way in: what its order depends on, and where it stands in the caller's list.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
+    small: bool,
     score_bits: u32,
     class: Class,
     whole: PixelBox,
@@ -119,9 +128,19 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// Best first: by score downwards, then by everything else that tells two apart.
-    fn key(&self) -> (u32, Class, PixelBox, u64, u32) {
-        (u32::MAX - self.score_bits, self.class, self.whole, self.digest, self.index)
+    /// What may be reconstructed first, then by score downwards.
+    fn rank(&self) -> (bool, u32) {
+        (self.small, u32::MAX - self.score_bits)
+    }
+
+    /// Best first: by rank, then by everything else that tells two apart.
+    fn key(&self) -> ((bool, u32), Class, PixelBox, u64, u32) {
+        (self.rank(), self.class, self.whole, self.digest, self.index)
+    }
+
+    /// Counts it as dropped for `reason`; what is too small is that first.
+    fn drop(&self, count: &mut DetectionCount, reason: fn(&mut DetectionCount) -> &mut u32) {
+        *(if self.small { &mut count.too_small } else { reason(count) }) += 1;
     }
 }
 
@@ -164,7 +183,7 @@ impl<'s> Detections<'s> {
             let Some(detection) = given.get(candidate.index as usize) else { continue };
             let pixels = candidate.whole.intersection(&image);
             let Some(place) = store.take(pixels) else {
-                count.no_room += 1;
+                candidate.drop(&mut count, |count| &mut count.no_room);
                 continue;
             };
             pack(detection, &candidate.whole, &place, store);
@@ -172,7 +191,7 @@ impl<'s> Detections<'s> {
             self.all().iter().for_each(|above| store.subtract(&place, &above.place));
             if store.area(&place) == 0 {
                 store.undo(place);
-                *(if bare { &mut count.bad_mask } else { &mut count.covered }) += 1;
+                candidate.drop(&mut count, if bare { |count| &mut count.bad_mask } else { |count| &mut count.covered });
                 continue;
             }
             if let Some(slot) = self.taken.get_mut(self.len) {
@@ -182,9 +201,13 @@ impl<'s> Detections<'s> {
                     class: candidate.class.code(),
                     delete_permille: config.delete_permille(pixels.area(), width),
                     track: 0,
+                    small: u32::from(candidate.small),
                 };
                 self.len += 1;
-                count.taken += 1;
+                let [taken, too_small] = [!candidate.small, candidate.small].map(u32::from);
+                count.taken += taken;
+                count.too_small += too_small;
+                count.tracked_only += too_small;
             }
         }
         count
@@ -205,8 +228,8 @@ fn choose(
         let Some(mut candidate) = check(config, detection, index, image, count) else { continue };
         let full = best.len() >= most;
         // The digest is dear: it is made only for what may stay.
-        if full && best.last().is_none_or(|worst| worst.score_bits > candidate.score_bits) {
-            count.beyond += 1;
+        if full && best.last().is_none_or(|worst| worst.rank() < candidate.rank()) {
+            candidate.drop(count, |count| &mut count.beyond);
             continue;
         }
         let mut digest = Digest::default();
@@ -214,13 +237,15 @@ fn choose(
         candidate.digest = digest.finish();
         let at = best.iter().position(|other| candidate.key() < other.key()).unwrap_or(best.len());
         if full {
-            count.beyond += 1;
-            best.pop();
+            let stays = at < best.len();
+            let worst = if stays { best.pop() } else { None };
+            worst.unwrap_or(candidate).drop(count, |count| &mut count.beyond);
+            if !stays {
+                continue;
+            }
         }
         if at <= best.len() {
             let _ = best.insert(at, candidate);
-        } else {
-            let _ = best.push(candidate);
         }
     }
     best
@@ -259,12 +284,13 @@ fn check(
         count.ignored += 1;
         return None;
     }
-    if !config.large_enough(pixels.area(), image.width as usize) {
+    let small = !config.large_enough(pixels.area(), image.width as usize);
+    if small && !config.trackable(pixels.area(), image.width as usize) {
         count.too_small += 1;
         return None;
     }
     // Adding 0 turns -0 into 0: the bits of scores are then in the scores' order.
-    Some(Candidate { score_bits: (score + 0.0).to_bits(), class, whole, digest: 0, index })
+    Some(Candidate { small, score_bits: (score + 0.0).to_bits(), class, whole, digest: 0, index })
 }
 
 /// Enters a caller's mask into the store.

@@ -83,15 +83,15 @@ impl Filter {
         Point3::from(self.center_world)
     }
 
-    /// Speed over ground and its error along the direction of motion, m/s.
-    pub fn speed(&self) -> [f64; 2] {
+    /// Speed over ground, its error along the direction of motion and its error in all directions together, m/s.
+    pub fn speed(&self) -> [f64; 3] {
         let velocity = self.velocity();
         let speed = libm::sqrt(velocity.dot(&velocity));
         let covariance = Matrix6::from(self.covariance);
         let part: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
         // A thing at rest has no direction: the mean of all counts.
         let variance = if speed > 1e-6 { velocity.dot(&(part * velocity)) / (speed * speed) } else { part.trace() / 3.0 };
-        [speed, libm::sqrt(variance)]
+        [speed, libm::sqrt(variance), libm::sqrt(part.trace())]
     }
 
     /// The motion over ground within a frame: maps points of the thing in the world from where they were to where they are.
@@ -106,17 +106,18 @@ impl Filter {
     pub fn predict(&mut self, config: &MotionConfig, interval_s: f64) {
         let square = |x: f32| f64::from(x) * f64::from(x);
         if self.frames == 0 {
-            let spread = |turn: f64, speed: f64| Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, speed, speed, speed));
+            let [tilt, turn, speed] = [config.tilt_rad_s, config.turn_rad_s, config.speed_m_s].map(square);
             self.rate = [0.0; 6];
-            self.covariance = spread(square(config.turn_rad_s), square(config.speed_m_s)).into();
+            self.covariance = Matrix6::from_diagonal(&Vector6::new(tilt, turn, tilt, speed, speed, speed)).into();
             return;
         }
         let turned = exp(self.turn() * interval_s, Vector3::zeros()).rotation * self.velocity();
         let [.., x, y, z] = &mut self.rate;
         (*x, *y, *z) = (turned.x, turned.y, turned.z);
-        let growth = [square(config.turn_acceleration_rad_s2), square(config.acceleration_m_s2)].map(|x| x * interval_s * interval_s);
-        for (i, row) in self.covariance.iter_mut().enumerate() {
-            if let (Some(entry), Some(growth)) = (row.get_mut(i), growth.get(i / 3)) {
+        let [tilt, turn, speed] = [config.tilt_acceleration_rad_s2, config.turn_acceleration_rad_s2, config.acceleration_m_s2]
+            .map(|change| square(change) * interval_s * interval_s);
+        for (i, (row, growth)) in self.covariance.iter_mut().zip([tilt, turn, tilt, speed, speed, speed]).enumerate() {
+            if let Some(entry) = row.get_mut(i) {
                 *entry += growth;
             }
         }

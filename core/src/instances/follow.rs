@@ -66,7 +66,7 @@ impl<'s> Instances<'s> {
 fn judge(config: &InstancesConfig, rig: &StereoRig, camera: &CameraMotion, track: &mut Track) {
     let evidence = camera.t_current_previous.filter(|_| track.measured == 1).map(|t_current_previous| {
         let interval_s = f64::from(config.frame_interval_s);
-        let [speed, sigma] = track.filter.speed();
+        let [speed, sigma, spread] = track.filter.speed();
         let camera_world = camera.t_world_camera.inverse();
         let standing = camera_world * track.filter.center_world();
         let now = standing + camera_world.rotation * track.filter.velocity() * interval_s;
@@ -77,7 +77,12 @@ fn judge(config: &InstancesConfig, rig: &StereoRig, camera: &CameraMotion, track
         let side = rig.focal_px * standing.x / (standing.z * rig.center_u_px);
         let error_px = f64::from(config.motion.bias_px) + f64::from(config.motion.lens_px) * side * side * side * side;
         let bias = passing * 2.0 * error_px * standing.z / rig.focal_baseline_px_m();
-        Evidence { speed_m_s: speed as f32, sigma_m_s: track.sigma_m_s, bias_m_s: bias as f32 }
+        Evidence {
+            speed_m_s: speed as f32,
+            sigma_m_s: track.sigma_m_s,
+            spread_m_s: libm::sqrt(spread * spread + turned * turned) as f32,
+            bias_m_s: bias as f32,
+        }
     });
     track.judgement.advance(&config.state, evidence);
 }

@@ -1,4 +1,7 @@
 //! One object's motion in one frame: an estimate that sorts out the outliers, then the filter.
+//!
+//! An object's points lie together: a match much nearer or farther than the middle one (by disparity) is not on the object but on what hides
+//! it, or behind it. Were it nearer it would count more than all the object's own.
 
 use super::{
     config::MotionConfig,
@@ -30,6 +33,55 @@ pub(super) struct Measured {
     pub measured: bool,
 }
 
+/// Half pixels of disparity the middle is sought among: up to 256 px.
+const BINS: usize = 512;
+
+/// Which matches can lie on one object.
+#[derive(Clone, Copy)]
+struct Reach {
+    least_px: f64,
+    most_px: f64,
+}
+
+impl Reach {
+    /// Those no more than `config.extent_m` and three sigmas nearer or farther than the middle one.
+    fn of<'m>(config: &MotionConfig, rig: &StereoRig, matches: impl Iterator<Item = &'m Match> + Clone) -> Self {
+        let mut counts = [0u32; BINS];
+        let mut total = 0;
+        for m in matches {
+            // What is not a number counts as 0.
+            if let Some(count) = counts.get_mut((2.0 * disparity(m)) as usize) {
+                *count += 1;
+                total += 1;
+            }
+        }
+        let mut below = 0;
+        let middle = counts.iter().position(|&count| {
+            below += count;
+            2 * below > total
+        });
+        let middle_px = (middle.unwrap_or(0) as f64 + 0.5) * 0.5;
+        let slack_px = 3.0 * core::f64::consts::SQRT_2 * f64::from(config.noise_px) + 0.5;
+        let depth_m = rig.focal_baseline_px_m() / middle_px;
+        let nearest_m = depth_m - f64::from(config.extent_m);
+        let most_px = if nearest_m > 0.0 { rig.focal_baseline_px_m() / nearest_m } else { f64::MAX };
+        Self {
+            least_px: rig.focal_baseline_px_m() / (depth_m + f64::from(config.extent_m)) - slack_px,
+            most_px: most_px + slack_px,
+        }
+    }
+
+    fn holds(&self, m: &Match) -> bool {
+        let disparity = disparity(m);
+        disparity >= self.least_px && disparity <= self.most_px
+    }
+}
+
+/// Disparity in the previous frame, px.
+fn disparity(m: &Match) -> f64 {
+    f64::from(m.previous_left[0]) - f64::from(m.previous_right[0])
+}
+
 /// Estimates a motion from an object's matches and lets the filter, already predicted, take in those it explains.
 pub(super) fn measure<'m>(
     config: &MotionConfig,
@@ -39,6 +91,8 @@ pub(super) fn measure<'m>(
     seed: u64,
     estimator: &mut Estimator<'_>,
 ) -> Measured {
+    let reach = Reach::of(config, ground.rig, matches.clone());
+    let matches = matches.filter(move |m| reach.holds(m));
     let points = matches.clone().count() as u32;
     let mut measured = Measured { matches: points, inliers: 0, measured: false };
     let needed = if filter.is_known() { config.matches_again } else { config.matches_min };
@@ -56,9 +110,9 @@ pub(super) fn measure<'m>(
     }
     measured.inliers = estimate.inliers;
     let inlying = Inlying { indexed: (0u32..).zip(matches), inliers: estimator.inliers() };
-    let sightings = inlying.filter_map(|m| sighting(m, ground));
     let noise_px =
         if estimate.residual_rms_px > f64::from(config.noise_px) { estimate.residual_rms_px } else { f64::from(config.noise_px) };
+    let sightings = inlying.filter_map(|m| sighting(m, ground));
     measured.measured = filter.update(config, ground.rig, ground.t_world_camera, ground.interval_s, noise_px, sightings);
     measured
 }

@@ -29,7 +29,7 @@ impl<'s> Instances<'s> {
         for index in 0..self.tracks.all().len() {
             let Some(track) = self.tracks.all().get(index).copied() else { break };
             let Some(detection) = track.detection.checked_sub(1).and_then(|at| self.detections.all().get(at as usize)) else { continue };
-            if !camera.known || track.chain == 0 || track.class().treatment() != Treatment::Reconstruct {
+            if !camera.known || track.chain == 0 || track.class().treatment() != Treatment::Reconstruct || detection.small == 1 {
                 continue;
             }
             let masks = if self.now == 0 { &self.masks[0] } else { &self.masks[1] };

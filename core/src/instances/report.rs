@@ -94,10 +94,10 @@ impl<'s> Instances<'s> {
         &self.report
     }
 
-    /// The tracks as they stand, by age.
+    /// The tracks as they stand, by age; without those too small to be reconstructed of which no motion was ever measured.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
         let interval_s = f64::from(self.config.frame_interval_s);
-        self.tracks.all().iter().map(move |track| {
+        self.tracks.all().iter().filter(|track| !track.is_tentative()).map(move |track| {
             let object = self.objects.of(track.id).and_then(|at| self.objects.objects.get(at));
             TrackReport {
                 id: track.id,

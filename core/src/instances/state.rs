@@ -1,9 +1,11 @@
 //! Uncertain, static, dynamic: what is known about whether a thing moves.
 //!
 //! A frame's motion has a speed, an error of it (one sigma) and a bias the cameras may add. It speaks for *dynamic* when the speed less the
-//! bias and `sigmas` times the error is above `dynamic_m_s`; for *static* when that is below `static_m_s` and the speed with `static_sigmas` times the error below
-//! `dynamic_m_s`; otherwise for neither. So a far parked car whose motion is noise stays uncertain rather than being called moving. With `sigmas` 0 and
-//! `confirm_frames` 1 this is the published rule (Section III-D).
+//! bias and `sigmas` times the error is above `dynamic_m_s`; for *static* when that is below `static_m_s` and the speed with `static_sigmas`
+//! times the error in all directions is below `slow_m_s`, of a thing known to move below `dynamic_m_s`; otherwise for neither. So a far car that may stand and
+//! is surely slower than somebody walking counts as standing, and one of which not even that can be said stays uncertain; but what was
+//! seen moving must be seen to have stopped. With `sigmas` 0, `confirm_frames` 1 and `slow_m_s` equal to `static_m_s` this is the published
+//! rule (Section III-D).
 //!
 //! ```text
 //!            confirm_frames agree                      change_frames agree
@@ -12,7 +14,8 @@
 //!     +------------------------------------+  no motion for more than static_frames or dynamic_frames frames
 //! ```
 //!
-//! A frame in which the thing is not seen is a frame without a motion.
+//! A frame in which the thing is not seen is a frame without a motion. It neither confirms nor refutes: what the frames before spoke for
+//! still counts until the state is lost, or for as long with none.
 
 use super::config::StateConfig;
 use crate::digest::Digest;
@@ -62,20 +65,23 @@ impl State {
 pub struct Evidence {
     /// Speed over ground, m/s.
     pub speed_m_s: f32,
-    /// Its error, one sigma, m/s.
+    /// Its error along the direction of motion, one sigma, m/s.
     pub sigma_m_s: f32,
+    /// Its error in all directions together, m/s: of what seems to stand the direction says nothing.
+    pub spread_m_s: f32,
     /// By how much the cameras' own errors may make it too high, m/s: of a thing that stands they can make one that moves.
     pub bias_m_s: f32,
 }
 
 impl Evidence {
     /// The state it speaks for; `Uncertain` when it speaks for neither, or is not a number.
-    fn vote(&self, config: &StateConfig) -> State {
+    fn vote(&self, config: &StateConfig, state: State) -> State {
         let least = self.speed_m_s - self.bias_m_s - config.sigmas * self.sigma_m_s;
-        let most = self.speed_m_s + config.static_sigmas * self.sigma_m_s;
+        let most = self.speed_m_s + config.static_sigmas * self.spread_m_s;
+        let slow_m_s = if state == State::Dynamic { config.dynamic_m_s } else { config.slow_m_s };
         if least > config.dynamic_m_s {
             State::Dynamic
-        } else if least < config.static_m_s && most < config.dynamic_m_s {
+        } else if least < config.static_m_s && most < slow_m_s {
             State::Static
         } else {
             State::Uncertain
@@ -116,7 +122,7 @@ impl Judgement {
         match evidence {
             Some(evidence) => {
                 self.since_motion = 0;
-                let vote = evidence.vote(config) as u32;
+                let vote = evidence.vote(config, self.state()) as u32;
                 self.streak = if vote == self.vote { self.streak.saturating_add(1) } else { 1 };
                 self.vote = vote;
                 let needed = if self.state() == State::Uncertain { config.confirm_frames } else { config.change_frames };
@@ -125,15 +131,13 @@ impl Judgement {
                 }
             }
             None => {
-                (self.vote, self.streak) = (0, 0);
                 self.since_motion = self.since_motion.saturating_add(1);
                 let most = match self.state() {
                     State::Static => config.static_frames,
-                    State::Dynamic => config.dynamic_frames,
-                    State::Uncertain => 0,
+                    State::Dynamic | State::Uncertain => config.dynamic_frames,
                 };
                 if self.since_motion > u32::from(most) {
-                    self.state = State::Uncertain as u32;
+                    (self.state, self.vote, self.streak) = (State::Uncertain as u32, 0, 0);
                 }
             }
         }
@@ -149,6 +153,7 @@ mod tests {
     const PUBLISHED: StateConfig = StateConfig {
         dynamic_m_s: 5.5,
         static_m_s: 0.3,
+        slow_m_s: 0.3,
         sigmas: 0.0,
         static_sigmas: 0.0,
         confirm_frames: 1,
@@ -158,7 +163,12 @@ mod tests {
     };
 
     fn seen(metres_per_frame: f32) -> Option<Evidence> {
-        Some(Evidence { speed_m_s: metres_per_frame * 10.0, sigma_m_s: 0.0, bias_m_s: 0.0 })
+        Some(Evidence {
+            speed_m_s: metres_per_frame * 10.0,
+            sigma_m_s: 0.0,
+            spread_m_s: 0.0,
+            bias_m_s: 0.0,
+        })
     }
 
     fn states(config: &StateConfig, frames: &[Option<Evidence>]) -> std::vec::Vec<State> {
@@ -198,27 +208,45 @@ mod tests {
 
     #[test]
     fn stopping_and_starting_need_two_frames_in_a_row() {
-        let script = [seen(1.0), seen(0.0), seen(1.0), seen(0.0), seen(0.0), seen(1.0), None, seen(1.0), seen(1.0)];
+        let script = [seen(1.0), seen(0.0), seen(1.0), seen(0.0), seen(0.0), seen(1.0), seen(0.0), seen(1.0), seen(1.0)];
         assert_eq!(states(&PUBLISHED, &script), [Dynamic, Dynamic, Dynamic, Dynamic, Static, Static, Static, Static, Dynamic]);
     }
 
     #[test]
-    fn confirmation_is_counted_in_frames_in_a_row() {
+    fn confirmation_is_counted_in_motions_in_a_row() {
         let config = StateConfig { confirm_frames: 3, ..PUBLISHED };
-        let script = [seen(1.0), seen(1.0), None, seen(1.0), seen(1.0), seen(0.2), seen(1.0), seen(1.0), seen(1.0)];
-        let mut expected = [Uncertain; 9];
-        expected[8] = Dynamic;
+        let script = [seen(1.0), seen(1.0), seen(0.2), seen(1.0), seen(1.0), seen(1.0)];
+        let mut expected = [Uncertain; 6];
+        expected[5] = Dynamic;
         assert_eq!(states(&config, &script), expected);
     }
 
     #[test]
+    fn a_frame_without_a_motion_does_not_undo_what_those_before_spoke_for_but_two_do() {
+        let config = StateConfig { confirm_frames: 3, ..PUBLISHED };
+        let last = |script: &[Option<Evidence>]| *states(&config, script).last().unwrap();
+        assert_eq!(last(&[seen(1.0), seen(1.0), None, seen(1.0)]), Dynamic);
+        assert_eq!(last(&[seen(1.0), seen(1.0), None, None, seen(1.0)]), Uncertain);
+        assert_eq!(last(&[seen(1.0), seen(1.0), None, None, seen(1.0), seen(1.0), seen(1.0)]), Dynamic);
+    }
+
+    #[test]
+    fn what_may_stand_and_is_slower_than_a_walker_stands_but_what_moved_must_be_seen_to_stop() {
+        let config = StateConfig { confirm_frames: 1, change_frames: 1, ..StateConfig::default() };
+        let far = |speed_m_s| Some(Evidence { speed_m_s, sigma_m_s: 0.5, spread_m_s: 0.5, bias_m_s: 0.0 });
+        assert_eq!(states(&config, &[far(0.6)]), [Static]);
+        assert_eq!(states(&config, &[far(0.8)]), [Uncertain], "it may be walking");
+        assert_eq!(states(&config, &[seen(1.0), far(0.6), far(0.05)]), [Dynamic, Dynamic, Static]);
+    }
+
+    #[test]
     fn a_noisy_motion_proves_nothing() {
-        let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, ..PUBLISHED };
-        let vote = |speed_m_s, sigma_m_s| Evidence { speed_m_s, sigma_m_s, bias_m_s: 0.0 }.vote(&config);
+        let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, slow_m_s: 5.5, ..PUBLISHED };
+        let vote = |speed_m_s, sigma_m_s| Evidence { speed_m_s, sigma_m_s, spread_m_s: sigma_m_s, bias_m_s: 0.0 }.vote(&config, Uncertain);
         assert_eq!([vote(8.0, 1.0), vote(8.0, 1.5)], [Dynamic, Uncertain]);
         // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give or take 2 nothing can be told.
         assert_eq!([vote(2.0, 1.5), vote(2.0, 2.0), vote(2.0, 0.5)], [Static, Uncertain, Uncertain]);
-        let biased = |bias_m_s| Evidence { speed_m_s: 8.0, sigma_m_s: 0.0, bias_m_s }.vote(&config);
+        let biased = |bias_m_s| Evidence { speed_m_s: 8.0, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s }.vote(&config, Uncertain);
         assert_eq!([biased(2.0), biased(3.0)], [Dynamic, Uncertain], "nor does one the lens could make");
         assert_eq!([vote(f32::NAN, 0.0), vote(0.0, f32::INFINITY)], [Uncertain, Uncertain]);
     }

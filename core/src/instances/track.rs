@@ -10,7 +10,7 @@
 //!
 //! Memory: [`Track`] a track and 4 bytes for each pair.
 
-use super::{Class, InstancesConfig, MaskPlace, MaskStore, config::Overlap, detection::Taken, filter::Filter, state::Judgement};
+use super::{Class, InstancesConfig, MaskPlace, MaskStore, State, config::Overlap, detection::Taken, filter::Filter, state::Judgement};
 use crate::digest::Digest;
 use crate::memory::{Capacity, Carver, SlabError, region_bytes};
 use crate::snapshot::Archive;
@@ -54,6 +54,10 @@ pub(super) struct Track {
     pub measured: u32,
     /// Error of the speed, m/s.
     pub sigma_m_s: f32,
+    /// Whether what was seen last is too small to be reconstructed, 0 or 1.
+    pub small: u32,
+    /// Unused.
+    pub padding: u32,
 }
 
 impl Track {
@@ -97,6 +101,16 @@ impl Track {
         let numbers = [self.id, self.class, self.class_lead, self.score.to_bits(), self.first_frame, self.last_frame, self.sightings];
         let counts = [self.detection, self.chain, self.chains, self.matches, self.inliers, self.measured, self.sigma_m_s.to_bits()];
         numbers.iter().chain(&counts).for_each(|&number| digest.u64(u64::from(number)));
+    }
+
+    /// Whether it is nothing yet: too small to be reconstructed, and no motion was ever measured.
+    pub fn is_tentative(&self) -> bool {
+        self.small == 1 && !self.filter.is_known()
+    }
+
+    /// Whether it is known to move.
+    pub fn moves(&self) -> bool {
+        self.judgement.state() == State::Dynamic
     }
 
     /// Majority by counting (Boyer, Moore): the class that leads holds until others were seen more often.
@@ -198,6 +212,7 @@ impl<'s> Tracks<'s> {
                 last_frame: frame,
                 sightings: 1,
                 detection: index as u32 + 1,
+                small: detection.small,
                 ..Track::default()
             };
             if !self.make_room(frame, detections, &mut count) {
@@ -259,6 +274,7 @@ impl<'s> Tracks<'s> {
         track.last_frame = frame;
         track.sightings += 1;
         track.detection = d as u32 + 1;
+        track.small = detection.small;
     }
 
     /// Drops tracks not seen for too long.

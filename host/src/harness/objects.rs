@@ -102,6 +102,7 @@ fn summed(a: DetectionCount, b: &DetectionCount) -> DetectionCount {
         bad_mask: a.bad_mask + b.bad_mask,
         ignored: a.ignored + b.ignored,
         too_small: a.too_small + b.too_small,
+        tracked_only: a.tracked_only + b.tracked_only,
         beyond: a.beyond + b.beyond,
         no_room: a.no_room + b.no_room,
         covered: a.covered + b.covered,

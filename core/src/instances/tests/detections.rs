@@ -135,3 +135,45 @@ fn without_dynamic_everything_is_background() {
         assert!(depth.iter().all(|&depth| depth == 5.0) && instances.tracks().count() == 0);
     });
 }
+
+#[test]
+fn what_is_too_small_to_be_reconstructed_is_tracked_in_the_room_that_is_left() {
+    let mask = vec![1; 3600];
+    let config = InstancesConfig::default();
+    let car = |score, pixels: &PixelBox| detection(Class::Car, score, pixels, &mask[..pixels.area() as usize]);
+    let [least, most] = [(30, 30), (31, 30)].map(|(width, height)| car(0.9, &pixels(200, 10, width, height)));
+    let count = |all: &[Detection<'_>]| admitted(&config, [1242, 375], all).0;
+    let counted = |taken, too_small, tracked_only, beyond, given| DetectionCount {
+        given,
+        taken,
+        too_small,
+        tracked_only,
+        beyond,
+        ..DetectionCount::default()
+    };
+    assert_eq!(count(&[least]), counted(0, 1, 0, 0, 1));
+    assert_eq!(count(&[most]), counted(0, 1, 1, 0, 1));
+    // A table of four: the small one goes first whatever its score, and is counted as small.
+    let large: Vec<_> = (0..5).map(|n| pixels(300 + 70 * n, 10, 60, 60)).collect();
+    let mut all: Vec<_> = large.iter().map(|pixels| car(0.3, pixels)).collect();
+    all.insert(0, most);
+    assert_eq!(count(&all[..5]), counted(4, 1, 0, 0, 5));
+    assert_eq!(count(&all), counted(4, 1, 0, 1, 6));
+    // A larger one keeps its pixels.
+    let over = car(0.3, &pixels(190, 5, 60, 60));
+    assert_eq!(count(&[most, over]), counted(1, 1, 0, 0, 2), "nothing of the small one is left");
+}
+
+#[test]
+fn of_more_equals_than_there_is_room_for_the_same_are_taken_in_whatever_order() {
+    let mask = vec![1; 3600];
+    let boxes: Vec<_> = (0..7).map(|n| pixels(10 + 40 * n, 10, 60, 60)).collect();
+    let mut all: Vec<_> = boxes.iter().map(|pixels| detection(Class::Car, 0.5, pixels, &mask)).collect();
+    let first = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
+    for _ in 0..7 {
+        all.rotate_left(1);
+        assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), first);
+    }
+    all.reverse();
+    assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), first);
+}

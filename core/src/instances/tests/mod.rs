@@ -106,11 +106,22 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
 
     /// Takes a frame: the camera at a place, each board at its (none: not seen).
     pub fn step(&mut self, t_world_camera: Transform, boards: &[(&Board, Option<Transform>)]) -> InstancesReport {
+        self.step_behind(t_world_camera, boards, &[])
+    }
+
+    /// The same with boards in front of which no detector knows.
+    pub fn step_behind(
+        &mut self,
+        t_world_camera: Transform,
+        seen: &[(&Board, Option<Transform>)],
+        unseen: &[(&Board, Option<Transform>)],
+    ) -> InstancesReport {
+        let boards: Vec<_> = seen.iter().chain(unseen).copied().collect();
         let t_current_previous = t_world_camera.inverse() * self.t_world_camera;
         self.before.resize(boards.len(), None);
         let (mut matches, mut disparity) = (Vec::new(), vec![0u16; WIDTH * HEIGHT]);
         let mut owned: Vec<(Class, f32, PixelBox, Vec<u8>)> = Vec::new();
-        for ((board, now), before) in boards.iter().zip(&self.before) {
+        for (index, ((board, now), before)) in boards.iter().zip(&self.before).enumerate() {
             let Some(now) = now else { continue };
             let camera_board = t_world_camera.inverse() * now;
             let [half_x, half_y] = board.half_m;
@@ -123,7 +134,9 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
                     disparity[v as usize * WIDTH + u as usize] = (RIG.focal_px * RIG.baseline_m / depth * 256.0) as u16;
                 }
             }
-            owned.push((board.class, board.score, pixels, vec![1; pixels.area() as usize]));
+            if index < seen.len() {
+                owned.push((board.class, board.score, pixels, vec![1; pixels.area() as usize]));
+            }
             let Some(before) = before else { continue };
             let mut random = Random::new(9);
             for n in 0..board.points {

@@ -135,3 +135,53 @@ fn silhouettes_belong_to_nobody() {
         assert!(instances.owner[0] != AMBIGUOUS && instances.owner[3] != AMBIGUOUS);
     });
 }
+
+/// A board too small to be reconstructed, and its camera.
+fn small_car(speed_m_s: f64) -> impl Fn(u32) -> [Transform; 2] {
+    move |frame| {
+        let t = f64::from(frame) * 0.1;
+        [shift(0.0, 0.0, 5.0 * t), shift(1.0, 0.3, 14.0 + speed_m_s * t)]
+    }
+}
+
+#[test]
+fn a_small_thing_is_nothing_until_its_motion_is_measured_and_left_in_the_static_map_until_it_moves() {
+    let config = InstancesConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..InstancesConfig::default() };
+    for (speed_m_s, state) in [(8.0, State::Dynamic), (0.0, State::Static)] {
+        with(&CAPACITY, &config, |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            for frame in 0..8 {
+                let [camera, car] = small_car(speed_m_s)(frame);
+                drive.step(camera, &[(&Board::CAR, Some(car))]);
+                assert_eq!(drive.track(1).is_some(), frame > 0, "frame {frame}");
+                let mut depth_m = vec![5.0; WIDTH * HEIGHT];
+                drive.instances.clear(&mut ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap());
+                let moves = drive.track(1).is_some_and(|track| track.state == State::Dynamic);
+                assert_eq!(depth_m.contains(&0.0), moves, "frame {frame}");
+            }
+            assert_eq!(drive.track(1).unwrap().state, state);
+            assert_eq!(drive.instances.objects().count(), 0, "never reconstructed");
+        });
+    }
+}
+
+#[test]
+fn a_few_matches_on_what_hides_a_car_do_not_outweigh_its_own() {
+    // A post much nearer than the car, in front of it, standing; its matches count the square of sixteen times as much each.
+    let board = Board { points: 40, ..Board::CAR };
+    let post = Board { half_m: [0.04, 0.1], points: 6, ..Board::CAR };
+    let speed = |with_post: bool| {
+        with(&CAPACITY, &any_size(), |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            for frame in 0..5 {
+                let t = f64::from(frame) * 0.1;
+                let (camera, car, stands) = (shift(0.0, 0.0, 2.0 * t), shift(0.3, 0.2, 28.0 + 8.0 * t), shift(0.04, 0.03, 4.0));
+                let posts = [(&post, Some(stands))];
+                drive.step_behind(camera, &[(&board, Some(car))], if with_post { &posts } else { &[] });
+            }
+            drive.track(1).unwrap().speed_m_s.unwrap()[0]
+        })
+    };
+    assert!((speed(false) - 8.0).abs() < 0.2, "{}", speed(false));
+    assert!((speed(true) - 8.0).abs() < 0.2, "{}", speed(true));
+}
