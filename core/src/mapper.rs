@@ -282,6 +282,11 @@ impl<'s> Mapper<'s> {
         self.background.finish()
     }
 
+    /// Where the left camera was in the last frame: camera to world; the identity before the first.
+    pub fn t_world_camera(&self) -> &Transform {
+        self.camera.t_world_camera()
+    }
+
     /// What is tracked, as it stands after the last frame, by age.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
         self.instances.tracks()

@@ -17,7 +17,7 @@ mod tests;
 pub use config::MeshConfig;
 
 use super::{BLOCK_SIDE, BlockCoord, Blocks, Volume};
-use cases::{CASES, EDGE_COUNT, EDGE_START, edge_axis};
+use cases::{CASES, EDGE_START, edge_axis};
 
 /// Lattice points along a block's side, with those of the next block that its last cells need.
 const SIDE: usize = BLOCK_SIDE + 1;
@@ -142,19 +142,20 @@ impl<'v, 's> Patch<'v, 's> {
     }
 
     /// Hands the triangles of a cell to `sink` and returns their number.
-    #[expect(clippy::indexing_slicing, reason = "the table names edges below 12 only; `inside` has 8 bits")]
+    #[expect(clippy::indexing_slicing, reason = "masks keep edges below 16 and cases below 256")]
     fn polygonise(&self, cell: [usize; 3], inside: usize, sink: &mut impl FnMut(Triangle)) -> u64 {
         let case = &CASES[inside & 0xFF];
-        let mut vertices = [Vertex::default(); EDGE_COUNT];
+        // As many as an edge's four bits can say.
+        let mut vertices = [Vertex::default(); 16];
         let mut left = case.edges;
         while left != 0 {
             let edge = left.trailing_zeros() as usize;
             left &= left - 1;
-            vertices[edge] = self.vertex(cell, edge);
+            vertices[edge & 15] = self.vertex(cell, edge);
         }
         let mut count = 0;
         for edges in case.triangles.iter().take(case.count.into()) {
-            let triangle = Triangle { vertices: edges.map(|edge| vertices[usize::from(edge)]) };
+            let triangle = Triangle { vertices: edges.map(|edge| vertices[usize::from(edge) & 15]) };
             let [a, b, c] = triangle.vertices.map(|vertex| vertex.position_m);
             if a != b && b != c && c != a {
                 sink(triangle);
@@ -165,21 +166,26 @@ impl<'v, 's> Patch<'v, 's> {
     }
 
     /// The vertex on an edge of a cell.
-    #[expect(clippy::indexing_slicing, reason = "cells lie below 8, so their corners within the 9 points a side; edges are below 12")]
     fn vertex(&self, cell: [usize; 3], edge: usize) -> Vertex {
         let axis = edge_axis(edge);
-        let start = EDGE_START[edge];
+        let start = EDGE_START.get(edge).copied().unwrap_or(0);
         let low = [cell[0] + (start & 1), cell[1] + (start >> 1 & 1), cell[2] + (start >> 2)];
         let mut high = low;
-        high[axis] += 1;
-        let [at_low, at_high] = [low, high].map(|p| f32::from(self.sdf[p[0] + SIDE * (p[1] + SIDE * p[2])]));
+        if let Some(along) = high.get_mut(axis) {
+            *along += 1;
+        }
+        // Cells lie below 8, so their corners within the 9 points a side.
+        let sdf = |[x, y, z]: [usize; 3]| self.sdf.get(x + SIDE * (y + SIDE * z)).copied().map_or(0.0, f32::from);
+        let [at_low, at_high] = [low, high].map(sdf);
         // One is above 0 and the other is not, so they differ.
         let share = at_low / (at_low - at_high);
         let mut place = [0.0; 3];
         for ((place, origin), low) in place.iter_mut().zip(self.origin).zip(low) {
             *place = (origin + low as i32) as f32;
         }
-        place[axis] += share;
+        if let Some(along) = place.get_mut(axis) {
+            *along += share;
+        }
         Vertex {
             position_m: place.map(|c| self.voxel_size_m * c),
             colour: mix(self.colour(low), self.colour(high), share),
@@ -187,9 +193,9 @@ impl<'v, 's> Patch<'v, 's> {
     }
 
     /// The colour of a point of the patch, if it has one.
-    #[expect(clippy::indexing_slicing, reason = "points lie within the 9 a side, hence in one of the 8 blocks, and voxels below 512")]
+    #[expect(clippy::indexing_slicing, reason = "voxels are below 512")]
     fn colour(&self, [x, y, z]: [usize; 3]) -> Option<[u8; 3]> {
-        let slot = self.slots[x / BLOCK_SIDE + 2 * (y / BLOCK_SIDE) + 4 * (z / BLOCK_SIDE)]?;
+        let slot = self.slots.get(x / BLOCK_SIDE + 2 * (y / BLOCK_SIDE) + 4 * (z / BLOCK_SIDE)).copied()??;
         let planes = self.blocks.colour(slot)?;
         let voxel = x % BLOCK_SIDE + BLOCK_SIDE * (y % BLOCK_SIDE) + BLOCK_SIDE * BLOCK_SIDE * (z % BLOCK_SIDE);
         let colour = [planes[0][voxel], planes[1][voxel], planes[2][voxel]];

@@ -20,15 +20,16 @@ pub(super) struct Corners {
 impl Corners {
     /// Gives unseen corners the value of the plane through the seen ones, its slope along each axis the mean over the edges with both
     /// ends seen. Exact for a plane, hence no bias to either side. `None` when no edge tells the slope along some axis.
-    #[expect(clippy::indexing_slicing, reason = "corners are below 8")]
+    #[expect(clippy::indexing_slicing, reason = "masks keep corners below 8")]
     pub fn complete(&self) -> Option<[f32; 8]> {
         let mut known = [0.0; 8];
         (0..).zip(&mut known).for_each(|(corner, known)| *known = f32::from(self.seen >> corner & 1));
         let slope = |low: [usize; 4], step: usize| {
             let (mut sum, mut edges) = (0.0, 0.0);
             for low in low {
-                let both = known[low] * known[low + step];
-                sum += both * (self.sdf[low + step] - self.sdf[low]);
+                let (low, high) = (low & 7, (low + step) & 7);
+                let both = known[low] * known[high];
+                sum += both * (self.sdf[high] - self.sdf[low]);
                 edges += both;
             }
             (sum, edges)

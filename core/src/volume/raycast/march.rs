@@ -158,16 +158,16 @@ impl Marcher<'_, '_> {
 
     /// The field where the ray enters a cell.
     #[inline(never)]
-    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     fn first_value(&self, here: &Here<'_>, step: Step, before: Trail) -> f32 {
         let axis = step.axes[0];
         if before.depth == step.from {
             // Taken over from the cell before: should the two have guessed differently at a corner never seen, no ray slips through.
             before.value
-        } else if axis == NO_AXIS {
-            self.guessed_value(here, step, step.from)
+        } else if let Some(&ahead) = here.ray.ahead.get(axis) {
+            self.wall_value(here, step, axis, step.from, 1 - ahead as u32)
         } else {
-            self.wall_value(here, step, axis, step.from, 1 - here.ray.ahead[axis] as u32)
+            // It begins within the cell, on no axis' wall.
+            self.guessed_value(here, step, step.from)
         }
     }
 

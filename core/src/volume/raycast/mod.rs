@@ -108,11 +108,11 @@ struct Band<'b> {
 impl<'b> Band<'b> {
     fn split(self, rows: usize, width: usize) -> (Self, Self) {
         let at = (rows * width).min(self.depth_m.len());
-        let (depth_m, depth_low) = self.depth_m.split_at_mut(at);
-        let (normal, normal_low) = self.normal.split_at_mut(at);
-        let (colour, colour_low) = self.colour.split_at_mut(at);
-        let (weight, weight_low) = self.weight.split_at_mut(at);
-        let (layer, layer_low) = self.layer.split_at_mut(at);
+        let (depth_m, depth_low) = self.depth_m.split_at_mut_checked(at).unwrap_or_default();
+        let (normal, normal_low) = self.normal.split_at_mut_checked(at).unwrap_or_default();
+        let (colour, colour_low) = self.colour.split_at_mut_checked(at).unwrap_or_default();
+        let (weight, weight_low) = self.weight.split_at_mut_checked(at).unwrap_or_default();
+        let (layer, layer_low) = self.layer.split_at_mut_checked(at).unwrap_or_default();
         let low = Band {
             first_row: self.first_row + rows,
             depth_m: depth_low,
@@ -268,7 +268,7 @@ impl<'s> Raycaster<'s> {
 
 /// Fills a band and counts the pixels that show the map.
 fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: Layer, band: Band<'_>) -> u32 {
-    let width = marcher.eye.width;
+    let width = marcher.eye.width.max(1);
     let images = band
         .depth_m
         .chunks_mut(width)
