@@ -1,0 +1,36 @@
+//! What must not be, put in on purpose, to see that the proofs notice.
+
+use core::hint::black_box;
+
+/// A panic, a recursion and a big frame.
+pub fn all(seed: usize) -> u64 {
+    #[cfg(feature = "heap_fault")]
+    let seed = seed + allocation(seed);
+    u64::from(panic(seed)) + recursion(seed) + frame(seed)
+}
+
+#[inline(never)]
+fn panic(seed: usize) -> u8 {
+    let table = black_box([1, 2, 3]);
+    table[seed]
+}
+
+#[inline(never)]
+fn recursion(seed: usize) -> u64 {
+    if seed == 0 { 1 } else { recursion(black_box(seed) / 2).wrapping_mul(black_box(3)) }
+}
+
+#[inline(never)]
+fn frame(seed: usize) -> u64 {
+    let mut room = [0u8; 100_000];
+    black_box(&mut room);
+    room.get(seed).copied().map_or(0, u64::from)
+}
+
+/// An allocation.
+#[cfg(feature = "heap_fault")]
+#[inline(never)]
+fn allocation(seed: usize) -> usize {
+    extern crate alloc;
+    *black_box(alloc::boxed::Box::new(seed))
+}

@@ -1,0 +1,102 @@
+//! Replays a fixture on a machine of any kind. Prints a line per frame: the digests as they stand in the fixture's file, then the blocks in
+//! use and, where the stack can be painted, the bytes a step took of it. The exit code is 0 when every line is the one on file.
+#![cfg_attr(not(feature = "hosted"), no_std, no_main)]
+
+#[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
+mod faults;
+#[cfg(not(feature = "hosted"))]
+mod forbidden;
+mod line;
+#[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "platform/cortex_m.rs")]
+#[cfg_attr(all(target_os = "linux", not(feature = "hosted")), path = "platform/linux.rs")]
+#[cfg_attr(target_arch = "wasm32", path = "platform/wasm.rs")]
+#[cfg_attr(feature = "hosted", path = "platform/hosted.rs")]
+mod platform;
+mod reach;
+#[cfg_attr(not(all(target_arch = "arm", target_os = "none")), path = "stack/unknown.rs")]
+#[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "stack/painted.rs")]
+mod stack;
+
+use dynvox_clip::{Clip, FrameDigests, SLAB_BYTES, replay};
+use dynvox_core::{Serial, memory::Slab};
+use line::Line;
+use stack::Paint;
+use static_cell::ConstStaticCell;
+
+/// The fixture as `dynvox fixtures pack` writes it.
+static CLIP: &[u8] = include_bytes!(env!("DYNVOX_CLIP"));
+/// What it must give.
+static DIGESTS: &str = include_str!("../../../../fixtures/street-320x96/digests.txt");
+
+#[cfg_attr(all(target_arch = "arm", target_os = "none"), unsafe(link_section = ".psram"))]
+static SLAB: ConstStaticCell<Slab<SLAB_BYTES>> = ConstStaticCell::new(Slab::ZERO);
+
+/// Most a step may take of the stack, bytes; and most that everything may, making the mapper included.
+const STEP_STACK: u32 = 32 * 1024;
+const WHOLE_STACK: u32 = 64 * 1024;
+
+/// Replays; returns the exit code: 0, or what of a digest (1), the fixture (2), the stack (3) was wrong.
+fn run() -> u8 {
+    let (Some(slab), Ok(clip)) = (SLAB.try_take(), Clip::new(CLIP)) else { return 2 };
+    let mut expected = Lines(DIGESTS.as_bytes()).filter(|line| line.first() != Some(&b'#'));
+    let mut paint = Paint::below();
+    let (mut wrong, mut whole, mut step) = (0u32, 0, 0);
+    let done = replay(&clip, &mut slab.0, &Serial, |frame| {
+        let bytes = paint.used_below();
+        whole = paint.used_in_all().max(whole);
+        // What the first frame shows is mostly the making of the mapper.
+        step = if frame.frame == 0 { 0 } else { bytes.max(step) };
+        let digests = written(frame);
+        let same = expected.next().is_some_and(|line| line == digests.text());
+        wrong += u32::from(!same);
+        platform::put(
+            &digests.str(if same { " blocks " } else { " WRONG, blocks " }).decimal(frame.blocks).str(" stack ").decimal(bytes).str("\n"),
+        );
+        paint = Paint::below();
+    });
+    let missing = expected.count() as u32;
+    platform::put(&Line::new().str("elsewhere ").hex(reach::digest(&clip, &mut slab.0)).str("\n"));
+    platform::put(&Line::new().str("stack of a step ").decimal(step).str(", of everything ").decimal(whole).str("\n"));
+    #[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
+    platform::put(&Line::new().hex(faults::all(CLIP.len())).str("\n"));
+    match (done, wrong + missing) {
+        (Err(_), _) => 2,
+        (Ok(()), 1..) => 1,
+        (Ok(()), 0) if step > STEP_STACK || whole > WHOLE_STACK => 3,
+        (Ok(()), 0) => 0,
+    }
+}
+
+/// Lines of a text: those of `str` can panic, or so the compiler thinks.
+struct Lines<'t>(&'t [u8]);
+
+impl<'t> Iterator for Lines<'t> {
+    type Item = &'t [u8];
+
+    fn next(&mut self) -> Option<&'t [u8]> {
+        let end = self.0.iter().position(|&byte| byte == b'\n')?;
+        let line = self.0.get(..end)?;
+        self.0 = self.0.get(end + 1..)?;
+        Some(line)
+    }
+}
+
+/// A frame's digests as they stand in the fixture's file.
+fn written(frame: &FrameDigests) -> Line {
+    let stages = &frame.stages;
+    let mut line = Line::new().decimal(frame.frame).str(" ").hex(frame.digest).str(" ");
+    for stage in [stages.input, stages.disparity, stages.matches, stages.egomotion, stages.tracks, stages.background] {
+        line = line.hex(stage).str(" ");
+    }
+    let mut between = "";
+    for object in stages.objects.iter() {
+        line = line.str(between).decimal(object.id).str(":").hex(object.digest);
+        between = ";";
+    }
+    if between.is_empty() { line.str("-") } else { line }
+}
+
+#[cfg(feature = "hosted")]
+fn main() -> std::process::ExitCode {
+    run().into()
+}

@@ -1,0 +1,94 @@
+//! What the fixture does not come to: every other way into the core, so that the proofs see it, and its bits are compared from machine to
+//! machine as well.
+
+use core::hint::black_box;
+use dynvox_clip::{Clip, Frame, SLAB_BYTES, config};
+use dynvox_core::{
+    Capacity, Mapper, Serial, StereoFrame,
+    digest::Digest,
+    image::View,
+    instances::{ObjectSink, RetiredObject},
+    volume::{BlockStore, LeavingBlock, ObservationWeight, Raycaster, ReturningBlock},
+};
+
+/// Frames taken.
+const FRAMES: usize = 6;
+/// So few blocks that some must leave, and with colour.
+const CAPACITY: Capacity = Capacity { blocks: 600, visible_blocks: 600, colour: true, ..Capacity::TINY };
+const _: () = assert!(CAPACITY.bytes() <= SLAB_BYTES);
+const PIXELS: usize = CAPACITY.pixels();
+
+static COLOUR: [[u8; 3]; PIXELS] = [[200, 100, 50]; PIXELS];
+static DISPARITY_Q8: [u16; PIXELS] = [20 << 8; PIXELS];
+
+/// Digest of what leaves.
+struct Leaving(Digest);
+
+impl BlockStore for Leaving {
+    fn keep(&mut self, block: LeavingBlock<'_>) -> bool {
+        self.0.i16s(block.sdf);
+        self.0.bytes(block.weight);
+        block.colour.into_iter().flatten().for_each(|plane| self.0.bytes(plane));
+        true
+    }
+
+    fn bring_back(&mut self, _: ReturningBlock<'_>) -> bool {
+        false
+    }
+}
+
+impl ObjectSink for Leaving {
+    fn retire(&mut self, object: RetiredObject<'_, '_>) {
+        self.0.u64(u64::from(object.summary.frames));
+        self.0.u64(object.volume.digest());
+    }
+}
+
+/// Goes every way; 0 where one is closed. What the compiler must not know is hidden from it.
+#[inline(never)]
+pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
+    let mut config = config(clip);
+    config.volume.observation_weight = black_box(ObservationWeight::Depth);
+    config.stereo.median = black_box(true);
+    let mut made = Mapper::new(black_box(&CAPACITY), black_box(&config), slab);
+    let Ok(mapper) = made.as_mut() else { return 0 };
+    let [width, height] = clip.size();
+    let (mut blocks, mut objects) = (Leaving(Digest::default()), Leaving(Digest::default()));
+    let mut digest = Digest::default();
+    for (index, frame) in clip.frames().enumerate().take(FRAMES) {
+        let Frame::Pair(pair) = frame else { return 0 };
+        let seen = pair.stereo();
+        let late = index >= FRAMES / 2;
+        let frame = StereoFrame {
+            colour: if late { View::new(&COLOUR, width, height) } else { None },
+            class: late.then_some(seen.left),
+            disparity_q8: if index == FRAMES - 1 { View::new(&DISPARITY_Q8, width, height) } else { None },
+            t_world_camera: late.then(|| *mapper.t_world_camera()),
+            ..seen
+        };
+        let Ok(report) = mapper.step_with(black_box(&frame), &Serial, &mut blocks, &mut objects) else { return 0 };
+        digest.u64(report.digest);
+        digest.u64(report.severity() as u64);
+    }
+    let pose = *mapper.t_world_camera();
+    let mut look = |seen: Option<&Raycaster<'_>>| {
+        let depth_m = seen.and_then(Raycaster::depth_m).into_iter().flat_map(|image| image.rows()).flatten();
+        depth_m.for_each(|&depth_m| digest.f64(f64::from(depth_m)));
+        let normals = seen.and_then(Raycaster::normal).into_iter().flat_map(|image| image.rows()).flatten();
+        normals.for_each(|normal| digest.bytes(&normal.map(|x| x as u8)));
+    };
+    look(mapper.raycast(&pose, &Serial).ok());
+    look(mapper.raycast_composed(&pose, &Serial).ok());
+    look(mapper.raycast_object(black_box(1), &pose, &Serial).ok());
+    let triangles = mapper.triangles(&mut |triangle| {
+        triangle.vertices.iter().flat_map(|vertex| vertex.position_m).for_each(|x| digest.f64(f64::from(x)));
+    });
+    digest.u64(triangles);
+    mapper.tracks().for_each(|track| digest.u64(u64::from(track.id)));
+    digest.u64(mapper.footprint().bytes() as u64);
+    digest.u64(u64::from(mapper.finish_with(&mut objects).visited));
+    digest.u64(u64::from(mapper.stream_out(&mut blocks).kept));
+    digest.u64(blocks.0.finish());
+    digest.u64(objects.0.finish());
+    digest.finish()
+}
