@@ -398,3 +398,48 @@ fn every_kth_frame_alone_is_fused_and_that_harms_nothing() {
     let refused = dynvox(root.path(), &[&["run", "--out", "x", "--fuse-every", "0"], &street[..]].concat());
     assert!(said(&refused).contains("mapper.fuse_every must be 1 or more"), "{}", said(&refused));
 }
+
+#[test]
+fn files_are_evaluated_without_a_run() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 1);
+    let json = |args: &[&str]| {
+        let told = dynvox(root.path(), args);
+        assert!(told.status.success(), "{}", said(&told));
+        serde_json::from_slice::<serde_json::Value>(&told.stdout).unwrap()
+    };
+    // The plane as a pair of KITTI 2015: its left half is an object whose truth is 5 px away from what is seen.
+    let place = |folder: &str| {
+        fs::create_dir_all(root.path().join("set/training").join(folder)).unwrap();
+        root.path().join("set/training").join(folder).join("000000_10.png")
+    };
+    fs::copy(root.path().join("rig/left/000.png"), place("image_2")).unwrap();
+    fs::copy(root.path().join("rig/right/000.png"), place("image_3")).unwrap();
+    let truth = |u: u32, _: u32| Luma([if u < 80 { 15 * 256u16 } else { 10 * 256 }]);
+    image::ImageBuffer::from_fn(160, 64, truth).save(place("disp_noc_0")).unwrap();
+    GrayImage::from_fn(160, 64, |u, _| Luma([u8::from(u < 80)])).save(place("obj_map")).unwrap();
+    let found = json(&["evaluate", "stereo", "set", "--json"]);
+    let regions = &found["regions"];
+    assert_eq!((&found["benchmark"], &regions["noc"]["pixels"]), (&"kitti-2015".into(), &10_240.into()));
+    assert!(
+        regions["noc_background"]["coverage"].as_f64().unwrap() > 0.6 && regions["noc_background"]["d1"].as_f64().unwrap() < 0.01,
+        "{found}"
+    );
+    let foreground = &regions["noc_foreground"];
+    assert!(
+        foreground["d1"].as_f64().unwrap() > 0.99 && (foreground["mean_signed_error_px"].as_f64().unwrap() + 5.0).abs() < 0.1,
+        "{found}"
+    );
+    assert!(regions["occ"].is_null());
+    let judged = json(&["evaluate", "stereo", "set", "--disparity", "set/training/disp_noc_0", "--json"]);
+    assert_eq!((&judged["regions"]["noc"]["d1_filled"], &judged["regions"]["noc"]["coverage"]), (&0.0.into(), &1.0.into()));
+    let refused = dynvox(root.path(), &["evaluate", "stereo", "rig"]);
+    assert!(!refused.status.success() && said(&refused).contains("is no stereo benchmark"), "{}", said(&refused));
+    // A run's folder against its own poses in the other format.
+    let small = ["--set", "street.width=160", "--set", "street.height=64", "--set", "street.frames=3"];
+    json(&[&["run", "--profile", "tiny", "--out", "run", "--json"], &small[..]].concat());
+    let same = json(&["evaluate", "trajectory", "run", "run/trajectory_kitti.txt", "--json"]);
+    assert!(same["ate_m"].as_f64().unwrap() < 1e-9 && same["rpe_r_deg"].as_f64().unwrap() < 1e-6, "{same}");
+    let refused = dynvox(root.path(), &["evaluate", "trajectory", "run", "rig/calib.txt"]);
+    assert!(!refused.status.success() && said(&refused).contains("line 1 is no pose"), "{}", said(&refused));
+}

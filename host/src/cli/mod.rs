@@ -26,6 +26,7 @@ Examples:
   dynvox budget --profile small                 where the bytes of a profile go
   dynvox run ~/kitti --sequence 06 --evaluate lidar     accuracy and completeness of input and map
   dynvox evaluate trajectory out/kitti-odometry-06-001 ~/kitti/poses/06.txt
+  dynvox evaluate stereo ~/kitti-stereo-2015        D1 and coverage of the matcher, by region
   dynvox synth --out street --set street.frames=50
   dynvox diff out/a out/b                       the first frame and stage in which two runs part
 
@@ -47,7 +48,7 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Show where the bytes go: all profiles, or one region by region
     Budget(budget::BudgetArgs),
-    /// Hold files against the truth: trajectories
+    /// Hold files against the truth: trajectories, disparities
     Evaluate(evaluate::EvaluateArgs),
     /// Write the synthetic street in KITTI's layout, with all its truth
     Synth(synth::SynthArgs),

@@ -57,6 +57,11 @@ impl Settings {
         Ok(layers.settings)
     }
 
+    /// The matcher's configuration.
+    pub fn stereo(&self) -> StereoConfig {
+        self.stereo
+    }
+
     /// The mapper's configuration for a rig.
     pub fn config(&self, rig: StereoRig) -> Config {
         let Self {

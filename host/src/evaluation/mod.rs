@@ -3,5 +3,6 @@
 pub mod exact;
 pub mod lidar;
 pub mod objects;
+pub mod stereo;
 pub mod swept;
 pub mod trajectory;

@@ -1,22 +1,10 @@
-//! `dynvox evaluate`: figures from files, without a run.
+//! `dynvox evaluate trajectory`.
 
 use crate::evaluation::trajectory::{self, TrajectoryErrors, read_trajectory, together};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
-pub struct EvaluateArgs {
-    #[command(subcommand)]
-    what: What,
-}
-
-#[derive(Debug, clap::Subcommand)]
-enum What {
-    /// Hold a trajectory against the true one
-    Trajectory(TrajectoryArgs),
-}
-
-#[derive(Debug, clap::Args)]
-struct TrajectoryArgs {
+pub struct TrajectoryArgs {
     /// Estimated poses: a file in KITTI's or TUM's format, or a run folder
     estimate: PathBuf,
     /// True poses, in either format; joined by time where both have times, row by row otherwise
@@ -26,13 +14,7 @@ struct TrajectoryArgs {
     json: bool,
 }
 
-pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
-    match &args.what {
-        What::Trajectory(args) => trajectories(args),
-    }
-}
-
-fn trajectories(args: &TrajectoryArgs) -> anyhow::Result<()> {
+pub fn run(args: &TrajectoryArgs) -> anyhow::Result<()> {
     let (estimate, truth) = together(&read_trajectory(&args.estimate)?, &read_trajectory(&args.truth)?)?;
     let found = trajectory::errors(&truth, &estimate).ok_or_else(|| anyhow::anyhow!("two poses are needed. Give longer trajectories"))?;
     if args.json {

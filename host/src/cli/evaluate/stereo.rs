@@ -1,0 +1,132 @@
+//! `dynvox evaluate stereo`.
+
+use crate::cli::settings::Settings;
+use crate::dataset::{Image, read_png, read_png_deep, read_png_u16};
+use crate::evaluation::stereo::{BAD_PX, StereoFigures, StereoPair, StereoTally, filled, find_stereo_set};
+use crate::harness::{HostSlab, Threads};
+use anyhow::bail;
+use dynvox_core::Capacity;
+use dynvox_core::memory::Carver;
+use dynvox_core::stereo::{StereoConfig, StereoMatcher};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Names of the regions: what both cameras see and all, each whole, its background and its foreground.
+const REGIONS: [&str; 6] = ["noc", "noc_background", "noc_foreground", "occ", "occ_background", "occ_foreground"];
+
+#[derive(Debug, clap::Args)]
+pub struct StereoArgs {
+    /// Folder of KITTI 2012 (image_0, image_1, disp_noc, disp_occ) or 2015 (image_2, image_3, disp_noc_0, disp_occ_0, obj_map), or the one with its training/
+    folder: PathBuf,
+    /// Judge another program's disparities instead: 16-bit PNG (value / 256 px, 0 none) of the images' names
+    #[arg(long, value_name = "DIR")]
+    disparity: Option<PathBuf>,
+    /// Settings from a file; config.toml of a run is one
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// One setting of the matcher, as in --set stereo.texture_min=10; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Threads; the result does not depend on them
+    #[arg(long, default_value_t = 2, value_name = "N")]
+    threads: usize,
+    /// Write the figures to standard output as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was found.
+#[derive(Serialize)]
+struct Found {
+    benchmark: &'static str,
+    pairs: usize,
+    regions: std::collections::BTreeMap<&'static str, StereoFigures>,
+}
+
+pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
+    let set = find_stereo_set(&args.folder)?;
+    let config = Settings::resolve(args.config.as_deref(), &args.set)?.stereo();
+    if args.threads == 0 {
+        bail!("--threads begins at 1. Give a larger number");
+    }
+    let threads = Threads::new(args.threads)?;
+    let mut tallies = [StereoTally::default(); REGIONS.len()];
+    for pair in &set.pairs {
+        let given = match &args.disparity {
+            Some(folder) => read_png_deep(&folder.join(format!("{}.png", pair.name)))?,
+            None => threads.run(|| matched(pair, &config, &threads))?,
+        };
+        judge(pair, &given, &mut tallies)?;
+    }
+    let regions = REGIONS.into_iter().zip(tallies).filter_map(|(name, tally)| Some((name, tally.figures()?))).collect();
+    let found = Found { benchmark: set.name, pairs: set.pairs.len(), regions };
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&found)?);
+    } else {
+        tell(&found);
+    }
+    Ok(())
+}
+
+/// The core's own disparity of a pair.
+fn matched(pair: &StereoPair, config: &StereoConfig, threads: &Threads) -> anyhow::Result<Image<u16>> {
+    let [left, right] = [read_png(&pair.images[0])?.grey, read_png(&pair.images[1])?.grey];
+    let (width, height) = (left.width(), left.height());
+    if (right.width(), right.height()) != (width, height) {
+        bail!("{} and {} differ in size. Fetch the pair anew", pair.images[0].display(), pair.images[1].display());
+    }
+    let capacity = Capacity { image_width: width, image_height: height, ..Capacity::SMALL };
+    let bytes = StereoMatcher::bytes(&capacity);
+    let Some(mut slab) = HostSlab::map(bytes) else { bail!("this machine has no {bytes} bytes for an image of {width} x {height} px") };
+    let refused = |reason: String| anyhow::anyhow!("{} cannot be matched: {reason}", pair.images[0].display());
+    let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(|error| refused(format!("{error:?}")))?;
+    let mut matcher = StereoMatcher::carve(&capacity, &mut carver).map_err(|error| refused(format!("{error:?}")))?;
+    let (Some(left), Some(right)) = (left.view(), right.view()) else { return Err(refused("it has no pixels".into())) };
+    // A pair that cannot be matched covers nothing: that shows in the figures.
+    matcher.compute(config, left, right, threads);
+    Ok(Image::from_view(&matcher.disparity_q8()))
+}
+
+/// Counts a pair in every region it has truth for.
+fn judge(pair: &StereoPair, given: &Image<u16>, tallies: &mut [StereoTally; REGIONS.len()]) -> anyhow::Result<()> {
+    let same = |path: &Path, image: &Image<u16>| {
+        if (image.width(), image.height()) == (given.width(), given.height()) {
+            return Ok(());
+        }
+        let sizes = [image, given].map(|image| format!("{} x {} px", image.width(), image.height()));
+        bail!("{} is {}, but the disparity {}. Fetch one of them anew", path.display(), sizes[0], sizes[1])
+    };
+    let whole = filled(given);
+    let objects = pair.objects.as_deref().map(read_png_u16).transpose()?;
+    if let (Some(path), Some(objects)) = (&pair.objects, &objects) {
+        same(path, objects)?;
+    }
+    for (path, tallies) in pair.truth.iter().zip(tallies.chunks_exact_mut(REGIONS.len() / 2)) {
+        let (Some(path), [all, background, foreground]) = (path, tallies) else { continue };
+        let truth = read_png_deep(path)?;
+        same(path, &truth)?;
+        all.add(&truth, given, &whole, |_| true);
+        if let Some(objects) = &objects {
+            let is_object = |at: usize| objects.pixels().get(at).is_some_and(|&object| object > 0);
+            background.add(&truth, given, &whole, |at| !is_object(at));
+            foreground.add(&truth, given, &whole, is_object);
+        }
+    }
+    Ok(())
+}
+
+fn tell(found: &Found) {
+    println!(
+        "{}: {} pairs. Percent of the pixels with an estimate; after the bar of all, holes filled as the benchmark does",
+        found.benchmark, found.pairs
+    );
+    print!("{:<16}{:>11}{:>10}{:>18}", "region", "pixels", "coverage", "D1");
+    BAD_PX.iter().for_each(|px| print!("{:>18}", format!("> {px} px")));
+    println!("{:>12}{:>10}", "mean |e|", "mean e");
+    for (name, of) in REGIONS.iter().filter_map(|name| Some((name, found.regions.get(name)?))) {
+        let both = |given: f64, filled: f64| format!("{:.2} | {:.2}", 100.0 * given, 100.0 * filled);
+        print!("{name:<16}{:>11}{:>9.2}%{:>18}", of.pixels, 100.0 * of.coverage, both(of.d1, of.d1_filled));
+        of.bad.iter().zip(of.bad_filled).for_each(|(given, filled)| print!("{:>18}", both(*given, filled)));
+        println!("{:>9.3} px{:>7.3} px", of.mean_error_px, of.mean_signed_error_px);
+    }
+}
