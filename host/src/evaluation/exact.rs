@@ -26,7 +26,7 @@ pub struct ExactFigures {
     pub accuracy: f64,
     /// Share of the exact pixels where the map shows a surface.
     pub completeness: f64,
-    /// Exact pixels compared: static ones within 20 m.
+    /// Exact pixels compared: those within 20 m that neither move nor belong to a thing with a map of its own.
     pub points: u64,
 }
 
@@ -46,11 +46,12 @@ impl Default for ExactErrors {
 }
 
 impl ExactErrors {
-    /// Compares one view of the map with the exact depth of the same pixels.
-    pub fn add(&mut self, map_depth_m: &View<'_, f32>, exact: &ExactFrame) {
+    /// Compares one view of the static map with the exact depth of the same pixels, but for those of things that have maps of their own.
+    pub fn add(&mut self, map_depth_m: &View<'_, f32>, exact: &ExactFrame, apart: impl Fn(usize, usize) -> bool) {
         let exact_pixels = exact.depth_m.pixels().iter().zip(exact.moving.pixels());
-        for (&shown_m, (&exact_m, &moving)) in map_depth_m.rows().flatten().zip(exact_pixels) {
-            if moving || !(exact_m > 0.0 && exact_m <= FAR_M) {
+        for (pixel, (&shown_m, (&exact_m, &moving))) in map_depth_m.rows().flatten().zip(exact_pixels).enumerate() {
+            let (u, v) = (pixel % map_depth_m.width(), pixel / map_depth_m.width());
+            if moving || !(exact_m > 0.0 && exact_m <= FAR_M) || apart(u, v) {
                 continue;
             }
             self.points += 1;
@@ -108,7 +109,14 @@ mod tests {
         let mut errors = ExactErrors::default();
         assert_eq!(errors.figures(), None);
         let map = image(vec![10.1, 10.1, 0.0, 3.0, 3.0, 3.0]);
-        errors.add(&map.view().unwrap(), &exact);
+        errors.add(&map.view().unwrap(), &exact, |u, v| (u, v) == (2, 0));
+        assert_eq!(
+            errors.figures().map(|figures| (figures.points, figures.completeness)),
+            Some((2, 1.0)),
+            "one lies on a thing kept apart"
+        );
+        let mut errors = ExactErrors::default();
+        errors.add(&map.view().unwrap(), &exact, |_, _| false);
         let figures = errors.figures().unwrap();
         assert_eq!(figures.points, 3);
         assert_eq!(figures.accuracy, 1.0, "what is not shown is not inaccurate");

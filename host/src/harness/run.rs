@@ -365,7 +365,8 @@ impl Course<'_, '_> {
         let (mapper, threads) = (&mut self.mapper, &self.threads);
         let Ok(seen) = threads.run(|| mapper.raycast(t_world_camera, threads)) else { return };
         if let (Some(exact), Some(depth_m)) = (exact, seen.depth_m()) {
-            self.exact.add(&depth_m, exact);
+            let apart = |sighting: &Sighting, u, v| self.plan.config.instances.dynamic && sighting.contains(u, v);
+            self.exact.add(&depth_m, exact, |u, v| images.sightings.all.iter().any(|one| apart(one, u as i32, v as i32)));
         }
         if let (Some(frame), Some(disparity_png), Some(grey)) = (keyframe, disparity_png, images.left.view()) {
             let input = images.colour.as_ref().and_then(|colour| colour.view());
