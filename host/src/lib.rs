@@ -10,4 +10,5 @@ pub mod fixtures;
 pub mod harness;
 pub mod segmentation;
 pub mod store;
+pub mod sweep;
 pub mod synth;

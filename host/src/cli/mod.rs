@@ -8,6 +8,7 @@ mod fixtures;
 mod inspect;
 mod run;
 mod settings;
+mod sweep;
 mod synth;
 
 use clap::{Parser, Subcommand};
@@ -27,6 +28,7 @@ Examples:
   dynvox run ~/kitti --sequence 06 --evaluate lidar     accuracy and completeness of input and map
   dynvox evaluate trajectory out/kitti-odometry-06-001 ~/kitti/poses/06.txt
   dynvox evaluate stereo ~/kitti-stereo-2015        D1 and coverage of the matcher, by region
+  dynvox sweep street ~/kitti:06 --out sweep    prune weights, frame rates and scales on one page
   dynvox synth --out street --set street.frames=50
   dynvox diff out/a out/b                       the first frame and stage in which two runs part
 
@@ -50,6 +52,8 @@ enum Command {
     Budget(budget::BudgetArgs),
     /// Hold files against the truth: trajectories, disparities
     Evaluate(evaluate::EvaluateArgs),
+    /// Make many runs with one thing varied, and one page of them beside the original's numbers
+    Sweep(Box<sweep::SweepArgs>),
     /// Write the synthetic street in KITTI's layout, with all its truth
     Synth(synth::SynthArgs),
     /// Name the first frame and the first stage in which two runs part
@@ -68,6 +72,7 @@ pub fn main() -> ExitCode {
         Some(Command::Inspect(args)) => inspect::run(&args),
         Some(Command::Budget(args)) => budget::run(&args),
         Some(Command::Evaluate(args)) => evaluate::run(&args),
+        Some(Command::Sweep(args)) => sweep::run(&args),
         Some(Command::Synth(args)) => synth::run(&args),
         Some(Command::Diff(args)) => return diff::main(&args),
         Some(Command::Fixtures(args)) => fixtures::run(&args),

@@ -104,15 +104,22 @@ pub struct RunArgs {
     quiet: bool,
 }
 
+/// The arguments of a run without the command's name.
+#[derive(clap::Parser)]
+struct Alone {
+    #[command(flatten)]
+    args: RunArgs,
+}
+
 impl RunArgs {
     /// What `dynvox` alone means.
     pub fn of_nothing() -> Self {
-        #[derive(clap::Parser)]
-        struct Alone {
-            #[command(flatten)]
-            args: RunArgs,
-        }
         <Alone as clap::Parser>::parse_from(["dynvox"]).args
+    }
+
+    /// What a line of arguments means, the program's name first.
+    pub fn of(line: &[String]) -> Result<Self, clap::Error> {
+        Ok(<Alone as clap::Parser>::try_parse_from(line)?.args)
     }
 
     fn silent(&self) -> bool {
@@ -141,7 +148,8 @@ fn on_or_off(text: &str) -> Result<bool, String> {
     }
 }
 
-pub fn run(args: &RunArgs) -> anyhow::Result<()> {
+/// What a run is to do.
+fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     let mut settings = Settings::resolve(args.config.as_deref(), &args.set)?;
     let capacity = super::profile(&args.profile)?;
     settings.fit(&capacity);
@@ -164,7 +172,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         Some(choice) => choice.apply(&mut settings, dataset.as_ref(), &indices)?,
         None => None,
     };
-    let plan = Plan {
+    Ok(Plan {
         indices,
         poses,
         profile: args.profile.clone(),
@@ -182,17 +190,30 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         rss_limit_bytes: args.rss_limit_mib.map_or(capacity.bytes() as u64 + HOST_OVERHEAD_BYTES, |mib| mib.saturating_mul(MIB)),
         quiet: args.silent(),
         dataset,
-    };
+    })
+}
+
+/// Maps into a folder, and tells what does not fit with what would.
+fn map(plan: &Plan, folder: &RunFolder) -> anyhow::Result<RunRecord> {
+    harness::run(plan, folder).map_err(|error| match error {
+        RunError::ImageSize { .. } | RunError::Window { .. } => anyhow::anyhow!("{error}\n\n{}", super::budget::table(&plan.config.volume)),
+        error => error.into(),
+    })
+}
+
+/// A run of which no folder stays.
+pub fn record(args: &RunArgs, workshop: &Path) -> anyhow::Result<RunRecord> {
+    map(&plan(args)?, &RunFolder::begin(workshop, true)?)
+}
+
+pub fn run(args: &RunArgs) -> anyhow::Result<()> {
+    let plan = plan(args)?;
     let target = args.out.clone().unwrap_or_else(|| RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name()));
     let folder = RunFolder::begin(&target, args.overwrite)?;
     if !args.silent() {
         introduce(&plan);
     }
-    let record = harness::run(&plan, &folder).map_err(|error| match error {
-        // What does not fit is told with what would.
-        RunError::ImageSize { .. } | RunError::Window { .. } => anyhow::anyhow!("{error}\n\n{}", super::budget::table(&plan.config.volume)),
-        error => error.into(),
-    })?;
+    let record = map(&plan, &folder)?;
     let summary = Summary::of(&record);
     write(&folder, &record, &summary)?;
     let place = folder.commit()?;

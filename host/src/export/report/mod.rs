@@ -1,6 +1,6 @@
 //! `report.html`: the run on one page, in one file. Pictures and drawings are inside; nothing is fetched, no script runs.
 
-mod chart;
+pub(crate) mod chart;
 mod lidar;
 mod objects;
 
@@ -11,7 +11,7 @@ use dynvox_core::Stage;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-const STYLE: &str = include_str!("style.css");
+pub(crate) const STYLE: &str = include_str!("style.css");
 const MIB: f64 = 1_048_576.0;
 
 /// Writes the page.
@@ -326,6 +326,6 @@ pub fn grouped(value: u64) -> String {
     out
 }
 
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

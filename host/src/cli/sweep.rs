@@ -1,0 +1,151 @@
+//! `dynvox sweep`.
+
+use super::run::{self, RunArgs};
+use crate::dataset::{self, Images};
+use crate::sweep::{Data, Kind, Plan, RunResult, SweepFolder, Wanted, merge};
+use anyhow::{Context, bail};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub struct SweepArgs {
+    /// Data sets: street, PATH or PATH:SEQUENCE [default: street]
+    data: Vec<Data>,
+    /// What to vary
+    #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Kind::PruneWeight, Kind::FrameRate, Kind::Scale])]
+    sweeps: Vec<Kind>,
+    /// Prune weights
+    #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2, 3, 5, 8, 10], value_name = "W,...")]
+    weights: Vec<u32>,
+    /// Frames from one that is fused to the next
+    #[arg(long, value_delimiter = ',', default_values_t = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12], value_name = "K,...")]
+    rates: Vec<u32>,
+    /// Sizes of the images, percent
+    #[arg(long, value_delimiter = ',', default_values_t = [100, 75, 50, 25], value_name = "PERCENT,...")]
+    scales: Vec<u32>,
+    /// Sources of depth, as `dynvox run --depth` takes them; exact is for the street alone
+    #[arg(long, value_delimiter = ',', default_values_t = ["elas".to_owned(), "exact".to_owned()], value_name = "SOURCE,...")]
+    depths: Vec<String>,
+    /// Pruning lag of the first two sweeps, frames
+    #[arg(long, default_value_t = 40, value_name = "N")]
+    prune_lag: usize,
+    /// Frames after which the first two sweeps look at the map, when pruning has been there
+    #[arg(long, default_value_t = 80, value_name = "N")]
+    evaluation_delay: usize,
+    /// Byte budget of every run
+    #[arg(long, default_value = "desktop", value_name = "NAME")]
+    profile: String,
+    /// Threads of a run; the result does not depend on them
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Frames of a run at most
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+    /// One setting of every run; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Make part I of N parts alone: give each machine its own, then put the folders together with --merge
+    #[arg(long, value_name = "I/N", value_parser = part_of)]
+    shard: Option<(usize, usize)>,
+    /// Put the folders of several parts together in --out, and make no run
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["data", "shard"])]
+    merge: Vec<PathBuf>,
+    /// Folder for results, tables and report.html; a sweep that was interrupted goes on there
+    #[arg(long, default_value = "out/sweep", value_name = "DIR")]
+    out: PathBuf,
+    /// Show no progress
+    #[arg(long)]
+    quiet: bool,
+}
+
+fn part_of(text: &str) -> Result<(usize, usize), String> {
+    let parts = text.split_once('/').and_then(|(part, parts)| Some((part.parse().ok()?, parts.parse().ok()?)));
+    parts.filter(|(part, parts)| (1..=*parts).contains(part)).ok_or_else(|| "say I/N with I from 1 to N, as in 2/3".to_owned())
+}
+
+pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
+    if !args.merge.is_empty() {
+        let (plan, folder, results) = merge(&args.merge, &args.out)?;
+        let page = folder.draw(&plan, &results)?;
+        return conclude(&plan, results.len(), &page, args.quiet);
+    }
+    let data = if args.data.is_empty() { vec![Data { path: None, sequence: None }] } else { args.data.clone() };
+    let labels: Vec<String> = data.iter().map(Data::label).collect();
+    if let Some(twice) = labels.iter().enumerate().find_map(|(at, label)| labels[..at].contains(label).then_some(label)) {
+        bail!("two data sets are called {twice}. Sweep them into two folders");
+    }
+    let plan = Plan::new(&Wanted {
+        data: data.iter().map(|one| Ok((one.clone(), reference(one)?))).collect::<anyhow::Result<_>>()?,
+        kinds: args.sweeps.clone(),
+        weights: args.weights.clone(),
+        rates: args.rates.clone(),
+        scales: args.scales.clone(),
+        depths: args.depths.clone(),
+        lag_and_delay: [args.prune_lag, args.evaluation_delay],
+        common: args.common(),
+    });
+    let folder = SweepFolder::open(&args.out, &plan)?;
+    let (part, parts) = args.shard.unwrap_or((1, 1));
+    let share = plan.share(part, parts);
+    for (at, key) in share.iter().enumerate() {
+        if folder.result(key).is_file() {
+            continue;
+        }
+        let (Some(arguments), Some(one)) = (plan.runs.get(*key), data_of(&plan, key, &labels).and_then(|at| data.get(at))) else {
+            continue;
+        };
+        if !args.quiet {
+            eprintln!("run {} of {}: {} {}", at + 1, share.len(), one.label(), arguments.join(" "));
+        }
+        let result = make(args, one, arguments, &folder.workshop(key)).with_context(|| format!("run {key} ended"))?;
+        result.write(&folder.result(key))?;
+        // The page grows with every run: an interrupted sweep has one, too.
+        folder.draw(&plan, &folder.results(&plan)?)?;
+    }
+    let results = folder.results(&plan)?;
+    let page = folder.draw(&plan, &results)?;
+    conclude(&plan, results.len(), &page, args.quiet)
+}
+
+impl SweepArgs {
+    /// Arguments of every run.
+    fn common(&self) -> Vec<String> {
+        let mut common = vec!["--profile".to_owned(), self.profile.clone()];
+        if let Some(frames) = self.frames {
+            common.extend(["--frames".to_owned(), frames.to_string()]);
+        }
+        common.extend(self.set.iter().flat_map(|set| ["--set".to_owned(), set.clone()]));
+        common
+    }
+}
+
+/// What the map of a data set can be held against.
+fn reference(data: &Data) -> anyhow::Result<Option<&'static str>> {
+    let Some(path) = &data.path else { return Ok(Some("exact")) };
+    let dataset = dataset::open(path, None, data.sequence.as_deref(), Images::Auto)?;
+    Ok((0..dataset.len()).any(|index| dataset.has_lidar(index)).then_some("lidar"))
+}
+
+/// Which data set a run is of.
+fn data_of(plan: &Plan, key: &str, labels: &[String]) -> Option<usize> {
+    let point = plan.points.iter().find(|point| point.run == key)?;
+    labels.iter().position(|label| *label == point.data)
+}
+
+/// Makes one run. Nothing of it stays but what is returned.
+fn make(args: &SweepArgs, data: &Data, arguments: &[String], workshop: &Path) -> anyhow::Result<RunResult> {
+    let mut line = vec!["dynvox".to_owned(), "--quiet".to_owned()];
+    line.extend(data.path.iter().map(|path| path.display().to_string()));
+    line.extend(data.sequence.iter().flat_map(|sequence| ["--sequence".to_owned(), sequence.clone()]));
+    line.extend(args.threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]));
+    line.extend_from_slice(arguments);
+    let record = run::record(&RunArgs::of(&line)?, workshop)?;
+    Ok(RunResult::of(arguments, &record)?)
+}
+
+fn conclude(plan: &Plan, made: usize, page: &Path, quiet: bool) -> anyhow::Result<()> {
+    if !quiet {
+        println!("{made} of {} runs made", plan.runs.len());
+        println!("{}", page.display());
+    }
+    Ok(())
+}

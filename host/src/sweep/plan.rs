@@ -1,0 +1,234 @@
+//! Which runs a sweep is made of. Points of different sweeps that mean the same run share it.
+
+use dynvox_core::digest::Digest;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// What is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Voxels seen at most so often are pruned.
+    PruneWeight,
+    /// Every k-th frame is fused.
+    FrameRate,
+    /// The images' size.
+    Scale,
+    /// Where depth comes from.
+    Depth,
+    /// Whether what moves is kept apart.
+    Dynamic,
+    /// The three methods of Table I: depth tracker, stereo egomotion, stereo egomotion and objects.
+    Methods,
+}
+
+impl Kind {
+    /// Name on the command line, and of its table.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PruneWeight => "prune-weight",
+            Self::FrameRate => "frame-rate",
+            Self::Scale => "scale",
+            Self::Depth => "depth",
+            Self::Dynamic => "dynamic",
+            Self::Methods => "methods",
+        }
+    }
+}
+
+/// One data set: `street`, `PATH` or `PATH:SEQUENCE`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Data {
+    /// Where it is; the synthetic street where absent.
+    pub path: Option<PathBuf>,
+    /// Sequence within it.
+    pub sequence: Option<String>,
+}
+
+impl FromStr for Data {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.is_empty() {
+            return Err("give street, PATH or PATH:SEQUENCE".to_owned());
+        }
+        if text == "street" {
+            return Ok(Self { path: None, sequence: None });
+        }
+        // A drive letter is no path with a sequence.
+        let split = text.rsplit_once(':').filter(|(path, name)| path.len() > 1 && !name.is_empty() && !name.contains(['/', '\\']));
+        Ok(match split {
+            Some((path, sequence)) => Self { path: Some(path.into()), sequence: Some(sequence.to_owned()) },
+            None => Self { path: Some(text.into()), sequence: None },
+        })
+    }
+}
+
+impl Data {
+    /// A short name, the same on every machine.
+    pub fn label(&self) -> String {
+        let name = |path: &Path| path.file_name().map_or_else(|| "data".to_owned(), |name| name.to_string_lossy().into_owned());
+        match (&self.path, &self.sequence) {
+            (None, _) => "street".to_owned(),
+            (Some(_), Some(sequence)) => sequence.clone(),
+            (Some(path), None) => name(path),
+        }
+    }
+}
+
+/// What to vary, over what.
+#[derive(Clone, Debug)]
+pub struct Wanted {
+    /// Data sets, and what each is evaluated against: `lidar`, `exact` or nothing.
+    pub data: Vec<(Data, Option<&'static str>)>,
+    /// Sweeps.
+    pub kinds: Vec<Kind>,
+    /// Prune weights.
+    pub weights: Vec<u32>,
+    /// Frames from one that is fused to the next.
+    pub rates: Vec<u32>,
+    /// Scales, percent.
+    pub scales: Vec<u32>,
+    /// Sources of depth; `exact` is for the street alone.
+    pub depths: Vec<String>,
+    /// Pruning lag and evaluation delay of the first two sweeps, frames.
+    pub lag_and_delay: [usize; 2],
+    /// Arguments of every run.
+    pub common: Vec<String>,
+}
+
+/// One point of a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// What is varied.
+    pub kind: Kind,
+    /// Name of the data set.
+    pub data: String,
+    /// The value, as it is shown.
+    pub value: String,
+    /// Key of the run.
+    pub run: String,
+}
+
+/// All points, and the runs they need: the same on every machine that makes a part of them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// In the order shown.
+    pub points: Vec<Point>,
+    /// What makes a run, by its key: its arguments without path and threads.
+    pub runs: BTreeMap<String, Vec<String>>,
+}
+
+impl Plan {
+    /// Spreads out what is wanted.
+    pub fn new(wanted: &Wanted) -> Self {
+        let mut plan = Self { points: Vec::new(), runs: BTreeMap::new() };
+        for &kind in &wanted.kinds {
+            for (data, reference) in &wanted.data {
+                for (value, more, late) in values(kind, wanted, data) {
+                    let mut arguments = wanted.common.clone();
+                    arguments.extend(more);
+                    if let Some(reference) = reference {
+                        arguments.extend(["--evaluate", reference].map(str::to_owned));
+                    }
+                    if late {
+                        let [lag, delay] = wanted.lag_and_delay;
+                        arguments.extend(["--set".to_owned(), format!("volume.prune_lag={lag}")]);
+                        arguments.extend(["--evaluation-delay".to_owned(), delay.to_string()]);
+                    }
+                    let label = data.label();
+                    let mut digest = Digest::default();
+                    arguments.iter().for_each(|argument| digest.bytes(argument.as_bytes()));
+                    let run = format!("{label}-{:016x}", digest.finish());
+                    plan.points.push(Point { kind, data: label, value, run: run.clone() });
+                    plan.runs.insert(run, arguments);
+                }
+            }
+        }
+        plan
+    }
+
+    /// Keys of the runs, in the order in which points need them, for part `part` of `parts` (from 1).
+    pub fn share(&self, part: usize, parts: usize) -> Vec<&str> {
+        let mut keys: Vec<&str> = Vec::new();
+        for point in &self.points {
+            if !keys.contains(&point.run.as_str()) {
+                keys.push(&point.run);
+            }
+        }
+        keys.into_iter().skip(part - 1).step_by(parts).collect()
+    }
+
+    /// The points of one sweep on one data set.
+    pub fn of<'p>(&'p self, kind: Kind, data: &'p str) -> impl Iterator<Item = &'p Point> {
+        self.points.iter().filter(move |point| point.kind == kind && point.data == data)
+    }
+
+    /// Sweeps there are.
+    pub fn kinds(&self) -> Vec<Kind> {
+        let mut kinds: Vec<Kind> = self.points.iter().map(|point| point.kind).collect();
+        kinds.dedup();
+        kinds
+    }
+
+    /// Data sets of a sweep.
+    pub fn data(&self, kind: Kind) -> Vec<&str> {
+        let mut names: Vec<&str> = self.points.iter().filter(|point| point.kind == kind).map(|point| point.data.as_str()).collect();
+        names.dedup();
+        names
+    }
+}
+
+/// Values of one sweep on one data set: as shown, as arguments, and whether the map is looked at late.
+fn values(kind: Kind, wanted: &Wanted, data: &Data) -> Vec<(String, Vec<String>, bool)> {
+    let one = |value: &dyn std::fmt::Display, arguments: &[&str], late: bool| {
+        (value.to_string(), arguments.iter().map(|argument| (*argument).to_owned()).collect::<Vec<_>>(), late)
+    };
+    // The defaults are left unsaid, so that sweeps share the runs they have in common.
+    match kind {
+        Kind::PruneWeight => wanted
+            .weights
+            .iter()
+            .map(|weight| match weight {
+                1 => one(weight, &[], true),
+                _ => one(weight, &["--set", &format!("volume.prune_weight={weight}")], true),
+            })
+            .collect(),
+        Kind::FrameRate => wanted
+            .rates
+            .iter()
+            .map(|rate| match rate {
+                1 => one(rate, &[], true),
+                _ => one(rate, &["--fuse-every", &rate.to_string()], true),
+            })
+            .collect(),
+        Kind::Scale => wanted
+            .scales
+            .iter()
+            .map(|percent| match percent {
+                100 => one(percent, &[], false),
+                _ => one(percent, &["--scale", &(f64::from(*percent) / 100.0).to_string()], false),
+            })
+            .collect(),
+        Kind::Depth => {
+            let fits = |source: &&String| source.as_str() != "exact" || data.path.is_none();
+            wanted
+                .depths
+                .iter()
+                .filter(fits)
+                .map(|source| match source.as_str() {
+                    "elas" => one(source, &[], false),
+                    _ => one(source, &["--depth", source], false),
+                })
+                .collect()
+        }
+        Kind::Dynamic => vec![one(&"off", &["--dynamic", "off"], false), one(&"on", &[], false)],
+        Kind::Methods => vec![
+            one(&"depth tracker (ICP)", &["--dynamic", "off", "--egomotion", "icp"], false),
+            one(&"stereo egomotion", &["--dynamic", "off"], false),
+            one(&"stereo egomotion, objects apart", &[], false),
+        ],
+    }
+}

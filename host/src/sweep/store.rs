@@ -1,0 +1,121 @@
+//! A sweep's folder: the plan, a file for each finished run, tables and page drawn of what is there.
+
+use super::{Plan, RunResult, SweepError, page, result::write_whole, table};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Results by key.
+pub type Results = BTreeMap<String, RunResult>;
+
+/// The folder.
+#[derive(Debug)]
+pub struct SweepFolder {
+    root: PathBuf,
+}
+
+impl SweepFolder {
+    /// Opens a folder for a plan, or makes it.
+    ///
+    /// # Errors
+    /// It belongs to another plan, or the disk refuses.
+    pub fn open(root: &Path, plan: &Plan) -> Result<Self, SweepError> {
+        let folder = Self { root: root.to_path_buf() };
+        let runs = folder.root.join("runs");
+        std::fs::create_dir_all(&runs).map_err(|source| SweepError::Write { path: runs, source })?;
+        let path = folder.root.join("plan.json");
+        if path.is_file() {
+            if folder.plan()? != *plan {
+                return Err(SweepError::Other { path });
+            }
+        } else {
+            let text =
+                serde_json::to_vec_pretty(plan).map_err(|error| SweepError::Foreign { path: path.clone(), reason: error.to_string() })?;
+            write_whole(&path, &text)?;
+        }
+        Ok(folder)
+    }
+
+    /// The plan in the folder.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn plan(&self) -> Result<Plan, SweepError> {
+        let path = self.root.join("plan.json");
+        let text = std::fs::read_to_string(&path).map_err(|source| SweepError::Read { path: path.clone(), source })?;
+        serde_json::from_str(&text).map_err(|error| SweepError::Foreign { path, reason: error.to_string() })
+    }
+
+    /// Where the result of a run is or will be.
+    pub fn result(&self, key: &str) -> PathBuf {
+        self.root.join("runs").join(format!("{key}.json"))
+    }
+
+    /// A place for a run under way.
+    pub fn workshop(&self, key: &str) -> PathBuf {
+        self.root.join("runs").join(key)
+    }
+
+    /// All results there are.
+    ///
+    /// # Errors
+    /// A result cannot be read, or was made by other arguments.
+    pub fn results(&self, plan: &Plan) -> Result<Results, SweepError> {
+        let mut results = Results::new();
+        for (key, arguments) in &plan.runs {
+            let path = self.result(key);
+            if let Some(result) = RunResult::read(&path)? {
+                if result.arguments != *arguments {
+                    return Err(SweepError::Foreign { path, reason: "it was made by other arguments".to_owned() });
+                }
+                results.insert(key.clone(), result);
+            }
+        }
+        Ok(results)
+    }
+
+    /// Writes a table for each sweep, and the page.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    pub fn draw(&self, plan: &Plan, results: &Results) -> Result<PathBuf, SweepError> {
+        for kind in plan.kinds() {
+            write_whole(&self.root.join(format!("{}.csv", kind.name())), table::csv(plan, kind, results).as_bytes())?;
+        }
+        let page = self.root.join("report.html");
+        write_whole(&page, page::html(plan, results).as_bytes())?;
+        Ok(page)
+    }
+}
+
+/// Puts the parts made on several machines together in `target`.
+///
+/// # Errors
+/// The parts belong to different plans, or have different results of one run.
+pub fn merge(parts: &[PathBuf], target: &Path) -> Result<(Plan, SweepFolder, Results), SweepError> {
+    let mut merged: Option<(Plan, Results)> = None;
+    for root in parts {
+        let part = SweepFolder { root: root.clone() };
+        let plan = part.plan()?;
+        let results = part.results(&plan)?;
+        let Some((first, all)) = &mut merged else {
+            merged = Some((plan, results));
+            continue;
+        };
+        if *first != plan {
+            return Err(SweepError::Other { path: root.join("plan.json") });
+        }
+        for (run, result) in results {
+            let digest = |result: &RunResult| result.summary["digest"].as_str().unwrap_or_default().to_owned();
+            if let Some(known) = all.get(&run).filter(|known| digest(known) != digest(&result)) {
+                return Err(SweepError::Differs { path: root.clone(), run, ours: digest(known), theirs: digest(&result) });
+            }
+            all.insert(run, result);
+        }
+    }
+    let (plan, results) = merged.unwrap_or_else(|| (Plan { points: Vec::new(), runs: BTreeMap::new() }, Results::new()));
+    let folder = SweepFolder::open(target, &plan)?;
+    for (key, result) in &results {
+        result.write(&folder.result(key))?;
+    }
+    Ok((plan, folder, results))
+}

@@ -1,0 +1,152 @@
+use super::draw::{Boxes, Curve, drawing, five};
+use super::*;
+use serde_json::json;
+use std::collections::BTreeSet;
+use tempfile::TempDir;
+
+fn wanted(kinds: &[Kind]) -> Wanted {
+    let street: Data = "street".parse().unwrap();
+    let drive: Data = "some/where:06".parse().unwrap();
+    Wanted {
+        data: vec![(street, Some("exact")), (drive, Some("lidar"))],
+        kinds: kinds.to_vec(),
+        weights: vec![0, 1, 2],
+        rates: vec![1, 4],
+        scales: vec![100, 50],
+        depths: vec!["elas".to_owned(), "exact".to_owned()],
+        lag_and_delay: [20, 40],
+        common: vec!["--profile".to_owned(), "small".to_owned()],
+    }
+}
+
+const ALL: [Kind; 6] = [Kind::PruneWeight, Kind::FrameRate, Kind::Scale, Kind::Depth, Kind::Dynamic, Kind::Methods];
+
+fn result(arguments: &[String], digest: &str, accuracy: f64) -> RunResult {
+    let share = json!({"accuracy": accuracy, "completeness": 0.9, "f1": 0.85});
+    RunResult {
+        arguments: arguments.to_vec(),
+        summary: json!({
+            "digest": digest, "frames": 3, "map": {"bytes": 1000, "blocks": 3},
+            "lidar": {"source": "exact", "frames": 2, "delay_frames": 0, "static": {"input": share, "fused": share}},
+            "egomotion": {"status": "tracking failure", "tracking_failures": 2, "ate_m": 0.5},
+        }),
+        samples: [accuracy - 0.01, accuracy, accuracy + 0.01]
+            .map(|accuracy| FrameSample { frame: 1, accuracy: [Some(accuracy); 2], completeness: [Some(0.9), None] })
+            .to_vec(),
+        blocks: vec![10, 20, 30],
+    }
+}
+
+fn results(plan: &Plan) -> Results {
+    plan.runs.iter().map(|(key, arguments)| (key.clone(), result(arguments, key, 0.92))).collect()
+}
+
+#[test]
+fn data_is_the_street_a_path_or_a_path_and_a_sequence() {
+    let data = |text: &str| text.parse::<Data>().unwrap();
+    assert_eq!(data("street").label(), "street");
+    assert_eq!(data("a/kitti:06"), Data { path: Some("a/kitti".into()), sequence: Some("06".to_owned()) });
+    assert_eq!((data("a/kitti:06").label(), data("a/rig").label()), ("06".to_owned(), "rig".to_owned()));
+    assert_eq!(data(r"C:\rig").sequence, None);
+    assert!("".parse::<Data>().is_err());
+}
+
+#[test]
+fn points_that_mean_the_same_run_share_it() {
+    let plan = Plan::new(&wanted(&ALL));
+    let run = |kind: Kind, value: &str| plan.of(kind, "street").find(|point| point.value == value).map(|point| point.run.clone());
+    assert_eq!(run(Kind::PruneWeight, "1"), run(Kind::FrameRate, "1"), "both are the default, looked at late");
+    assert_eq!(run(Kind::Scale, "100"), run(Kind::Dynamic, "on"));
+    assert_eq!(run(Kind::Depth, "elas"), run(Kind::Methods, "stereo egomotion, objects apart"));
+    assert_ne!(run(Kind::FrameRate, "1"), run(Kind::Scale, "100"), "the one is looked at late");
+    assert!(run(Kind::Depth, "exact").is_some() && plan.of(Kind::Depth, "06").count() == 1, "only the street has exact depth");
+    // By hand: 3 weights and 1 rate late; default, 50 %, off, tracker; on the street exact depth as well.
+    assert_eq!(plan.runs.len(), 2 * 8 + 1);
+    let paths = plan.runs.values().flatten().any(|argument| argument.contains("where"));
+    assert!(!paths, "a plan is the same wherever the data lie");
+}
+
+#[test]
+fn parts_have_every_run_once() {
+    let plan = Plan::new(&wanted(&ALL));
+    for parts in [1, 2, 3, 50] {
+        let shares: Vec<&str> = (1..=parts).flat_map(|part| plan.share(part, parts)).collect();
+        let distinct: BTreeSet<&str> = shares.iter().copied().collect();
+        assert_eq!((shares.len(), distinct.len()), (plan.runs.len(), plan.runs.len()));
+    }
+}
+
+#[test]
+fn a_folder_keeps_to_its_plan_and_to_its_results_arguments() {
+    let root = TempDir::new().unwrap();
+    let plan = Plan::new(&wanted(&[Kind::Scale]));
+    let folder = SweepFolder::open(root.path(), &plan).unwrap();
+    let (key, arguments) = plan.runs.iter().next().unwrap();
+    let made = result(arguments, "aa", 0.9);
+    made.write(&folder.result(key)).unwrap();
+    let again = SweepFolder::open(root.path(), &plan).unwrap();
+    assert_eq!(again.results(&plan).unwrap(), Results::from([(key.clone(), made.clone())]));
+    let other = SweepFolder::open(root.path(), &Plan::new(&wanted(&[Kind::Dynamic])));
+    assert!(other.unwrap_err().to_string().contains("belongs to a sweep of other runs"));
+    result(&["--frames".to_owned()], "aa", 0.9).write(&folder.result(key)).unwrap();
+    assert!(again.results(&plan).unwrap_err().to_string().contains("made by other arguments"));
+    std::fs::write(folder.result(key), "{\"arg").unwrap();
+    assert!(again.results(&plan).unwrap_err().to_string().contains("is no file of a sweep"));
+}
+
+#[test]
+fn parts_are_put_together_unless_they_disagree() {
+    let [a, b, c] = [(); 3].map(|()| TempDir::new().unwrap());
+    let plan = Plan::new(&wanted(&[Kind::Scale]));
+    let all = results(&plan);
+    for (part, root) in [&a, &b].into_iter().enumerate() {
+        let folder = SweepFolder::open(root.path(), &plan).unwrap();
+        plan.share(part + 1, 2).iter().for_each(|key| all[*key].write(&folder.result(key)).unwrap());
+    }
+    let parts = [a.path().to_path_buf(), b.path().to_path_buf()];
+    let (merged, folder, found) = merge(&parts, c.path()).unwrap();
+    assert_eq!((&merged, &found), (&plan, &all));
+    folder.draw(&merged, &found).unwrap();
+    assert!(c.path().join("report.html").is_file() && c.path().join("scale.csv").is_file());
+    let (key, arguments) = plan.runs.iter().next().unwrap();
+    for (root, digest) in [(&a, "one"), (&b, "two")] {
+        result(arguments, digest, 0.9).write(&SweepFolder::open(root.path(), &plan).unwrap().result(key)).unwrap();
+    }
+    let message = merge(&parts, c.path()).unwrap_err().to_string();
+    assert!(message.contains("one against two") && message.contains(key.as_str()), "{message}");
+}
+
+#[test]
+fn tables_and_page_have_every_point_made_or_not() {
+    let plan = Plan::new(&wanted(&ALL));
+    let mut found = results(&plan);
+    let missing = found.pop_first().unwrap().0;
+    for kind in ALL {
+        let csv = table::csv(&plan, kind, &found);
+        let widths: BTreeSet<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+        assert_eq!((csv.lines().count(), widths.len()), (1 + plan.points.iter().filter(|point| point.kind == kind).count(), 1), "{csv}");
+    }
+    let page = page::html(&plan, &found);
+    assert_eq!(page.matches("not run yet").count(), plan.points.iter().filter(|point| point.run == missing).count());
+    assert!(page.contains("<b>tracking failure</b> in 2 of 3 frames") && page.contains("0.920"));
+    // The original's numbers stand beside ours.
+    for theirs in ["0.961", "0.9238", "0.878 / 0.923 / 0.955", "(original)"] {
+        assert!(page.contains(theirs), "{theirs}");
+    }
+    assert!(!page.contains("http") && !page.contains("<script") && !page.contains("NaN"));
+}
+
+#[test]
+fn boxes_are_quartiles_and_whiskers_end_at_samples() {
+    // By hand: nine samples and one far off.
+    let samples = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 100.0];
+    assert_eq!(five(&samples), Some([1.0, 3.0, 5.0, 7.0, 8.0]));
+    assert_eq!(five(&[2.0, 1.0]), Some([1.0, 1.25, 1.5, 1.75, 2.0]));
+    assert_eq!((five(&[0.5]), five(&[])), (Some([0.5; 5]), None));
+    let labels = ["a".to_owned(), "b".to_owned()];
+    let one = drawing("t", &labels, &[Boxes { name: "n", colour: "red", boxes: vec![None, Some([1.0; 5])] }], &[]);
+    assert!(one.matches("<rect").count() == 1 && !one.contains("NaN"));
+    let gap = Curve { name: "n", colour: "red", theirs: true, numbers: vec![None, Some(0.5)] };
+    assert!(drawing("t", &labels, &[], &[gap]).contains("stroke-dasharray"));
+    assert!(drawing("t", &labels, &[], &[]).is_empty());
+}

@@ -1,0 +1,96 @@
+//! A sweep as a user meets it: interrupted, taken up again, made in parts.
+#![allow(missing_docs)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+fn dynvox(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(folder).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Names in the folder, hidden ones included.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_killed_sweep_goes_on_where_it_stopped_and_parts_make_the_same_whole() {
+    let root = TempDir::new().unwrap();
+    let sweep = [
+        "sweep",
+        "street",
+        "--sweeps",
+        "prune-weight,scale,methods",
+        "--weights",
+        "0,1",
+        "--scales",
+        "100,50",
+        "--prune-lag",
+        "2",
+        "--evaluation-delay",
+        "3",
+        "--profile",
+        "small",
+        "--frames",
+        "6",
+        "--set",
+        "street.width=320",
+        "--set",
+        "street.height=96",
+        "--set",
+        "street.frames=6",
+        "--quiet",
+        "--out",
+    ];
+    let results = |out: &str| {
+        let list = fs::read_dir(root.path().join(out).join("runs")).into_iter().flatten().flatten();
+        let mut paths: Vec<_> =
+            list.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|ending| ending == "json")).collect();
+        paths.sort();
+        paths
+    };
+    let mut child = Command::new(env!("CARGO_BIN_EXE_dynvox")).args(sweep).arg("cut").current_dir(root.path()).spawn().unwrap();
+    while results("cut").len() < 2 && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let before = results("cut");
+    assert!((2..6).contains(&before.len()), "killed in the middle: {before:?}");
+    let made = |path: &std::path::PathBuf| (fs::read(path).unwrap(), fs::metadata(path).unwrap().modified().unwrap());
+    let kept: Vec<_> = before.iter().map(made).collect();
+    let on = dynvox(root.path(), &[&sweep[..], &["cut"]].concat());
+    assert!(on.status.success(), "{}", said(&on));
+    assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "what was made is not made again");
+    assert_eq!(results("cut").len(), 6, "two late, two scales, tracker and no objects");
+    assert_eq!(names(&root.path().join("cut")), ["methods.csv", "plan.json", "prune-weight.csv", "report.html", "runs", "scale.csv"]);
+    assert!(names(&root.path().join("cut/runs")).iter().all(|name| name.ends_with(".json")), "nothing of a run stays but its result");
+    for part in ["1/2", "2/2"] {
+        let run = dynvox(root.path(), &[&sweep[..], &[&part[..1], "--shard", part]].concat());
+        assert!(run.status.success() && results(&part[..1]).len() == 3, "{}", said(&run));
+    }
+    let merged = dynvox(root.path(), &["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
+    assert!(merged.status.success(), "{}", said(&merged));
+    for table in ["prune-weight.csv", "scale.csv", "methods.csv"] {
+        let [whole, cut] = ["whole", "cut"].map(|out| fs::read_to_string(root.path().join(out).join(table)).unwrap());
+        assert_eq!(whole, cut, "{table}");
+        assert!(
+            whole
+                .lines()
+                .skip(1)
+                .all(|line| line.split(',').nth(9).is_some_and(|accuracy| accuracy.parse::<f64>().is_ok() || line.contains("ICP"))),
+            "{whole}"
+        );
+    }
+    let other = dynvox(root.path(), &[&sweep[..], &["cut", "--set", "volume.far_m=10"]].concat());
+    assert!(!other.status.success() && said(&other).contains("belongs to a sweep of other runs"), "{}", said(&other));
+}
