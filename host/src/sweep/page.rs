@@ -8,15 +8,14 @@ use super::{
 use crate::export::report::{STYLE, chart::COLOURS, escaped};
 use std::fmt::Write;
 
-const MIB: f64 = 1_048_576.0;
-
 /// Draws the page.
 pub fn html(plan: &Plan, results: &Results) -> String {
     let done = plan.runs.keys().filter(|key| results.contains_key(*key)).count();
     let mut html = format!(
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\"><title>dynvox: sweeps</title>\
          <style>{STYLE}</style></head><body><main><h1>Sweeps</h1><p class=\"soft\">{done} of {} runs made. dynvox {}. Boxes: quartiles and median over \
-         evaluated frames, whiskers to the last frame within 1.5 box heights. Broken lines: the original's published numbers, on other data; shapes can be \
+         evaluated frames, whiskers to the last frame within 1.5 box heights. Accuracy is judged on the points that input and map both show: a map that \
+         was lost shows few. Broken lines: the original's published numbers, on other data; shapes can be \
          compared, values cannot.</p>",
         plan.runs.len(),
         env!("CARGO_PKG_VERSION")
@@ -25,7 +24,7 @@ pub fn html(plan: &Plan, results: &Results) -> String {
         let _ = write!(html, "<section><h2>{}</h2>", title(kind));
         for data in plan.data(kind) {
             let rows: Vec<(&Point, Option<&RunResult>)> = plan.of(kind, data).map(|point| (point, results.get(&point.run))).collect();
-            let _ = write!(html, "<h3>{} <span class=\"soft small\">{}</span></h3>", escaped(data), about(&rows));
+            let _ = write!(html, "<h3 style=\"margin-top:16px\">{} <span class=\"soft small\">{}</span></h3>", escaped(data), about(&rows));
             let figures = match kind {
                 Kind::PruneWeight => prune(&rows),
                 Kind::FrameRate => rate(&rows),
@@ -123,10 +122,10 @@ fn prune(rows: &Rows<'_>) -> String {
         ],
     );
     let relative = |table: [f64; 7]| at(table.map(|gib| gib / table[0]));
-    let whole = rows.iter().find(|(point, _)| point.value == "0").and_then(|(_, result)| result.as_ref()?.map_bytes());
-    let memory: Vec<Option<f64>> = rows.iter().map(|(_, result)| Some(result.as_ref()?.map_bytes()? / whole?)).collect();
+    let whole = rows.iter().find(|(point, _)| point.value == "0").and_then(|(_, result)| result.as_ref()?.blocks_in_the_end());
+    let memory: Vec<Option<f64>> = rows.iter().map(|(_, result)| Some(result.as_ref()?.blocks_in_the_end()? / whole?)).collect();
     let memory = drawing(
-        "memory in the end, as a share of weight 0",
+        "blocks in the end, as a share of weight 0",
         &labels,
         &[],
         &[
@@ -216,8 +215,8 @@ fn depth(rows: &Rows<'_>) -> String {
 /// Every value with what was measured.
 fn table(kind: Kind, rows: &Rows<'_>) -> String {
     let mut html = format!(
-        "<div class=\"scroll\"><table><tr><th>{}<th class=n>input accuracy<th class=n>input compl.<th class=n>map accuracy<th class=n>map compl.<th class=n>map F1\
-         <th class=n>cars: input<th class=n>cars: map<th class=n>memory, MiB<th class=n>triangles where cars drove<th class=n>ATE, m<th>tracking</tr>",
+        "<div class=\"scroll\"><table><tr><th>{}<th>tracking<th class=n>input accuracy<th class=n>input compl.<th class=n>map accuracy<th class=n>map compl.<th class=n>map F1\
+         <th class=n>cars: input<th class=n>cars: map<th class=n>blocks<th class=n>trail triangles<th class=n>ATE, m</tr>",
         kind.name()
     );
     for (point, result) in rows {
@@ -225,9 +224,9 @@ fn table(kind: Kind, rows: &Rows<'_>) -> String {
             let share = result.as_ref().and_then(|result| result.share(layer, source, name));
             share.map_or_else(|| "–".to_owned(), |share| format!("{share:.3}"))
         };
-        let number = |group: &str, name: &str, digits: usize, unit: f64| {
+        let number = |group: &str, name: &str, digits: usize| {
             let number = result.as_ref().and_then(|result| result.summary[group][name].as_f64());
-            number.map_or_else(|| "–".to_owned(), |number| format!("{:.digits$}", number / unit))
+            number.map_or_else(|| "–".to_owned(), |number| format!("{number:.digits$}"))
         };
         let tracking = match result {
             None => "not run yet".to_owned(),
@@ -238,7 +237,7 @@ fn table(kind: Kind, rows: &Rows<'_>) -> String {
         };
         let _ = write!(
             html,
-            "<tr><td>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td>{tracking}</tr>",
+            "<tr><td>{}<td>{tracking}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}</tr>",
             escaped(&point.value),
             share("static", "input", "accuracy"),
             share("static", "input", "completeness"),
@@ -247,9 +246,9 @@ fn table(kind: Kind, rows: &Rows<'_>) -> String {
             share("static", "fused", "f1"),
             share("dynamic", "input", "accuracy"),
             share("dynamic", "fused", "accuracy"),
-            number("map", "bytes", 0, MIB),
-            number("map", "swept_triangles", 0, 1.0),
-            number("egomotion", "ate_m", 3, 1.0)
+            number("map", "blocks", 0),
+            number("map", "swept_triangles", 0),
+            number("egomotion", "ate_m", 3)
         );
     }
     html + "</table></div>"
@@ -260,7 +259,7 @@ fn originals(kind: Kind) -> String {
     let mut html = String::new();
     match kind {
         Kind::Methods => {
-            html += "<h3>The original <span class=\"soft small\">Table I: tracking sequence 09</span></h3><div class=\"scroll\"><table><tr><th>method\
+            html += "<h3 style=\"margin-top:16px\">The original <span class=\"soft small\">Table I: tracking sequence 09</span></h3><div class=\"scroll\"><table><tr><th>method\
                      <th class=n>ELAS accuracy<th class=n>ELAS compl.<th class=n>DispNet accuracy<th class=n>DispNet compl.</tr>";
             for (method, shares) in theirs::METHODS {
                 let cells = shares.map_or_else(
@@ -271,14 +270,14 @@ fn originals(kind: Kind) -> String {
             }
         }
         Kind::Dynamic => {
-            html += "<h3>The original <span class=\"soft small\">static accuracy on the tracking sequences, ELAS</span></h3><div class=\"scroll\"><table>\
+            html += "<h3 style=\"margin-top:16px\">The original <span class=\"soft small\">static accuracy on the tracking sequences, ELAS</span></h3><div class=\"scroll\"><table>\
                      <tr><th>sequence<th class=n>input<th class=n>off<th class=n>on</tr>";
             for (sequence, [input, off, on]) in theirs::DYNAMIC_ELAS.iter().enumerate() {
                 let _ = write!(html, "<tr><td>{sequence:02}<td class=n>{input:.4}<td class=n>{off:.4}<td class=n>{on:.4}</tr>");
             }
         }
         Kind::Depth => {
-            html += "<h3>The original <span class=\"soft small\">odometry 00 to 10: means, and quartiles over frames of the static accuracy</span></h3>\
+            html += "<h3 style=\"margin-top:16px\">The original <span class=\"soft small\">odometry 00 to 10: means, and quartiles over frames of the static accuracy</span></h3>\
                      <div class=\"scroll\"><table><tr><th>source<th class=n>static accuracy<th class=n>static compl.<th class=n>dynamic accuracy\
                      <th class=n>dynamic compl.<th class=n>quartiles</tr>";
             for ((source, shares), (_, [low, middle, high])) in theirs::DEPTHS.iter().zip(theirs::DEPTH_QUARTILES) {

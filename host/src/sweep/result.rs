@@ -92,9 +92,9 @@ impl RunResult {
         self.summary["egomotion"]["tracking_failures"].as_u64().filter(|failures| *failures > 0)
     }
 
-    /// Bytes of the map in the end.
-    pub fn map_bytes(&self) -> Option<f64> {
-        self.summary["map"]["bytes"].as_f64()
+    /// Blocks of the map in the end.
+    pub fn blocks_in_the_end(&self) -> Option<f64> {
+        self.summary["map"]["blocks"].as_f64()
     }
 }
 
