@@ -210,6 +210,17 @@ fn inspect_tells_what_is_there_and_how_to_map_it() {
     for words in ["rig: folder", "2 stereo pairs of 160 x 64 px", "baseline 0.5000 m", "no times.txt", "tiny, small", "dynvox run rig"] {
         assert!(text.contains(words), "{words} in {text}");
     }
+    assert!(text.contains("no LiDAR scans") && text.contains("no masks"), "{text}");
+    for (path, words) in
+        [("rig/left", "is a part of the data set rig"), ("rig/left/000.png", "is a file"), ("nothing", "there is no data set at")]
+    {
+        let told = dynvox(root.path(), &["inspect", path]);
+        assert!(!told.status.success() && said(&told).contains(words), "{path}: {}", said(&told));
+    }
+    fs::create_dir_all(root.path().join("run")).unwrap();
+    fs::write(root.path().join("run/summary.json"), "{}").unwrap();
+    let told = String::from_utf8(dynvox(root.path(), &["inspect", "run"]).stdout).unwrap();
+    assert!(told.contains("the results of a run") && told.contains("dynvox evaluate trajectory run TRUTH"), "{told}");
     fs::remove_file(root.path().join("rig/calib.txt")).unwrap();
     let told = dynvox(root.path(), &["inspect", "rig"]);
     assert!(!told.status.success() && String::from_utf8_lossy(&told.stdout).contains("calib.txt is missing"));
@@ -248,6 +259,8 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
     let root = TempDir::new().unwrap();
     let small = ["--set", "street.width=320", "--set", "street.height=96"];
     assert!(dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "4"], &small[..]].concat()).status.success());
+    let told = String::from_utf8(dynvox(root.path(), &["inspect", "street"]).stdout).unwrap();
+    assert!(told.contains("LiDAR scans of 4 frames") && told.contains("dynvox run street --sequence 00 --evaluate lidar"), "{told}");
     let run = |args: &[&str]| dynvox(root.path(), &[&["run", "--profile", "small", "--json"], args].concat());
     let figures = |output: &Output| {
         assert!(output.status.success(), "{}", said(output));
@@ -433,6 +446,8 @@ fn files_are_evaluated_without_a_run() {
     assert!(regions["occ"].is_null());
     let judged = json(&["evaluate", "stereo", "set", "--disparity", "set/training/disp_noc_0", "--json"]);
     assert_eq!((&judged["regions"]["noc"]["d1_filled"], &judged["regions"]["noc"]["coverage"]), (&0.0.into(), &1.0.into()));
+    let told = String::from_utf8(dynvox(root.path(), &["inspect", "set"]).stdout).unwrap();
+    assert!(told.contains("kitti-2015, 1 pairs") && told.contains("dynvox evaluate stereo set"), "{told}");
     let refused = dynvox(root.path(), &["evaluate", "stereo", "rig"]);
     assert!(!refused.status.success() && said(&refused).contains("is no stereo benchmark"), "{}", said(&refused));
     // A run's folder against its own poses in the other format.

@@ -1,6 +1,7 @@
 //! `dynvox inspect`.
 
-use crate::dataset::{self, Dataset, Found, Kind, Masks};
+use crate::dataset::{self, Dataset, DatasetError, Found, Kind, Masks};
+use crate::evaluation::stereo::{StereoSetError, find_stereo_set};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -13,7 +14,11 @@ pub struct InspectArgs {
 }
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
-    let (kind, found) = dataset::survey(&args.path, args.dataset)?;
+    let (kind, found) = match dataset::survey(&args.path, args.dataset) {
+        // What cannot be mapped may be good for something else.
+        Err(error @ DatasetError::Layout { .. }) => return other(&args.path).unwrap_or(Err(error.into())),
+        survey => survey?,
+    };
     println!("{}: {} ({} sequence{})", args.path.display(), kind.name(), found.len(), if found.len() == 1 { "" } else { "s" });
     for one in &found {
         println!();
@@ -31,6 +36,26 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Says what a folder is that is no data set: a run's results, a stereo benchmark; `None` for neither.
+fn other(path: &Path) -> Option<anyhow::Result<()>> {
+    let shown = path.display();
+    if path.join("summary.json").is_file() {
+        println!("{shown}: the results of a run; report.html shows them in a browser");
+        println!("  hold its poses against others: dynvox evaluate trajectory {shown} TRUTH");
+        println!("  the same run again: dynvox run [PATH] --config {}", path.join("config.toml").display());
+        return Some(Ok(()));
+    }
+    match find_stereo_set(path) {
+        Ok(set) => {
+            println!("{shown}: {}, {} pairs with true disparity: single pairs, nothing to map", set.name, set.pairs.len());
+            println!("  hold the matcher against it: dynvox evaluate stereo {shown}");
+            Some(Ok(()))
+        }
+        Err(error @ StereoSetError::NoTruth { .. }) => Some(Err(error.into())),
+        Err(_) => None,
+    }
+}
+
 fn command(path: &Path, found: &Found) -> String {
     let sequence = found.sequence.as_ref().map(|sequence| format!(" --sequence {sequence}")).unwrap_or_default();
     format!("dynvox run {}{sequence}", path.display())
@@ -45,7 +70,8 @@ fn describe(dataset: &dyn Dataset, command: &str) {
         "  focal length {:.2} px, principal point ({:.2}, {:.2}) px, baseline {:.4} m",
         rig.focal_px, rig.center_u_px, rig.center_v_px, rig.baseline_m
     );
-    match dataset.frame(0) {
+    let first = dataset.frame(0);
+    match &first {
         Ok(frame) => {
             println!("  {}", if frame.colour.is_some() { "colour images: the map has colours" } else { "grey images: the map is grey" })
         }
@@ -59,14 +85,11 @@ fn describe(dataset: &dyn Dataset, command: &str) {
             "no true poses: the trajectory's errors stay unknown"
         }
     );
-    println!(
-        "  {}",
-        match dataset.masks() {
-            Masks::Folder(folder) => format!("masks in {}: what moves is kept apart", folder.display()),
-            Masks::Exact => "exact masks: what moves is kept apart".to_owned(),
-            Masks::Absent => "no masks: cars go into the static map, unless --instances names some".to_owned(),
-        }
-    );
+    if first.is_ok_and(|frame| frame.objects.is_some()) {
+        println!("  labels of what moves: motions, states and tracks are held against them");
+    }
+    println!("  {}", masks(dataset));
+    let evaluate = lidar(dataset);
     for note in dataset.notes() {
         println!("  note: {note}");
     }
@@ -78,5 +101,35 @@ fn describe(dataset: &dyn Dataset, command: &str) {
     } else {
         println!("  fits the profiles {}", profiles.join(", "));
     }
-    println!("  map it: {command}");
+    println!("  map it: {command}{}", if evaluate { " --evaluate lidar" } else { "" });
+}
+
+fn masks(dataset: &dyn Dataset) -> String {
+    match dataset.masks() {
+        Masks::Folder(folder) => {
+            let has = |index: &usize| dataset.stem(*index).is_some_and(|stem| folder.join(format!("{stem}.png")).is_file());
+            let there = (0..dataset.len()).filter(has).count();
+            match there {
+                0 => format!("{} has no mask of any frame's name: cars go into the static map", folder.display()),
+                there if there == dataset.len() => format!("masks in {}: what moves is kept apart", folder.display()),
+                there => format!("masks in {} for {there} of {} frames: in the others nothing is seen", folder.display(), dataset.len()),
+            }
+        }
+        Masks::Exact => "exact masks: what moves is kept apart".to_owned(),
+        Masks::Absent => "no masks: cars go into the static map, unless --instances names some".to_owned(),
+    }
+}
+
+/// Says whether there are scans; whether input and map can be held against them.
+fn lidar(dataset: &dyn Dataset) -> bool {
+    let scans: Vec<usize> = (0..dataset.len()).filter(|&index| dataset.has_lidar(index)).collect();
+    let Some(&first) = scans.first() else {
+        println!("  no LiDAR scans (velodyne/): accuracy and completeness stay unknown");
+        return false;
+    };
+    match dataset.lidar(first) {
+        Ok(_) => println!("  LiDAR scans of {} frames: --evaluate lidar measures accuracy and completeness", scans.len()),
+        Err(error) => println!("  LiDAR scans of {} frames, but {error}", scans.len()),
+    }
+    dataset.lidar(first).is_ok()
 }

@@ -23,6 +23,20 @@ pub enum DatasetError {
         /// Folders in it that have a known layout.
         below: Vec<PathBuf>,
     },
+    /// A file in place of a folder.
+    #[error("{path} is a file. Give the folder of the data set")]
+    File {
+        /// Path as given.
+        path: PathBuf,
+    },
+    /// A folder inside a data set.
+    #[error("{path} is a part of the data set {root}. Give {root}; `dynvox inspect {root}` says what it holds")]
+    Within {
+        /// Folder looked at.
+        path: PathBuf,
+        /// The data set around it.
+        root: PathBuf,
+    },
     /// A part of the layout is missing.
     #[error("{path} is missing. {action}")]
     Part {

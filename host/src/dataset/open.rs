@@ -6,6 +6,9 @@ use std::path::Path;
 /// Data sets named at most where a folder is none itself but holds some.
 const HINTS: usize = 8;
 
+/// How many folders up a data set is looked for around one that is none itself.
+const AROUND: usize = 3;
+
 /// The layouts that are known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
@@ -32,7 +35,14 @@ impl Kind {
         if !path.exists() {
             return Err(DatasetError::Absent { path: path.to_path_buf() });
         }
+        if path.is_file() {
+            return Err(DatasetError::File { path: path.to_path_buf() });
+        }
         Self::of(path).ok_or_else(|| {
+            let mut around = path.ancestors().skip(1).take(AROUND);
+            if let Some(root) = around.find(|folder| Self::of(folder).is_some()) {
+                return DatasetError::Within { path: path.to_path_buf(), root: root.to_path_buf() };
+            }
             let entries = path.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
             let mut below: Vec<_> = entries.filter(|folder| Self::of(folder).is_some()).take(HINTS).collect();
             below.sort();
