@@ -113,7 +113,9 @@ struct Drive<T> {
 impl<T: Table> Drive<T> {
     fn new(table: T) -> Self {
         let mut drive = Self { table, coords: vec![[0; 4]; BLOCKS], entered: 0, insertions_ns: Vec::new() };
-        (0..40 * BLOCKS / SLICE).for_each(|_| drop(drive.slice()));
+        for _ in 0..40 * BLOCKS / SLICE {
+            drive.slice();
+        }
         drive.insertions_ns.clear();
         drive
     }
