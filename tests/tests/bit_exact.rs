@@ -1,6 +1,6 @@
 //! P2: the same frames give the same digests, however the work is spread.
 
-use dynvox::fixtures::{self, FixtureError, Verdict};
+use dynvox::fixtures::{self, Blessing, FixtureError, Verdict};
 use dynvox::harness::Threads;
 use dynvox_core::{Capacity, Executor, Serial};
 use dynvox_tests::Clip;
@@ -47,4 +47,33 @@ fn the_fixtures_give_the_digests_on_file_on_one_two_and_eight_threads() {
             verify(&|| fixtures::verify(&fixture, &Threads::new(threads).expect("a pool")));
         }
     }
+}
+
+#[test]
+fn a_changed_pixel_of_a_fixture_is_named_and_a_blessing_keeps_its_reason_beside_those_before() {
+    let root = tempfile::TempDir::new().expect("a folder");
+    let copy = root.path().join("pairs");
+    let from = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/pairs-317x93"));
+    for folder in ["left", "right"] {
+        std::fs::create_dir_all(copy.join(folder)).expect("a folder");
+        for index in 0..4 {
+            let name = format!("{folder}/{index:06}.png");
+            // The third pair's left image is shown twice.
+            let source = if name == "left/000002.png" { "left/000001.png" } else { &name };
+            std::fs::copy(from.join(source), copy.join(&name)).expect("a copy");
+        }
+    }
+    for name in ["calib.txt", "fixture.toml", "digests.txt", "blessings.txt"] {
+        std::fs::copy(from.join(name), copy.join(name)).expect("a copy");
+    }
+    let difference = |path: &Path| fixtures::verify(path, &Serial).expect("a whole fixture").difference;
+    let found = difference(&copy).expect("it differs");
+    assert_eq!((found.frame, found.column.as_str()), (2, "input"));
+    assert!(matches!(fixtures::bless(&copy, " \n ", &Serial), Err(FixtureError::NoReason)));
+    assert_eq!(fixtures::bless(&copy, "The image is shown twice", &Serial).expect("a blessing"), Blessing::Written);
+    assert_eq!(difference(&copy), None);
+    assert_eq!(fixtures::bless(&copy, "Again", &Serial).expect("a blessing"), Blessing::Unchanged);
+    let log = std::fs::read_to_string(copy.join("blessings.txt")).expect("a log");
+    let reasons: Vec<&str> = log.lines().filter_map(|line| Some(line.split_once(' ')?.1)).collect();
+    assert_eq!(reasons, ["The first digests", "The image is shown twice"]);
 }
