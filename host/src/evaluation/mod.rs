@@ -4,5 +4,6 @@ pub mod exact;
 pub mod lidar;
 pub mod objects;
 pub mod stereo;
+pub mod surfaces;
 pub mod swept;
 pub mod trajectory;

@@ -4,7 +4,8 @@ use super::state_name;
 use crate::evaluation::exact::ExactFigures;
 use crate::evaluation::lidar::LidarFigures;
 use crate::evaluation::objects::{ObjectFigures, TrackErrors};
-use crate::harness::{RunRecord, TrackRecord};
+use crate::evaluation::surfaces::SurfaceFigures;
+use crate::harness::{KeptObject, RunRecord, TrackRecord};
 use dynvox_core::Report;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -94,10 +95,13 @@ struct ObjectSummary {
     me_r_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     truth: Option<TrackErrors>,
+    /// The mesh of the track's object fused most often, against the true surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface: Option<SurfaceFigures>,
 }
 
 impl ObjectSummary {
-    fn of(track: &TrackRecord) -> Self {
+    fn of(track: &TrackRecord, kept: &[KeptObject]) -> Self {
         let errors = track.errors.as_ref();
         Self {
             id: track.id,
@@ -112,6 +116,11 @@ impl ObjectSummary {
             me_t_m: errors.and_then(|errors| errors.me_t_m),
             me_r_deg: errors.and_then(|errors| errors.me_r_deg),
             truth: errors.cloned(),
+            surface: kept
+                .iter()
+                .filter(|object| object.id == track.id)
+                .max_by_key(|object| object.frames)
+                .and_then(|object| object.surface),
         }
     }
 }
@@ -200,7 +209,7 @@ impl Summary {
             },
             exact: run.exact.map(|still| ExactSummary { still }),
             lidar: run.lidar.as_ref().and_then(|lidar| lidar.figures.clone()),
-            objects: run.objects.tracks.iter().map(ObjectSummary::of).collect(),
+            objects: run.objects.tracks.iter().map(|track| ObjectSummary::of(track, &run.objects.kept)).collect(),
             objects_truth: run.objects.figures.clone(),
             map: MapSummary {
                 blocks: run.blocks,

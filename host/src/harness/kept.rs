@@ -1,5 +1,6 @@
 //! Objects that leave the mapper: their meshes and where they were, written as they go.
 
+use crate::evaluation::surfaces::{SeenSide, SurfaceFigures};
 use crate::export::{FolderError, PlyWriter, portrait, write_numbered};
 use dynvox_core::geometry::Transform;
 use dynvox_core::instances::{Class, ObjectSink, RetiredObject, State};
@@ -29,6 +30,8 @@ pub struct KeptObject {
     pub blocks: usize,
     /// Triangles of its mesh.
     pub triangles: u64,
+    /// Its mesh against the true surface, where that is known.
+    pub surface: Option<SurfaceFigures>,
     /// Its mesh from three sides, as a PNG file; empty where there are enough others.
     pub portrait_png: Vec<u8>,
 }
@@ -39,6 +42,8 @@ pub struct Kept {
     mesh: MeshConfig,
     /// Where each object that is still in the mapper was when it was fused: by track and chain.
     paths: BTreeMap<(u32, u32), Vec<(usize, Transform)>>,
+    /// What was really there of each, where that is known.
+    sides: BTreeMap<(u32, u32), SeenSide>,
     kept: Vec<KeptObject>,
     failed: Option<FolderError>,
 }
@@ -55,12 +60,24 @@ impl ObjectSink for Kept {
 impl Kept {
     /// A sink that writes into `folder`, which is made with the first object.
     pub(super) fn new(folder: PathBuf, mesh: MeshConfig) -> Self {
-        Self { folder, mesh, paths: BTreeMap::new(), kept: Vec::new(), failed: None }
+        Self {
+            folder,
+            mesh,
+            paths: BTreeMap::new(),
+            sides: BTreeMap::new(),
+            kept: Vec::new(),
+            failed: None,
+        }
     }
 
     /// Notes where an object is in a frame.
     pub(super) fn follow(&mut self, frame: usize, id: u32, chain: u32, t_world_object: Transform) {
         self.paths.entry((id, chain)).or_default().push((frame, t_world_object));
+    }
+
+    /// What was really there of an object.
+    pub(super) fn side(&mut self, id: u32, chain: u32) -> &mut SeenSide {
+        self.sides.entry((id, chain)).or_default()
     }
 
     /// All objects written, in that order.
@@ -74,6 +91,7 @@ impl Kept {
     fn take(&mut self, object: &RetiredObject<'_, '_>) -> Result<(), FolderError> {
         let summary = &object.summary;
         let poses = self.paths.remove(&(summary.id, summary.chain)).unwrap_or_default();
+        let side = self.sides.remove(&(summary.id, summary.chain));
         let mut triangles: Vec<Triangle> = Vec::new();
         object.volume.triangles(&self.mesh, &mut |triangle| triangles.push(triangle));
         if triangles.is_empty() {
@@ -101,6 +119,7 @@ impl Kept {
             frames: summary.frames,
             blocks: object.volume.pool().len(),
             triangles: triangles.len() as u64,
+            surface: side.and_then(|side| side.compare(&triangles, f64::from(object.volume.config().voxel_size_m))),
             portrait_png: portrait(&triangles),
         });
         self.thin_portraits();

@@ -5,9 +5,11 @@ use super::tracks::{TrackRecord, TrackRow, track_records};
 use super::{FrameRow, Plan};
 use crate::dataset::StereoImages;
 use crate::evaluation::objects::{Judged, ObjectErrors, ObjectFigures};
+use crate::evaluation::surfaces::TrueView;
 use crate::evaluation::swept::Swept;
 use crate::export::{FolderError, RunFolder};
 use crate::segmentation::Refusals;
+use dynvox_core::geometry::StereoRig;
 use dynvox_core::instances::{DetectionCount, InstancesConfig, TrackReport};
 use dynvox_core::{Mapper, Report};
 use std::path::Path;
@@ -38,6 +40,7 @@ pub struct ObjectsAtWork {
     errors: ObjectErrors,
     swept: Option<Swept>,
     instances: InstancesConfig,
+    rig: StereoRig,
 }
 
 impl ObjectsAtWork {
@@ -49,6 +52,7 @@ impl ObjectsAtWork {
             errors: ObjectErrors::default(),
             swept: None,
             instances: plan.config.instances,
+            rig: plan.config.rig,
         }
     }
 
@@ -61,10 +65,24 @@ impl ObjectsAtWork {
         if let Some(truth) = &images.objects {
             let width = images.left.width();
             self.errors.add(&tracks, &report.t_world_camera, truth, |pixels| self.instances.large_enough(pixels.area(), width));
-            if images.exact.is_some() {
+            if let Some(exact) = &images.exact {
                 let t_map_world = report.t_world_camera * truth.t_world_camera.inverse();
                 let swept = self.swept.get_or_insert_default();
                 truth.objects.iter().for_each(|object| swept.add(object, &t_map_world));
+                let Some(depth_m) = exact.depth_m.view() else { return tracks.iter().map(TrackRow::from).collect() };
+                let view = TrueView {
+                    rig: &self.rig,
+                    depth_m,
+                    t_world_camera: truth.t_world_camera,
+                    far_m: f64::from(self.instances.volume.far_m),
+                };
+                for (summary, _) in mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame) {
+                    let thing = self.errors.truth_of(summary.id).and_then(|id| truth.objects.iter().find(|thing| thing.id == id));
+                    if let Some(thing) = thing {
+                        let t_thing_object = thing.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
+                        self.sink.side(summary.id, summary.chain).add(&view, thing, &t_thing_object);
+                    }
+                }
             }
         }
         tracks.iter().map(TrackRow::from).collect()

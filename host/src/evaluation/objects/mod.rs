@@ -115,6 +115,11 @@ impl ObjectErrors {
         self.frame += 1;
     }
 
+    /// The true thing a track belongs to in the frame added last.
+    pub fn truth_of(&self, track: u32) -> Option<u32> {
+        self.tracks.get(&track)?.last().filter(|judged| judged.at + 1 == self.frame as usize).map(|judged| judged.truth)
+    }
+
     /// Each track's errors, by its number.
     pub fn tracks(&self) -> BTreeMap<u32, TrackErrors> {
         self.tracks.iter().map(|(&id, judged)| (id, TrackErrors::of(judged))).collect()

@@ -1,6 +1,7 @@
 //! What moves or could: tracks over time in the colours of their states, a table, and the objects' meshes.
 
 use super::{escaped, grouped};
+use crate::evaluation::surfaces::SurfaceFigures;
 use crate::export::state_name;
 use crate::harness::{KeptObject, RunRecord, TrackRecord};
 use base64::{Engine, engine::general_purpose::STANDARD};
@@ -230,14 +231,25 @@ fn gallery(kept: &[KeptObject]) -> String {
         let _ = write!(
             html,
             "<figure><img alt=\"mesh of object {0}\" src=\"data:image/png;base64,{1}\"><figcaption>{2} <code>{0}.ply</code>, {3}: {4} frames, {5} \
-             triangles</figcaption></figure>",
+             triangles{6}</figcaption></figure>",
             escaped(&object.name),
             STANDARD.encode(&object.portrait_png),
             object.class.name(),
             state_name(object.state),
             object.frames,
-            grouped(object.triangles)
+            grouped(object.triangles),
+            object.surface.as_ref().map(surface).unwrap_or_default()
         );
     }
     html + "</div>"
+}
+
+/// A mesh against the true surface in a few words.
+fn surface(figures: &SurfaceFigures) -> String {
+    let median = figures.median_m.map_or_else(|| "far".to_owned(), |median_m| format!("{:.1} cm", 100.0 * median_m));
+    format!(
+        "; {median} from the true surface (median), {:.0} % of what was seen of it, from {:.0} m on",
+        100.0 * figures.completeness,
+        figures.nearest_m
+    )
 }
