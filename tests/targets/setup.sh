@@ -44,7 +44,9 @@ cross_toolchain() {
 # The fixture as the firmware embeds it, packed from its files.
 pack() {
   export DYNVOX_CLIP=${DYNVOX_CLIP:-$(dirname "$build")/street-320x96.clip}
-  [ -s "$DYNVOX_CLIP" ] && [ -z "$(find "$targets/../../fixtures/street-320x96" -newer "$DYNVOX_CLIP" -print -quit)" ] && return 0
+  # Digests are not in it.
+  [ -s "$DYNVOX_CLIP" ] && [ -z "$(find "$targets/../../fixtures/street-320x96" -newer "$DYNVOX_CLIP" -type f ! -name '*.txt' -print -quit)" ] &&
+    return 0
   cargo run --quiet --locked --manifest-path "$targets/../../Cargo.toml" -p dynvox -- \
     fixtures pack "$targets/../../fixtures/street-320x96" --out "$DYNVOX_CLIP"
 }

@@ -1,0 +1,145 @@
+/* Maps a clip (dynvox fixtures pack FIXTURE --out clip.bin) and prints each frame's number and digest. The digests on file come of the
+ * voxels and the pruning window that fixtures are replayed with (dynvox_clip::config), which are given behind the clip.
+ *
+ *   cargo build --release -p dynvox-capi
+ *   cc -std=c11 -Icore/capi/include core/capi/examples/map_fixture.c target/release/libdynvox_capi.a -lm -lpthread -ldl -o map_fixture
+ *   ./map_fixture clip.bin VOXEL_SIZE_M PRUNE_LAG
+ */
+#include "dynvox.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What is left of the clip; fixtures/clip/src/lib.rs documents its bytes. */
+static const uint8_t *at;
+
+static uint32_t take_u32(void) {
+  uint32_t value = (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+  at += 4;
+  return value;
+}
+
+static float take_f32(void) {
+  uint32_t bits = take_u32();
+  float value;
+  memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+static double take_f64(void) {
+  uint64_t low = take_u32(), bits = low | (uint64_t)take_u32() << 32;
+  double value;
+  memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+static void check(DynvoxStatus status, const char *what) {
+  if (status != DYNVOX_STATUS_OK) {
+    fprintf(stderr, "%s: %s\n", what, dynvox_status_text(status));
+    exit(1);
+  }
+}
+
+static void count(void *context, const DynvoxTriangle *triangle) {
+  (void)triangle;
+  ++*(uint64_t *)context;
+}
+
+static bool keep(void *context, const DynvoxBlock *block) {
+  (void)block;
+  ++*(uint32_t *)context;
+  return true;
+}
+
+static uint8_t *read_file(const char *path) {
+  FILE *file = fopen(path, "rb");
+  uint8_t *bytes = malloc(64u << 20);
+  if (!file || !bytes || fread(bytes, 1, 64u << 20, file) < 56 || memcmp(bytes, "DVXCLIP1", 8) != 0) {
+    fprintf(stderr, "%s is no clip\n", path);
+    exit(1);
+  }
+  fclose(file);
+  return bytes;
+}
+
+int main(int argc, char **argv) {
+  if (argc != 4) {
+    fprintf(stderr, "map_fixture CLIP VOXEL_SIZE_M PRUNE_LAG\n");
+    return 1;
+  }
+  uint8_t *clip = read_file(argv[1]);
+  at = clip + 8;
+  if (take_u32() != 0) {
+    fprintf(stderr, "not a clip for the whole mapper\n");
+    return 1;
+  }
+  size_t width = take_u32(), height = take_u32();
+  uint32_t frames = take_u32();
+  DynvoxRig rig;
+  rig.focal_px = take_f64();
+  rig.center_u_px = take_f64();
+  rig.center_v_px = take_f64();
+  rig.baseline_m = take_f64();
+
+  DynvoxConfig config;
+  check(dynvox_config_default(&rig, &config), "config");
+  config.voxel_size_m = strtof(argv[2], NULL);
+  config.prune_lag = (uint32_t)strtoul(argv[3], NULL, 10);
+  size_t bytes;
+  check(dynvox_bytes(DYNVOX_PROFILE_TINY, &bytes), "bytes");
+  size_t alignment = dynvox_alignment();
+  uint8_t *buffer = aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+  DynvoxMapper *mapper;
+  check(dynvox_create(DYNVOX_PROFILE_TINY, &config, buffer, bytes, &mapper), "create");
+
+  DynvoxReport report;
+  for (uint32_t index = 0; index < frames; ++index) {
+    DynvoxFrame frame = {0};
+    DynvoxDetection detections[64];
+    frame.width = width;
+    frame.height = height;
+    frame.left = (DynvoxImage){at, width};
+    at += width * height;
+    frame.right = (DynvoxImage){at, width};
+    at += width * height;
+    frame.detection_count = take_u32();
+    frame.detections = detections;
+    for (size_t i = 0; i < frame.detection_count; ++i) {
+      DynvoxDetection *seen = &detections[i];
+      seen->class_code = *at++;
+      seen->score = take_f32();
+      seen->left = (int32_t)take_u32();
+      seen->top = (int32_t)take_u32();
+      seen->width = take_u32();
+      seen->height = take_u32();
+      seen->mask = at;
+      at += (size_t)seen->width * seen->height;
+    }
+    check(dynvox_step(mapper, &frame, NULL, &report), "step");
+    printf("%u %016llx\n", (unsigned)report.frame, (unsigned long long)report.digest);
+  }
+
+  float *depth_m = malloc(width * height * sizeof *depth_m);
+  DynvoxPicture picture = {0};
+  picture.capacity = width * height;
+  picture.depth_m = depth_m;
+  DynvoxPose pose;
+  check(dynvox_pose(mapper, &pose), "pose");
+  check(dynvox_raycast(mapper, &pose, &picture), "raycast");
+  size_t seen = 0;
+  for (size_t i = 0; i < width * height; ++i) seen += depth_m[i] > 0;
+  uint64_t triangles = 0, said = 0;
+  check(dynvox_triangles(mapper, count, &triangles, &said), "triangles");
+  uint32_t left = 0, kept = 0, lost = 0;
+  DynvoxStore store = {&left, keep, NULL};
+  check(dynvox_finish(mapper), "finish");
+  check(dynvox_stream_out(mapper, &store, &kept, &lost), "stream out");
+  check(dynvox_destroy(mapper), "destroy");
+  fprintf(stderr, "%zu of %zu pixels show the map, %llu triangles, %u blocks left\n", seen, width * height, (unsigned long long)triangles,
+          (unsigned)left);
+  free(depth_m);
+  free(buffer);
+  free(clip);
+  return triangles == said && left == kept && lost == 0 && seen > 0 ? 0 : 1;
+}

@@ -1,0 +1,74 @@
+//! Reading what a caller hands over: every pointer is checked for null and alignment here, and nowhere else.
+
+use crate::DynvoxStatus;
+use core::{ops::Range, slice};
+
+/// Most bytes a slice may have.
+const MOST: usize = isize::MAX as usize;
+
+/// Copies the value out.
+///
+/// # Safety
+/// `pointer` is null, misaligned or points to a `T`.
+pub unsafe fn read<T: Copy>(pointer: *const T) -> Result<T, DynvoxStatus> {
+    if pointer.is_null() {
+        Err(DynvoxStatus::Null)
+    } else if !pointer.is_aligned() {
+        Err(DynvoxStatus::Misaligned)
+    } else {
+        // SAFETY: not null and aligned; of the right type by the caller's promise.
+        Ok(unsafe { *pointer })
+    }
+}
+
+/// The pointer, when a value can be written there.
+///
+/// # Safety
+/// None is needed to look; whoever writes needs room for a `T`.
+pub unsafe fn output<T>(pointer: *mut T) -> Result<*mut T, DynvoxStatus> {
+    if pointer.is_null() {
+        Err(DynvoxStatus::Null)
+    } else if pointer.is_aligned() {
+        Ok(pointer)
+    } else {
+        Err(DynvoxStatus::Misaligned)
+    }
+}
+
+/// Items of a caller's that must not lie in `forbidden`, the mapper's own buffer.
+///
+/// # Safety
+/// `pointer` is null, misaligned or points to `len` items that nobody writes to for 'a.
+pub unsafe fn items<'a, T>(pointer: *const T, len: usize, forbidden: &Range<usize>) -> Result<&'a [T], DynvoxStatus> {
+    if len == 0 {
+        return Ok(&[]);
+    }
+    if pointer.is_null() {
+        return Err(DynvoxStatus::Null);
+    }
+    if !pointer.is_aligned() {
+        return Err(DynvoxStatus::Misaligned);
+    }
+    let bytes = len.checked_mul(size_of::<T>()).filter(|&bytes| bytes <= MOST).ok_or(DynvoxStatus::Size)?;
+    let start = pointer as usize;
+    let end = start.checked_add(bytes).ok_or(DynvoxStatus::Size)?;
+    if start < forbidden.end && forbidden.start < end {
+        return Err(DynvoxStatus::Overlap);
+    }
+    // SAFETY: not null, aligned, no longer than a slice can be; as long as it says, and left alone, by the caller's promise.
+    Ok(unsafe { slice::from_raw_parts(pointer, len) })
+}
+
+/// As [`items`], to be written to.
+///
+/// # Safety
+/// `pointer` is null, misaligned or points to `len` items that nobody else reads or writes for 'a.
+pub unsafe fn items_mut<'a, T>(pointer: *mut T, len: usize, forbidden: &Range<usize>) -> Result<&'a mut [T], DynvoxStatus> {
+    // SAFETY: the same promise, and more.
+    unsafe { items(pointer.cast_const(), len, forbidden)? };
+    if len == 0 {
+        return Ok(&mut []);
+    }
+    // SAFETY: checked above; nobody else uses them by the caller's promise.
+    Ok(unsafe { slice::from_raw_parts_mut(pointer, len) })
+}

@@ -1,0 +1,169 @@
+//! A mapper in a caller's buffer.
+//!
+//! The buffer begins with a [`Head`], behind which, at the next multiple of the alignment, lies the slab. A handle points to the head. The
+//! two never overlap, so the mapper's exclusive hold on the slab and a handle's access to the head do not meet.
+
+use crate::{
+    DynvoxConfig, DynvoxProfile, DynvoxStatus,
+    given::{output, read},
+    types::capacity,
+};
+use core::{mem::MaybeUninit, ops::Range, ptr, slice};
+use dynvox_core::{Capacity, Mapper, memory::SLAB_ALIGN};
+
+/// A mapper; only ever behind a pointer.
+pub struct DynvoxMapper {
+    _opaque: [u8; 0],
+}
+
+/// Stands in the head of a mapper that lives.
+const ALIVE: u64 = 0x6479_6e76_6f78_2e31;
+
+#[repr(C)]
+struct Head {
+    alive: u64,
+    busy: bool,
+    /// Bytes of head and slab.
+    bytes: usize,
+    mapper: MaybeUninit<Mapper<'static>>,
+}
+
+const HEAD_BYTES: usize = size_of::<Head>().next_multiple_of(SLAB_ALIGN);
+
+const fn bytes(capacity: &Capacity) -> usize {
+    HEAD_BYTES + capacity.bytes()
+}
+
+/// Alignment of a mapper's buffer, bytes.
+#[unsafe(no_mangle)]
+pub extern "C" fn dynvox_alignment() -> usize {
+    SLAB_ALIGN
+}
+
+/// Writes how many bytes of buffer a mapper of that profile takes.
+///
+/// # Safety
+/// `bytes` is null or points to room for a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_bytes(profile: DynvoxProfile, bytes: *mut usize) -> DynvoxStatus {
+    // SAFETY: only looked at.
+    match (capacity(profile), unsafe { output(bytes) }) {
+        (Ok(capacity), Ok(bytes)) => {
+            // SAFETY: checked; room for one by the caller's promise.
+            unsafe { bytes.write(self::bytes(&capacity)) };
+            DynvoxStatus::Ok
+        }
+        (Err(status), _) | (_, Err(status)) => status,
+    }
+}
+
+/// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nobody else may read,
+/// write, move or free it. What it holds before does not matter. Takes up to 64 KiB of stack, once; a step takes less than 32 KiB.
+///
+/// # Safety
+/// `config` is null or points to a configuration, `buffer` is null or to `len` bytes that are nobody else's, `mapper` is null or to room for
+/// a pointer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_create(
+    profile: DynvoxProfile,
+    config: *const DynvoxConfig,
+    buffer: *mut u8,
+    len: usize,
+    mapper: *mut *mut DynvoxMapper,
+) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    let (capacity, config, handle) = match (capacity(profile), unsafe { read(config) }, unsafe { output(mapper) }) {
+        (Ok(capacity), Ok(config), Ok(handle)) => (capacity, config, handle),
+        (Err(status), ..) | (_, Err(status), _) | (.., Err(status)) => return status,
+    };
+    if buffer.is_null() {
+        return DynvoxStatus::Null;
+    }
+    if !(buffer as usize).is_multiple_of(SLAB_ALIGN) {
+        return DynvoxStatus::Misaligned;
+    }
+    if len < bytes(&capacity) {
+        return DynvoxStatus::TooSmall;
+    }
+    // SAFETY: within the buffer, behind the head, which nothing but the mapper made here will use until it is destroyed.
+    let slab: &'static mut [u8] = unsafe { slice::from_raw_parts_mut(buffer.add(HEAD_BYTES), capacity.bytes()) };
+    let made = match Mapper::new(&capacity, &config.resolved(), slab) {
+        Ok(made) => made,
+        Err(error) => return error.into(),
+    };
+    let head = buffer.cast::<Head>();
+    // SAFETY: the buffer is aligned better than a head, and long enough; the handle was checked.
+    unsafe {
+        head.write(Head {
+            alive: ALIVE,
+            busy: false,
+            bytes: bytes(&capacity),
+            mapper: MaybeUninit::new(made),
+        });
+        handle.write(head.cast());
+    }
+    DynvoxStatus::Ok
+}
+
+/// Ends a mapper; its buffer is the caller's again. Whoever wants the map takes it first.
+///
+/// # Safety
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_destroy(mapper: *mut DynvoxMapper) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    let head = match unsafe { head(mapper) } {
+        Ok(head) => head,
+        Err(status) => return status,
+    };
+    // SAFETY: alive, hence written in whole by dynvox_create, and not borrowed, as it is not busy.
+    unsafe {
+        (*head).mapper.assume_init_drop();
+        ptr::addr_of_mut!((*head).alive).write(0);
+    }
+    DynvoxStatus::Ok
+}
+
+/// The head of a mapper that lives and is not at work.
+///
+/// # Safety
+/// `mapper` is null, misaligned or points to a head's memory.
+unsafe fn head(mapper: *mut DynvoxMapper) -> Result<*mut Head, DynvoxStatus> {
+    let head = mapper.cast::<Head>();
+    // SAFETY: only looked at.
+    unsafe { output(head)? };
+    // SAFETY: not null, aligned, a head's memory by the caller's promise; no reference to either field is ever made.
+    let (alive, busy) = unsafe { (ptr::addr_of!((*head).alive).read(), ptr::addr_of!((*head).busy).cast::<u8>().read()) };
+    if alive != ALIVE {
+        Err(DynvoxStatus::NoMapper)
+    } else if busy != 0 {
+        Err(DynvoxStatus::Busy)
+    } else {
+        Ok(head)
+    }
+}
+
+/// Does `work` with the mapper and the addresses of its buffer, while no callback can.
+///
+/// # Safety
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
+pub unsafe fn with(
+    mapper: *mut DynvoxMapper,
+    work: impl FnOnce(&mut Mapper<'static>, &Range<usize>) -> Result<(), DynvoxStatus>,
+) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    let head = match unsafe { head(mapper) } {
+        Ok(head) => head,
+        Err(status) => return status,
+    };
+    // SAFETY: alive, hence written in whole; the one reference made is to the mapper alone, and busy keeps a second one from being made.
+    let done = unsafe {
+        ptr::addr_of_mut!((*head).busy).write(true);
+        let buffer = head as usize..head as usize + ptr::addr_of!((*head).bytes).read();
+        let mapper = &mut *ptr::addr_of_mut!((*head).mapper).cast::<Mapper<'static>>();
+        let done = work(mapper, &buffer);
+        ptr::addr_of_mut!((*head).busy).write(false);
+        done
+    };
+    done.err().unwrap_or(DynvoxStatus::Ok)
+}

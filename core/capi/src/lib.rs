@@ -1,0 +1,29 @@
+//! The mapper for C.
+//!
+//! Every function checks what it is given and answers with a [`DynvoxStatus`]; what it cannot check (that a pointer is to as many bytes as
+//! it says) stands in the comments, which become the header's (`include/dynvox.h`, written by cbindgen and compared in the tests).
+//!
+//! Memory: none but the caller's buffer. It holds a small head (what a handle points to: the mapper's own fields) and, behind it, the slab.
+#![no_std]
+
+// A library by itself must name a panic handler and an allocator, though neither is ever reached.
+#[cfg(feature = "std")]
+extern crate std;
+
+mod callback;
+mod given;
+mod handle;
+mod look;
+mod status;
+mod step;
+mod types;
+
+pub use callback::{DynvoxBlock, DynvoxReturningBlock, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink, DynvoxVertex};
+pub use handle::{DynvoxMapper, dynvox_alignment, dynvox_bytes, dynvox_create, dynvox_destroy};
+pub use look::{DynvoxPicture, dynvox_finish, dynvox_pose_matrix, dynvox_raycast, dynvox_stream_out, dynvox_triangles};
+pub use status::{DynvoxStatus, dynvox_status_text};
+pub use step::{dynvox_pose, dynvox_step};
+pub use types::{
+    DYNVOX_PROFILE_DESKTOP, DYNVOX_PROFILE_ONBOARD, DYNVOX_PROFILE_SMALL, DYNVOX_PROFILE_TINY, DynvoxConfig, DynvoxDetection, DynvoxFrame,
+    DynvoxImage, DynvoxPose, DynvoxProfile, DynvoxReport, DynvoxRig, DynvoxSeverity, dynvox_config_default, dynvox_config_problem,
+};

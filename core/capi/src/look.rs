@@ -1,0 +1,166 @@
+//! Looking at the map and taking it away.
+
+use crate::{
+    DynvoxMapper, DynvoxPose, DynvoxStatus, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink,
+    given::{items_mut, output, read},
+    handle::with,
+};
+use core::{ffi::c_void, ops::Range};
+use dynvox_core::{Serial, image::View};
+
+/// What the map looks like from somewhere: rooms of the caller's, any of which may be null. The picture is as large as the frames were;
+/// its rows follow each other without padding.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct DynvoxPicture {
+    /// Pixels there is room for in every room that is not null.
+    pub capacity: usize,
+    /// Depth, m; 0 where there is no surface.
+    pub depth_m: *mut f32,
+    /// Three bytes a pixel: the surface's normal in the world, 1/127.
+    pub normal: *mut i8,
+    /// Three bytes a pixel: red, green, blue.
+    pub colour: *mut u8,
+    /// How often the surface was seen.
+    pub weight: *mut u8,
+    /// Written: columns.
+    pub width: usize,
+    /// Written: rows.
+    pub height: usize,
+}
+
+/// Looks at the static map from a pose.
+///
+/// # Safety
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to a
+/// pose; `picture` is null or points to a picture whose rooms are as large as it says and overlap nothing.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_raycast(mapper: *mut DynvoxMapper, pose: *const DynvoxPose, picture: *mut DynvoxPicture) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        with(mapper, |mapper, buffer| {
+            let pose = read(pose)?.transform()?;
+            let mut to = read(picture.cast_const())?;
+            let seen = mapper.raycast(&pose, &Serial)?;
+            let depth_m = seen.depth_m().ok_or(DynvoxStatus::NoFrame)?;
+            (to.width, to.height) = (depth_m.width(), depth_m.height());
+            if to.capacity < to.width * to.height {
+                return Err(DynvoxStatus::TooSmall);
+            }
+            fill(Some(depth_m), to.depth_m, buffer)?;
+            fill(seen.normal(), to.normal.cast(), buffer)?;
+            fill(seen.colour(), to.colour.cast(), buffer)?;
+            fill(seen.weight(), to.weight, buffer)?;
+            picture.write(to);
+            Ok(())
+        })
+    }
+}
+
+/// Copies an image into a room, unless the room is null.
+///
+/// # Safety
+/// `room` is null or to as many pixels as the image has, which nobody else uses.
+unsafe fn fill<T: Copy>(seen: Option<View<'_, T>>, room: *mut T, buffer: &Range<usize>) -> Result<(), DynvoxStatus> {
+    let Some(seen) = seen.filter(|_| !room.is_null()) else { return Ok(()) };
+    // SAFETY: the caller's promise.
+    let room = unsafe { items_mut(room, seen.width() * seen.height(), buffer)? };
+    room.iter_mut().zip(seen.rows().flatten()).for_each(|(to, from)| *to = *from);
+    Ok(())
+}
+
+/// Hands every triangle of the static map to `sink`, and writes how many there were to `count`, which may be null.
+///
+/// # Safety
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or to room for
+/// a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_triangles(
+    mapper: *mut DynvoxMapper,
+    sink: DynvoxTriangleSink,
+    context: *mut c_void,
+    count: *mut u64,
+) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        with(mapper, |mapper, _| {
+            let sink = sink.ok_or(DynvoxStatus::Null)?;
+            let count = if count.is_null() { None } else { Some(output(count)?) };
+            let triangles = mapper.triangles(&mut |triangle| {
+                let triangle = DynvoxTriangle::from(triangle);
+                sink(context, &raw const triangle);
+            });
+            if let Some(count) = count {
+                count.write(triangles);
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Lets every block of the static map leave into `store`, so that the store holds the whole map. Writes how many it kept to `kept` and
+/// how many it did not to `lost`; either may be null.
+///
+/// # Safety
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `store` is null or points to a
+/// store; `kept` and `lost` are null or to room for a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_stream_out(
+    mapper: *mut DynvoxMapper,
+    store: *const DynvoxStore,
+    kept: *mut u32,
+    lost: *mut u32,
+) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        with(mapper, |mapper, _| {
+            let mut store = read(store)?;
+            let kept = if kept.is_null() { None } else { Some(output(kept)?) };
+            let lost = if lost.is_null() { None } else { Some(output(lost)?) };
+            let report = mapper.stream_out(&mut store);
+            if let Some(kept) = kept {
+                kept.write(report.kept);
+            }
+            if let Some(lost) = lost {
+                lost.write(report.lost);
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Ends a drive: prunes what is still in the window. The map can be looked at and taken away as before.
+///
+/// # Safety
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_finish(mapper: *mut DynvoxMapper) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        with(mapper, |mapper, _| {
+            mapper.finish();
+            Ok(())
+        })
+    }
+}
+
+/// Writes a pose as the upper three rows of its matrix, row by row: twelve numbers.
+///
+/// # Safety
+/// `pose` is null or points to a pose, `matrix` is null or to room for twelve numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_pose_matrix(pose: *const DynvoxPose, matrix: *mut f64) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    let (pose, matrix) = match unsafe { (read(pose).and_then(|pose| pose.transform()), output(matrix)) } {
+        (Ok(pose), Ok(matrix)) => (pose, matrix),
+        (Err(status), _) | (_, Err(status)) => return status,
+    };
+    let rotation = pose.rotation.to_rotation_matrix();
+    let (r, t) = (rotation.matrix(), &pose.translation);
+    let rows = [[r.m11, r.m12, r.m13, t.x], [r.m21, r.m22, r.m23, t.y], [r.m31, r.m32, r.m33, t.z]];
+    for (at, &number) in rows.as_flattened().iter().enumerate() {
+        // SAFETY: three rows of four.
+        unsafe { matrix.add(at).write(number) };
+    }
+    DynvoxStatus::Ok
+}

@@ -1,0 +1,99 @@
+//! What a call comes back with.
+
+use core::ffi::{CStr, c_char};
+use dynvox_core::{NewError, StepError, memory::SlabError, volume::RaycastError};
+
+/// What a call comes back with. Whatever is not DYNVOX_STATUS_OK has changed nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub enum DynvoxStatus {
+    /// Done.
+    Ok = 0,
+    /// A pointer that must not be null is.
+    Null,
+    /// The buffer does not begin at a multiple of dynvox_alignment(), or another pointer not at one of its type's.
+    Misaligned,
+    /// The buffer or an output is too small.
+    TooSmall,
+    /// The handle is not that of a mapper: never created, or destroyed.
+    NoMapper,
+    /// The call came from within a callback of the same mapper.
+    Busy,
+    /// A frame's memory lies within the mapper's buffer.
+    Overlap,
+    /// There is no such profile, class or the like.
+    Unknown,
+    /// The configuration cannot be used: dynvox_config_problem says why. A calibration that is not finite is one reason.
+    Config,
+    /// A pose is not finite, its rotation is not of length 1, or it lies beyond the map.
+    Pose,
+    /// An image is larger than the profile allows, too small to match, or its stride is below its width.
+    Size,
+    /// A frame's size differs from that of the frames before.
+    SizeChanged,
+    /// More detections than a frame can have (64).
+    TooMany,
+    /// There has been no frame yet.
+    NoFrame,
+}
+
+impl DynvoxStatus {
+    const fn text(self) -> &'static CStr {
+        match self {
+            Self::Ok => c"ok",
+            Self::Null => c"a pointer is null: give one",
+            Self::Misaligned => c"a pointer is misaligned: buffers begin at a multiple of dynvox_alignment()",
+            Self::TooSmall => c"a buffer is too small: dynvox_bytes says how much is needed",
+            Self::NoMapper => c"this is no mapper: create one, and use none that is destroyed",
+            Self::Busy => c"a callback called its own mapper: call it after the callback has returned",
+            Self::Overlap => c"a frame lies within the mapper's buffer: keep it elsewhere",
+            Self::Unknown => c"there is no such value: see the enumeration in the header",
+            Self::Config => c"the configuration cannot be used: dynvox_config_problem says why",
+            Self::Pose => c"a pose is not finite, not a rotation, or beyond the map",
+            Self::Size => c"an image's size does not suit the profile",
+            Self::SizeChanged => c"a frame's size differs from that of the frames before: create another mapper",
+            Self::TooMany => c"too many detections: give the best 64",
+            Self::NoFrame => c"there has been no frame yet: step first",
+        }
+    }
+}
+
+impl From<NewError> for DynvoxStatus {
+    fn from(error: NewError) -> Self {
+        match error {
+            NewError::Slab(SlabError::Misaligned) => Self::Misaligned,
+            NewError::Slab(_) => Self::TooSmall,
+            NewError::Config(_) => Self::Config,
+        }
+    }
+}
+
+impl From<StepError> for DynvoxStatus {
+    fn from(error: StepError) -> Self {
+        match error {
+            StepError::SizeChanged => Self::SizeChanged,
+            StepError::SizesDiffer | StepError::TooLarge { .. } | StepError::TooSmall { .. } => Self::Size,
+            StepError::PoseNotFinite => Self::Pose,
+        }
+    }
+}
+
+impl From<RaycastError> for DynvoxStatus {
+    fn from(error: RaycastError) -> Self {
+        match error {
+            RaycastError::ImageSize => Self::NoFrame,
+            RaycastError::Viewpoint => Self::Pose,
+            RaycastError::Object => Self::Unknown,
+        }
+    }
+}
+
+/// A sentence for a status, in static memory; "no such status" for another number.
+#[unsafe(no_mangle)]
+pub extern "C" fn dynvox_status_text(status: u32) -> *const c_char {
+    const ALL: [DynvoxStatus; 14] = {
+        use DynvoxStatus::*;
+        [Ok, Null, Misaligned, TooSmall, NoMapper, Busy, Overlap, Unknown, Config, Pose, Size, SizeChanged, TooMany, NoFrame]
+    };
+    ALL.get(status as usize).map_or(c"no such status", |status| status.text()).as_ptr()
+}
