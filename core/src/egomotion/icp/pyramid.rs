@@ -30,11 +30,10 @@ impl<'a> Pyramid<'a> {
         for slot in pyramid.levels.iter_mut().take(usize::from(levels)) {
             let pixels = width * height;
             let coarse = finer.is_some() && (width < MIN_WIDTH || height < MIN_HEIGHT);
-            if coarse || pixels == 0 || rest.len() < pixels {
+            if coarse || pixels == 0 {
                 break;
             }
-            let (level, after) = rest.split_at_mut(pixels);
-            rest = after;
+            let Some(level) = rest.split_off_mut(..pixels) else { break };
             match finer {
                 None => halve_given(limits_px, disparity_q8, level, width),
                 Some(finer) => halve(finer, level, width),
@@ -63,7 +62,7 @@ fn halve_given(limits_px: [f32; 2], disparity_q8: View<'_, u16>, level: &mut [f3
         let px = f32::from(value) / f32::from(DISPARITY_ONE_PX);
         if px >= limits_px[0] && px <= limits_px[1] { px } else { 0.0 }
     };
-    for (v, row) in level.chunks_exact_mut(width).enumerate() {
+    for (v, row) in level.chunks_exact_mut(width.max(1)).enumerate() {
         for (to, four) in row.iter_mut().zip(blocks(disparity_q8.row(2 * v), disparity_q8.row(2 * v + 1))) {
             *to = mean(four.map(px));
         }
@@ -72,7 +71,7 @@ fn halve_given(limits_px: [f32; 2], disparity_q8: View<'_, u16>, level: &mut [f3
 
 /// Mean of each 2 x 2 px of a finer level.
 fn halve(finer: View<'_, f32>, level: &mut [f32], width: usize) {
-    for (v, row) in level.chunks_exact_mut(width).enumerate() {
+    for (v, row) in level.chunks_exact_mut(width.max(1)).enumerate() {
         for (to, four) in row.iter_mut().zip(blocks(finer.row(2 * v), finer.row(2 * v + 1))) {
             *to = mean(four);
         }
