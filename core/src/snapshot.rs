@@ -1,6 +1,6 @@
 //! A mapper's state as bytes: what a drive needs to go on as if it had never stopped.
 //!
-//! Each part of the core describes its state once, as a walk over its fields ([`Archive`]); the same walk writes them and reads them back. All
+//! Each part of the core describes its state once, as a walk over its fields (`Archive`); the same walk writes them and reads them back. All
 //! numbers are little-endian and of a stated width, so the bytes are the same on every machine. What can be made anew is not stored: features of
 //! the last pair, the block index. What only one frame needs is not stored either, so [`crate::Mapper::disparity_q8`] has nothing to show
 //! before the next frame.

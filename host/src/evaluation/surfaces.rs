@@ -2,7 +2,7 @@
 //! seen.
 //!
 //! Every pixel of exact depth that lies on a thing while its object is fused is a point of its true surface, in the thing's own frame; those
-//! of one cell of [`CELL_M`] are one sample, their mean. So the seen side is known, whatever hides the rest. The mesh is carried into the
+//! of one cell of `CELL_M` are one sample, their mean. So the seen side is known, whatever hides the rest. The mesh is carried into the
 //! thing's frame by where the object was in the frame in which the thing was nearest, and most of it is made: drift of the object's pose
 //! shows as distance.
 
