@@ -69,7 +69,7 @@ cross() {
   # Only this one command sees the other compiler.
   env RUSTC="$cross_rustc" RUSTC_BOOTSTRAP=1 PATH="$linkers:$PATH" CARGO_TARGET_DIR="$build" RUSTFLAGS="$flags" \
     "$cross_cargo" build --quiet --release --locked --manifest-path "$targets/firmware/Cargo.toml" --target "$target" \
-    -Zbuild-std=core,alloc,compiler_builtins -Zbuild-std-features=compiler-builtins-mem "$@"
+    -Zbuild-std=core,alloc,compiler_builtins -Zbuild-std-features=compiler-builtins-mem "$@" || return
   elf=$build/$target/release/dynvox-firmware
 }
 
