@@ -1,7 +1,13 @@
 //! Shared ground of the integration tests: a slab for a mapper, and clips of the synthetic street.
 
+use dynvox::segmentation::Sighting;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
-use dynvox_core::{Capacity, Config, Mapper, StereoFrame, image::View, memory::SLAB_ALIGN};
+use dynvox_core::{
+    Capacity, Config, Mapper, StereoFrame,
+    image::View,
+    instances::{Class, PixelBox},
+    memory::SLAB_ALIGN,
+};
 
 /// A slab on the heap, aligned as a mapper wants it.
 pub struct HeapSlab {
@@ -56,6 +62,17 @@ impl Clip {
             t_world_camera: None,
             detections: &[],
         })
+    }
+
+    /// What a detector without faults would see in each frame.
+    pub fn sightings(&self) -> Vec<Vec<Sighting>> {
+        let of = |frame: &SynthFrame| {
+            let whole = PixelBox { left: 0, top: 0, width: frame.width as i32, height: frame.height as i32 };
+            let holds = |car: usize, u: i32, v: i32| usize::from(frame.instances[v as usize * frame.width + u as usize]) == car + 1;
+            let cars = frame.objects.iter().enumerate();
+            cars.filter_map(|(car, _)| Sighting::drawn(Class::Car, 0.9, whole, |u, v| holds(car, u, v))).collect()
+        };
+        self.frames.iter().map(of).collect()
     }
 
     /// Flips the lowest bit of a left pixel.
