@@ -60,6 +60,8 @@ pub struct LidarAtWork {
     delay_frames: usize,
     field: Field,
     rig: StereoRig,
+    /// Px of the images as they are stored in one px of those mapped.
+    enlarged: f32,
     /// Whether what moves is kept apart; where it is not, masks are taken as they are given.
     instances: InstancesConfig,
     delay: Delay,
@@ -81,7 +83,13 @@ pub fn evaluable(dataset: &dyn Dataset, indices: &[usize], reference: Reference,
 
 impl LidarAtWork {
     /// Begins; `evaluable` are the positions of the frames that have a reference.
-    pub fn new(reference: Reference, delay_frames: usize, config: &Config, size: (usize, usize), evaluable: &[usize]) -> Self {
+    pub fn new(
+        reference: Reference,
+        delay_frames: usize,
+        config: &Config,
+        (size, enlarged): ((usize, usize), f32),
+        evaluable: &[usize],
+    ) -> Self {
         let count = PICTURES.min(evaluable.len());
         let field = Field {
             width: size.0,
@@ -94,6 +102,7 @@ impl LidarAtWork {
             delay_frames,
             field,
             rig: config.rig,
+            enlarged,
             instances: config.instances,
             delay: Delay::new(delay_frames),
             drawn: (1..=count).filter_map(|at| evaluable.get(at * evaluable.len() / count - 1).copied()).collect(),
@@ -157,7 +166,7 @@ impl LidarAtWork {
 
     /// Compares a frame that is due with a view of the map from its pose.
     pub fn compare(&mut self, awaited: &Awaited, map_depth_m: &View<'_, f32>) {
-        let (evaluated, shown_px) = awaited.compare(map_depth_m, self.rig.focal_baseline_px_m());
+        let (evaluated, shown_px) = awaited.compare(map_depth_m, self.rig.focal_baseline_px_m(), self.enlarged);
         self.frames.push(evaluated);
         if let Some(picture) = awaited.picture.as_ref().and_then(|picture| picture.view()) {
             let errors = |seen_px: &dyn Fn(usize) -> f32| {

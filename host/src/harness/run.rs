@@ -209,7 +209,9 @@ fn drive(plan: &Plan, slab: &mut [u8], folder: &RunFolder) -> Result<(Drive, Mes
 /// Begins holding the map against a reference.
 fn evaluation(plan: &Plan, reference: Reference) -> LidarAtWork {
     let evaluable = evaluable(plan.dataset.as_ref(), &plan.indices, reference, plan.evaluation_delay);
-    LidarAtWork::new(reference, plan.evaluation_delay, &plan.config, plan.dataset.size(), &evaluable)
+    let (size, full_size) = (plan.dataset.size(), plan.dataset.full_size());
+    let enlarged = (full_size.0 as f64 / size.0 as f64) as f32;
+    LidarAtWork::new(reference, plan.evaluation_delay, &plan.config, (size, enlarged), &evaluable)
 }
 
 /// Refuses what cannot run before any memory is taken.

@@ -56,13 +56,14 @@ impl Awaited {
     }
 
     /// Compares with a view of the map from the frame's pose; `focal_baseline_px_m` turns its depth into disparity. Also gives the map's disparity of
-    /// each sample, 0 where it shows nothing.
-    pub fn compare(&self, map_depth_m: &View<'_, f32>, focal_baseline_px_m: f64) -> (EvaluatedFrame, Vec<f32>) {
+    /// each sample, 0 where it shows nothing. `enlarged` px of the images as they are stored are one px of those compared: errors are counted at full
+    /// size, whatever the scale.
+    pub fn compare(&self, map_depth_m: &View<'_, f32>, focal_baseline_px_m: f64, enlarged: f32) -> (EvaluatedFrame, Vec<f32>) {
         let mut layers = [Tally::default(); 3];
         let shown = |sample: &Sample| {
             let depth_m = map_depth_m.get(sample.target.u.into(), sample.target.v.into()).unwrap_or_default();
             let shown_px = if depth_m > 1e-5 { (focal_baseline_px_m / f64::from(depth_m)) as f32 } else { 0.0 };
-            layers[sample.layer as usize].add(sample.target.disparity_px, [sample.input_px, shown_px]);
+            layers[sample.layer as usize].add(enlarged * sample.target.disparity_px, [enlarged * sample.input_px, enlarged * shown_px]);
             shown_px
         };
         let shown_px = self.samples.iter().map(shown).collect();

@@ -79,7 +79,7 @@ fn settle(frame: usize, hits: &[Hit], masks: &Masks) -> (Awaited, Vec<f32>) {
 }
 
 fn compare(frame: &Awaited, map_depth_m: &[f32]) -> EvaluatedFrame {
-    frame.compare(&View::new(map_depth_m, FIELD.width, FIELD.height).unwrap(), FOCAL_PX * BASELINE_M).0
+    frame.compare(&View::new(map_depth_m, FIELD.width, FIELD.height).unwrap(), FOCAL_PX * BASELINE_M, 1.0).0
 }
 
 /// Position of a plain threshold among the rules.
@@ -168,4 +168,15 @@ fn frames_without_a_judged_point_are_left_out_of_the_means() {
     assert_eq!((fused.fused.accuracy, fused.fused.completeness, fused.frames), (Some(0.5), Some(0.5), 2));
     assert!((fused.fused.f1.unwrap() - 2.0 / 3.0).abs() < 1e-12, "the second frame has no accuracy, hence no F1");
     assert!(LidarFigures::of("lidar", 0, &[]).is_none());
+}
+
+#[test]
+fn errors_are_counted_at_full_size_whatever_the_scale() {
+    let (frame, map) = settle(0, &[(300, 180, 30.0, 30.0, 28.0)], &masks(0));
+    let wrong = |enlarged: f32| {
+        let view = View::new(&map, FIELD.width, FIELD.height).unwrap();
+        let (found, _) = frame.compare(&view, FOCAL_PX * BASELINE_M, enlarged);
+        found.layers[Layer::Static as usize].sources[1].errors[0]
+    };
+    assert_eq!((wrong(1.0), wrong(2.0)), (0, 1), "2 px at half the size are 4 px");
 }
