@@ -70,7 +70,7 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
         let map = mapper.raycast(&frame.t_world_camera, &Serial).unwrap().depth_m().unwrap();
         let input = |u: usize, v: usize| f32::from(exact_q8[v * 640 + u]) / f32::from(DISPARITY_ONE_PX);
         let judge = |aim: &Aim, map: &View<'_, f32>| -> EvaluatedFrame {
-            Awaited::settle(index as usize, frame.t_world_camera, aim, input, |_, _| Layer::Static).compare(map, bf).0
+            Awaited::settle(index as usize, frame.t_world_camera, aim, input, |_, _| Layer::Static).compare(map, bf, 1.0).0
         };
         by_scan.push(judge(&aims[0], &map));
         by_pixel.push(judge(&aims[1], &map));
