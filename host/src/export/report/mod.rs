@@ -134,17 +134,17 @@ fn pictures(run: &RunRecord) -> String {
                     none where dark; the map from the camera's place after this frame.</p>"
             .to_owned();
     if run.keyframes.iter().any(|keyframe| !keyframe.composed_png.is_empty()) {
-        html += "<p class=\"soft small\">Below: the map and, in front of it, every object where it is at that time, from a volume of its own: \
+        html += "<p class=\"soft small\">Last: the map and, in front of it, every object where it is at that time, from a volume of its own: \
                  blue those that stand, orange those that move.</p>";
     }
     for keyframe in &run.keyframes {
-        let composed = match &keyframe.composed_png[..] {
-            [] => String::new(),
-            png => image(png, "map with objects"),
+        let (layout, composed) = match &keyframe.composed_png[..] {
+            [] => ("three", String::new()),
+            png => ("four", image(png, "map with objects")),
         };
         let _ = write!(
             html,
-            "<figure><div class=\"three\">{}{}{}{composed}</div><figcaption>frame {}</figcaption></figure>",
+            "<figure><div class=\"{layout}\">{}{}{}{composed}</div><figcaption>frame {}</figcaption></figure>",
             image(&keyframe.input_png, "left image"),
             image(&keyframe.disparity_png, "disparity"),
             image(&keyframe.raycast_png, "map"),
