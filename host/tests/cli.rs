@@ -1,42 +1,13 @@
 //! The binary as a user meets it: exit codes, sentences, and nothing left behind when something is wrong.
 #![allow(missing_docs)]
 
+mod binary;
+
+use binary::{CALIB, dynvox, names, rig, said};
 use image::{GrayImage, Luma};
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 use tempfile::TempDir;
-
-const CALIB: &str = "focal_px 90\ncenter_u_px 79.5\ncenter_v_px 31.5\nbaseline_m 0.5\n";
-
-fn dynvox(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(folder).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// A stereo folder with `frames` textured frames of a plane 4.5 m away: 10 px of disparity.
-fn rig(root: &Path, frames: u32) {
-    for (side, shift) in [("left", 0), ("right", 10)] {
-        fs::create_dir_all(root.join("rig").join(side)).unwrap();
-        for at in 0..frames {
-            let texture = |u: u32, v: u32| Luma([((u / 3).wrapping_mul(2_654_435_761) ^ (v / 3).wrapping_mul(40_503_777) >> 7) as u8]);
-            let image = GrayImage::from_fn(160, 64, |u, v| texture(u + shift, v));
-            image.save(root.join("rig").join(side).join(format!("{at:03}.png"))).unwrap();
-        }
-    }
-    fs::write(root.join("rig/calib.txt"), CALIB).unwrap();
-}
-
-/// Names in the folder, hidden ones included.
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
-}
 
 #[test]
 fn a_run_leaves_its_folder_and_json_alone_on_standard_output() {

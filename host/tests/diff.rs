@@ -1,28 +1,17 @@
 //! `dynvox diff` as a user meets it: one pixel, one setting, one frame fewer, and folders that are none.
 #![allow(missing_docs)]
 
-use image::{GrayImage, Luma};
+mod binary;
+
+use binary::{dynvox, rig};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 use tempfile::TempDir;
-
-fn dynvox(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(folder).output().unwrap()
-}
 
 /// Four textured pairs of a plane, and a run of them named `clean`.
 fn prepared() -> TempDir {
     let root = TempDir::new().unwrap();
-    for (side, shift) in [("left", 0), ("right", 10)] {
-        fs::create_dir_all(root.path().join("rig").join(side)).unwrap();
-        for at in 0..4 {
-            let texture = |u: u32, v: u32| Luma([((u / 3).wrapping_mul(2_654_435_761) ^ (v / 3).wrapping_mul(40_503_777) >> 7) as u8]);
-            let image = GrayImage::from_fn(160, 64, |u, v| texture(u + shift, v));
-            image.save(root.path().join(format!("rig/{side}/{at:03}.png"))).unwrap();
-        }
-    }
-    fs::write(root.path().join("rig/calib.txt"), "focal_px 90\ncenter_u_px 79.5\ncenter_v_px 31.5\nbaseline_m 0.5\n").unwrap();
+    rig(root.path(), 4);
     run(root.path(), "clean", &[]);
     root
 }

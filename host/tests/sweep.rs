@@ -1,26 +1,12 @@
 //! A sweep as a user meets it: interrupted, taken up again, made in parts.
 #![allow(missing_docs)]
 
+mod binary;
+
+use binary::{dynvox, names, said};
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use tempfile::TempDir;
-
-fn dynvox(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(folder).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// Names in the folder, hidden ones included.
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
-}
 
 #[test]
 fn a_killed_sweep_goes_on_where_it_stopped_and_parts_make_the_same_whole() {

@@ -1,8 +1,8 @@
 //! Choosing a source and laying it over a data set.
 
 use super::{GivenDepth, Meaning, convert::to_disparity, opencv, other_size, pfm, unusable};
-use crate::dataset::{Dataset, DatasetError, Image, LidarScan, Masks, StereoImages, read_png_deep};
-use dynvox_core::geometry::{StereoRig, Transform};
+use crate::dataset::{Dataset, DatasetError, Image, Layer, Masks, Overlay, StereoImages, read_png_deep};
+use dynvox_core::geometry::StereoRig;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -53,7 +53,7 @@ pub fn attach(dataset: Box<dyn Dataset>, choice: &DepthChoice) -> Result<Box<dyn
         DepthChoice::Exact if dataset.masks() != Masks::Exact => {
             return Err(unusable(Path::new(dataset.name()), "only the synthetic street has exact depth".to_owned()));
         }
-        DepthChoice::Exact => return Ok(Box::new(WithDepth::new(dataset, Source::Exact, "exact depth".to_owned()))),
+        DepthChoice::Exact => return Ok(Box::new(Overlay::new(dataset, Source::Exact, "exact depth".to_owned()))),
         DepthChoice::Files(folder) => (folder, meaning_of(folder)),
         DepthChoice::Disparity(folder) => (folder, Meaning::DisparityPx),
         DepthChoice::Depth(folder) => (folder, Meaning::DepthM),
@@ -76,7 +76,7 @@ pub fn attach(dataset: Box<dyn Dataset>, choice: &DepthChoice) -> Result<Box<dyn
     let part = if there == files.len() { String::new() } else { format!(" for {there} of {} frames", files.len()) };
     let note = format!("{what} from {}{part}", folder.display());
     let expected = stems.iter().map(|stem| folder.join(format!("{stem}.png"))).collect();
-    Ok(Box::new(WithDepth::new(dataset, Source::Files { files, expected, meaning }, note)))
+    Ok(Box::new(Overlay::new(dataset, Source::Files { files, expected, meaning }, note)))
 }
 
 /// A folder whose name speaks of depth and not of disparity holds depth: `precomputed-depth-dispnet` holds disparity.
@@ -124,90 +124,22 @@ enum Source {
     Exact,
 }
 
-/// A data set with depth.
-struct WithDepth {
-    dataset: Box<dyn Dataset>,
-    source: Source,
-    notes: Vec<String>,
-}
-
-impl WithDepth {
-    fn new(dataset: Box<dyn Dataset>, source: Source, note: String) -> Self {
-        let mut notes = dataset.notes().to_vec();
-        notes.push(note);
-        Self { dataset, source, notes }
-    }
-
-    fn depth(&self, index: usize, images: &StereoImages) -> Result<Option<GivenDepth>, DatasetError> {
-        let (size, rig) = (self.dataset.size(), self.dataset.rig());
-        match &self.source {
-            Source::Exact => Ok(images.exact.as_ref().map(|exact| {
+impl Layer for Source {
+    fn add(&self, dataset: &dyn Dataset, index: usize, images: &mut StereoImages) -> Result<(), DatasetError> {
+        let (size, rig) = (dataset.size(), dataset.rig());
+        images.depth = match self {
+            Self::Exact => images.exact.as_ref().map(|exact| {
                 // The sky is no value that could not be used.
                 let depth_m: Image<f32> = exact.depth_m.map(|&depth_m| if depth_m.is_finite() { depth_m } else { 0.0 });
                 to_disparity(&depth_m, Meaning::DepthM, &rig)
-            })),
-            Source::Files { files, expected, meaning } => match (files.get(index).and_then(Option::as_ref), expected.get(index)) {
-                (Some(path), _) => read(path, *meaning, size, &rig).map(Some),
-                (None, Some(path)) => Err(unusable(path, "it is missing, as are .pfm and .xml of that name".to_owned())),
+            }),
+            Self::Files { files, expected, meaning } => match (files.get(index).and_then(Option::as_ref), expected.get(index)) {
+                (Some(path), _) => Some(read(path, *meaning, size, &rig)?),
+                (None, Some(path)) => return Err(unusable(path, "it is missing, as are .pfm and .xml of that name".to_owned())),
                 // Frames beyond the data set are its own to refuse.
-                (None, None) => Ok(None),
+                (None, None) => None,
             },
-        }
-    }
-}
-
-impl Dataset for WithDepth {
-    fn name(&self) -> &str {
-        self.dataset.name()
-    }
-
-    fn len(&self) -> usize {
-        self.dataset.len()
-    }
-
-    fn size(&self) -> (usize, usize) {
-        self.dataset.size()
-    }
-
-    fn full_size(&self) -> (usize, usize) {
-        self.dataset.full_size()
-    }
-
-    fn stem(&self, index: usize) -> Option<String> {
-        self.dataset.stem(index)
-    }
-
-    fn masks(&self) -> Masks {
-        self.dataset.masks()
-    }
-
-    fn rig(&self) -> StereoRig {
-        self.dataset.rig()
-    }
-
-    fn time_s(&self, index: usize) -> f64 {
-        self.dataset.time_s(index)
-    }
-
-    fn frame(&self, index: usize) -> Result<StereoImages, DatasetError> {
-        let mut images = self.dataset.frame(index)?;
-        images.depth = self.depth(index, &images)?;
-        Ok(images)
-    }
-
-    fn has_lidar(&self, index: usize) -> bool {
-        self.dataset.has_lidar(index)
-    }
-
-    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, DatasetError> {
-        self.dataset.lidar(index)
-    }
-
-    fn truth(&self) -> Option<&[Transform]> {
-        self.dataset.truth()
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
+        };
+        Ok(())
     }
 }

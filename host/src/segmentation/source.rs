@@ -3,8 +3,7 @@
 use super::{
     Frames, Segmenter, Sightings, exact::Exact, indexed::Indexed, mnc::Mnc, mots::MotsPictures, mots::MotsText, noisy::Noisy, unusable,
 };
-use crate::dataset::{Dataset, DatasetError, LidarScan, Masks, StereoImages};
-use dynvox_core::geometry::{StereoRig, Transform};
+use crate::dataset::{Dataset, DatasetError, Layer, Masks, Overlay, StereoImages};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -59,11 +58,9 @@ impl FromStr for Choice {
 pub fn attach(dataset: Box<dyn Dataset>, choice: &Choice) -> Result<Box<dyn Dataset>, DatasetError> {
     let source = Source::open(dataset.as_ref(), choice)?;
     let Some(Source { segmenter, note, fits_scaled }) = source else { return Ok(dataset) };
-    let mut notes = dataset.notes().to_vec();
-    notes.push(note);
     let scale = dataset.size().0 as f64 / dataset.full_size().0 as f64;
     let shrink = (!fits_scaled && dataset.size() != dataset.full_size()).then_some(scale);
-    Ok(Box::new(Segmented { dataset, segmenter, shrink, notes }))
+    Ok(Box::new(Overlay::new(dataset, Masking { segmenter, shrink }, note)))
 }
 
 /// A source that was opened.
@@ -132,73 +129,22 @@ impl Source {
     }
 }
 
-/// A data set with masks.
-struct Segmented {
-    dataset: Box<dyn Dataset>,
+/// Masks, fitted to the images.
+struct Masking {
     segmenter: Box<dyn Segmenter>,
     /// How much masks must be scaled to fit the images.
     shrink: Option<f64>,
-    notes: Vec<String>,
 }
 
-impl Dataset for Segmented {
-    fn name(&self) -> &str {
-        self.dataset.name()
-    }
-
-    fn len(&self) -> usize {
-        self.dataset.len()
-    }
-
-    fn size(&self) -> (usize, usize) {
-        self.dataset.size()
-    }
-
-    fn full_size(&self) -> (usize, usize) {
-        self.dataset.full_size()
-    }
-
-    fn rig(&self) -> StereoRig {
-        self.dataset.rig()
-    }
-
-    fn time_s(&self, index: usize) -> f64 {
-        self.dataset.time_s(index)
-    }
-
-    fn stem(&self, index: usize) -> Option<String> {
-        self.dataset.stem(index)
-    }
-
-    fn masks(&self) -> Masks {
-        self.dataset.masks()
-    }
-
-    fn frame(&self, index: usize) -> Result<StereoImages, DatasetError> {
-        let mut images = self.dataset.frame(index)?;
-        let mut seen: Sightings = self.segmenter.sightings(index, &images)?;
+impl Layer for Masking {
+    fn add(&self, dataset: &dyn Dataset, index: usize, images: &mut StereoImages) -> Result<(), DatasetError> {
+        let mut seen: Sightings = self.segmenter.sightings(index, images)?;
         if let Some(scale) = self.shrink {
             for one in std::mem::take(&mut seen.all) {
-                seen.keep(one.shrunk(scale, self.size()));
+                seen.keep(one.shrunk(scale, dataset.size()));
             }
         }
         images.sightings = seen;
-        Ok(images)
-    }
-
-    fn has_lidar(&self, index: usize) -> bool {
-        self.dataset.has_lidar(index)
-    }
-
-    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, DatasetError> {
-        self.dataset.lidar(index)
-    }
-
-    fn truth(&self) -> Option<&[Transform]> {
-        self.dataset.truth()
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
+        Ok(())
     }
 }
