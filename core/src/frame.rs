@@ -28,7 +28,20 @@ pub struct StereoFrame<'a> {
     pub detections: &'a [Detection<'a>],
 }
 
-impl StereoFrame<'_> {
+impl<'a> StereoFrame<'a> {
+    /// A pair of grey images and nothing else: add what there is with `StereoFrame { colour, ..StereoFrame::pair(left, right) }`.
+    pub fn pair(left: View<'a, u8>, right: View<'a, u8>) -> Self {
+        Self {
+            left,
+            right,
+            colour: None,
+            class: None,
+            disparity_q8: None,
+            t_world_camera: None,
+            detections: &[],
+        }
+    }
+
     /// Digest of the images, row by row, of given disparities and pose, and of the detections, whatever their order.
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::default();

@@ -53,14 +53,9 @@ impl Clip {
     /// Its frames as the core takes them.
     pub fn stereo(&self) -> impl Iterator<Item = StereoFrame<'_>> {
         let (width, height) = (self.street.config().width as usize, self.street.config().height as usize);
-        self.frames.iter().map(move |frame| StereoFrame {
-            left: View::new(&frame.left_grey, width, height).expect("a whole image"),
-            right: View::new(&frame.right_grey, width, height).expect("a whole image"),
-            colour: None,
-            class: None,
-            disparity_q8: None,
-            t_world_camera: None,
-            detections: &[],
+        self.frames.iter().map(move |frame| {
+            let view = |pixels| View::new(pixels, width, height).expect("a whole image");
+            StereoFrame::pair(view(&frame.left_grey), view(&frame.right_grey))
         })
     }
 

@@ -80,16 +80,8 @@ impl Drive {
                 detections.reverse();
             }
             let view = |pixels| View::new(pixels, frame.width, frame.height).unwrap();
-            let (left, right) = (view(&frame.left_grey[..]), view(&frame.right_grey[..]));
-            let stereo = StereoFrame {
-                left,
-                right,
-                colour: None,
-                class: None,
-                disparity_q8: None,
-                t_world_camera: None,
-                detections: &detections,
-            };
+            let pair = StereoFrame::pair(view(&frame.left_grey[..]), view(&frame.right_grey[..]));
+            let stereo = StereoFrame { detections: &detections, ..pair };
             let report = mapper.step_with(&stereo, &Serial, &mut NoStore, &mut NoSink).unwrap();
             look(index, &report, &mut mapper);
         }

@@ -58,15 +58,7 @@ impl Walk {
     fn with_frame<R>(&self, at: usize, take: impl FnOnce(&StereoFrame<'_>) -> R) -> R {
         let detections = [self.detection()];
         let [left, right] = self.pairs[at].each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
-        take(&StereoFrame {
-            left,
-            right,
-            colour: None,
-            class: None,
-            disparity_q8: None,
-            t_world_camera: None,
-            detections: &detections,
-        })
+        take(&StereoFrame { detections: &detections, ..StereoFrame::pair(left, right) })
     }
 
     fn step(&self, at: usize, mapper: &mut Mapper<'_>) -> Report {
