@@ -203,7 +203,7 @@ pub(super) fn block_digest(
     colour: Option<&[[u8; BLOCK_VOXELS]; 3]>,
 ) -> u64 {
     let mut digest = Digest::default();
-    digest.i16s(&coord.packed());
+    digest.u64(coord.packed().iter().fold(0, |place, &along| place << 16 | u64::from(along as u16)));
     digest.i16s(sdf);
     digest.bytes(weight);
     colour.into_iter().flatten().for_each(|plane| digest.bytes(plane));

@@ -151,6 +151,21 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
 }
 
 #[test]
+fn blocks_that_swap_their_contents_or_their_planes_change_the_sum_of_digests() {
+    let places = [BlockCoord { x: 1, y: -2, z: 300 }, BlockCoord { x: -2, y: 1, z: 300 }];
+    let contents: [([i16; BLOCK_VOXELS], [u8; BLOCK_VOXELS]); 2] =
+        [([5; BLOCK_VOXELS], [3; BLOCK_VOXELS]), ([-5; BLOCK_VOXELS], [4; BLOCK_VOXELS])];
+    let planes = [[0; BLOCK_VOXELS], [1; BLOCK_VOXELS], [2; BLOCK_VOXELS]];
+    let sum = |order: [usize; 2], planes: &[[u8; BLOCK_VOXELS]; 3]| {
+        let blocks = places.iter().zip(order.map(|at| &contents[at]));
+        blocks.map(|(&place, (sdf, weight))| fuse::block_digest(place, sdf, weight, Some(planes))).fold(0u64, u64::wrapping_add)
+    };
+    let swapped = [planes[1], planes[0], planes[2]];
+    let sums = [sum([0, 1], &planes), sum([1, 0], &planes), sum([0, 0], &planes), sum([1, 1], &planes), sum([0, 1], &swapped)];
+    assert!((0..sums.len()).all(|one| (0..one).all(|other| sums[one] != sums[other])), "{sums:?}");
+}
+
+#[test]
 fn a_full_pool_refuses_and_counts_and_keeps_what_it_has() {
     let (depth_m, grey) = (bumpy_depth(), vec![50; WIDTH * HEIGHT]);
     for blocks in [1, 2, 17] {
