@@ -153,8 +153,7 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
 #[test]
 fn blocks_that_swap_their_contents_or_their_planes_change_the_sum_of_digests() {
     let places = [BlockCoord { x: 1, y: -2, z: 300 }, BlockCoord { x: -2, y: 1, z: 300 }];
-    let contents: [([i16; BLOCK_VOXELS], [u8; BLOCK_VOXELS]); 2] =
-        [([5; BLOCK_VOXELS], [3; BLOCK_VOXELS]), ([-5; BLOCK_VOXELS], [4; BLOCK_VOXELS])];
+    let contents = [([5; BLOCK_VOXELS], [3; BLOCK_VOXELS]), ([-5; BLOCK_VOXELS], [4; BLOCK_VOXELS])];
     let planes = [[0; BLOCK_VOXELS], [1; BLOCK_VOXELS], [2; BLOCK_VOXELS]];
     let sum = |order: [usize; 2], planes: &[[u8; BLOCK_VOXELS]; 3]| {
         let blocks = places.iter().zip(order.map(|at| &contents[at]));
