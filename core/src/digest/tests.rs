@@ -234,7 +234,8 @@ fn tells_lengths_and_orders_apart_and_makes_nan_one() {
     assert_ne!(of_bytes(&[1, 2, 3]), of_bytes(&[3, 2, 1]));
     assert_ne!(of(|d| d.bytes(&[0; 64])), of(|d| d.u64(64)));
     // Runs among values, and where one ends and the next begins.
-    let (run, value): (fn(&mut Digest), fn(&mut Digest)) = (|d| d.bytes(&[5; 64]), |d| d.u64(64));
+    let run: fn(&mut Digest) = |d| d.bytes(&[5; 64]);
+    let value: fn(&mut Digest) = |d| d.u64(64);
     let orders = [[run, run, value], [run, value, run], [value, run, run]];
     all_different(orders.iter().map(|order| of(|d| order.iter().for_each(|enter| enter(d)))).collect());
     let cuts = (0..=128).map(|cut| of(|d| [&[5; 128][..cut], &[5; 128][cut..]].iter().for_each(|part| d.bytes(part))));
