@@ -267,11 +267,12 @@ fn check(
     }
     let near = |at: i32| at.unsigned_abs() <= MAX_SIDE;
     let whole = PixelBox { left, top, width: width as i32, height: height as i32 };
-    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE || !near(left) || !near(top) {
+    if width > MAX_SIDE || height > MAX_SIDE || !near(left) || !near(top) {
         count.bad_box += 1;
         return None;
     }
     let pixels = whole.intersection(image);
+    // Empty, or beside the image.
     if pixels.area() == 0 {
         count.bad_box += 1;
         return None;

@@ -177,3 +177,72 @@ fn of_more_equals_than_there_is_room_for_the_same_are_taken_in_whatever_order() 
     all.reverse();
     assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), first);
 }
+
+#[test]
+fn a_box_of_absurd_width_is_refused_though_its_mask_is_as_wide() {
+    let mask = vec![1; 160_000];
+    let wide = |width: u32| Detection {
+        left: 0,
+        top: 10,
+        width,
+        height: 4,
+        ..detection(Class::Car, 0.9, &pixels(0, 0, 1, 1), &mask)
+    };
+    let count = |width| admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &[wide(width)]).0;
+    assert_eq!((count(32_768).taken, count(32_769).bad_box, count(40_000).bad_box), (1, 1, 1));
+}
+
+#[test]
+fn of_a_box_half_beside_the_image_the_half_within_counts() {
+    let mask = vec![1; 3600];
+    for (left, within) in [(-30, 0), (370, 370)] {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            instances.admit(0, &[detection(Class::Car, 0.9, &pixels(left, 100, 60, 60), &mask)], [WIDTH, HEIGHT]);
+            let taken = instances.detections.all()[0];
+            assert_eq!(taken.place.pixels, pixels(within, 100, 30, 20));
+            assert_eq!(instances.masks_now().area(&taken.place), 30 * 20, "and no pixel beside it");
+        });
+    }
+}
+
+#[test]
+fn a_score_below_the_least_is_ignored() {
+    let mask = vec![1; 3600];
+    let car = |score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask);
+    let config = InstancesConfig { score_min: 0.4, ..any_size() };
+    let count = |score| admitted(&config, [WIDTH, HEIGHT], &[car(score)]).0;
+    assert_eq!([count(0.39), count(0.4)].map(|count| (count.taken, count.ignored)), [(0, 1), (1, 0)]);
+}
+
+#[test]
+fn a_score_of_minus_nothing_is_nothing() {
+    let mask = vec![1; 3600];
+    let cars = [-0.0, 0.5].map(|score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask));
+    let (count, scores, _) = admitted(&any_size(), [WIDTH, HEIGHT], &cars);
+    assert_eq!((count.covered, scores), (1, vec![0.5]), "the better one is on top");
+}
+
+#[test]
+fn of_two_alike_but_for_class_box_or_mask_the_same_is_on_top_in_either_order() {
+    let whole = vec![1; 3600];
+    let left: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 < 40)).collect();
+    let right: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 >= 20)).collect();
+    let car = detection(Class::Car, 0.5, &pixels(10, 10, 60, 60), &whole);
+    let pairs = [
+        [car, Detection { class: Class::Van, ..car }],
+        [car, Detection { left: 11, ..car }],
+        [Detection { mask: &left, ..car }, Detection { mask: &right, ..car }],
+    ];
+    for [a, b] in pairs {
+        let seen = |order: [Detection<'_>; 2]| {
+            with(&CAPACITY, &any_size(), |instances, _| {
+                instances.admit(0, &order, [WIDTH, HEIGHT]);
+                let (masks, taken) = (instances.masks_now(), instances.detections.all());
+                taken.iter().map(|taken| (taken.class(), taken.place.pixels, masks.area(&taken.place))).collect::<Vec<_>>()
+            })
+        };
+        let digest = |order: [Detection<'_>; 2]| admitted(&any_size(), [WIDTH, HEIGHT], &order).2;
+        assert_eq!(seen([a, b]), seen([b, a]));
+        assert_eq!(digest([a, b]), digest([b, a]));
+    }
+}

@@ -1,10 +1,15 @@
 //! Stories of instances, on scenes of points with closed answers.
 
 mod detections;
+mod full;
+mod gaps;
 mod masks;
+mod matches;
 mod motions;
 mod objects;
+mod settings;
 mod tracks;
+mod volumes;
 
 use super::*;
 use crate::{
@@ -88,6 +93,8 @@ pub(super) struct Drive<'i, 's, 't> {
     pub estimator: &'i mut Estimator<'t>,
     pub frame: u32,
     pub t_world_camera: Transform,
+    /// Whether the camera's pose is known, and not a guess.
+    pub known: bool,
     pub sink: Taken,
     before: Vec<Option<Transform>>,
 }
@@ -99,6 +106,7 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
             estimator,
             frame: 0,
             t_world_camera: Transform::identity(),
+            known: true,
             sink: Taken::default(),
             before: Vec::new(),
         }
@@ -153,7 +161,7 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
         let camera = CameraMotion {
             t_world_camera,
             t_current_previous: (self.frame > 0).then_some(t_current_previous),
-            known: true,
+            known: self.known,
         };
         self.instances.admit(self.frame, &detections, [WIDTH, HEIGHT]);
         self.instances.claim(&matches, &[]);
@@ -176,6 +184,27 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
 pub(super) fn detection<'a>(class: Class, score: f32, pixels: &PixelBox, mask: &'a [u8]) -> Detection<'a> {
     let &PixelBox { left, top, width, height } = pixels;
     Detection { class, score, left, top, width: width as u32, height: height as u32, mask }
+}
+
+/// Takes a frame of a camera that stands: detections and matches as they are given, and no depth.
+pub(super) fn take_frame(
+    instances: &mut Instances<'_>,
+    estimator: &mut Estimator<'_>,
+    frame: u32,
+    detections: &[Detection<'_>],
+    [refined, sparse]: [&[Match]; 2],
+) {
+    let camera = CameraMotion {
+        t_world_camera: Transform::identity(),
+        t_current_previous: (frame > 0).then(Transform::identity),
+        known: true,
+    };
+    instances.admit(frame, detections, [WIDTH, HEIGHT]);
+    instances.claim(refined, sparse);
+    instances.follow(&RIG, refined, sparse, &camera, estimator);
+    let (grey, nothing) = (vec![128u8; WIDTH * HEIGHT], vec![0u16; WIDTH * HEIGHT]);
+    let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
+    instances.reconstruct(&RIG, &picture, View::new(&nothing, WIDTH, HEIGHT).unwrap(), &camera, &Serial, &mut NoSink);
 }
 
 /// No detection is too small.

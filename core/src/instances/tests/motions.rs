@@ -95,7 +95,7 @@ fn the_camera_listens_to_no_moving_car_and_to_no_large_one_of_unknown_state() {
         })
     };
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)];
-    let config = InstancesConfig { large_share: 0.05, ..any_size() };
+    let config = any_size();
     assert!(!guides(&config, 6, &ahead, &Board::CAR), "known to move");
     assert!(guides(&config, 6, &parked, &Board::CAR), "known to stand");
     let small = Board { half_m: [0.9, 0.5], ..Board::CAR };

@@ -77,6 +77,7 @@ fn a_track_unseen_for_more_than_fifty_frames_is_forgotten() {
                 take(instances, frame, &[]);
             }
             assert_eq!(take(instances, gap, &[car(100)]), [id], "gap {gap}");
+            assert_eq!(instances.report.tracks.forgotten, id - 1);
         });
     }
 }
@@ -101,10 +102,92 @@ fn a_mask_that_stops_filling_its_box_still_overlaps_by_what_it_fills() {
     // Two diagonal halves of one box: full overlap as boxes, almost none as masks.
     let half = |upper: bool| -> Vec<u8> { (0..3600).map(|i| u8::from((i % 60 > i / 60) == upper)).collect() };
     let (upper, lower) = (half(true), half(false));
-    for (overlap, id) in [(Overlap::Mask, 2), (Overlap::Box, 1)] {
+    for (overlap, id) in [(any_size().overlap, 2), (Overlap::Box, 1)] {
         with(&CAPACITY, &InstancesConfig { overlap, ..any_size() }, |instances, _| {
             take(instances, 0, &[Detection { mask: &upper, ..car(100) }]);
             assert_eq!(take(instances, 1, &[Detection { mask: &lower, ..car(100) }]), [id]);
         });
     }
+}
+
+#[test]
+fn a_car_that_speeds_up_is_looked_for_where_it_goes() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        for (frame, left) in [(0, 20), (1, 40), (2, 80), (3, 130), (4, 180)] {
+            assert_eq!(take(instances, frame, &[car(left)]), [1], "{left} px: the last two steps are nearly the car's width");
+        }
+    });
+}
+
+#[test]
+fn a_movement_goes_on_over_a_gap_by_its_frames_up_to_four_of_them() {
+    let found = |gap: u32, left: i32| {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            take(instances, 0, &[car(20)]);
+            take(instances, 1, &[car(40)]);
+            take(instances, 1 + gap, &[car(left)]) == [1]
+        })
+    };
+    assert_eq!([found(3, 100), found(3, 60)], [true, false], "three times 20 px");
+    assert_eq!([found(9, 120), found(9, 220)], [true, false], "four times at most");
+}
+
+#[test]
+fn a_movement_over_a_gap_is_shared_among_its_frames() {
+    with(&CAPACITY, &InstancesConfig { association_min: 0.01, ..any_size() }, |instances, _| {
+        take(instances, 0, &[car(100)]);
+        assert_eq!(take(instances, 3, &[car(130)]), [1]);
+        assert_eq!(instances.tracks.all()[0].drift, [10, 0]);
+    });
+}
+
+#[test]
+fn of_equals_the_first_detection_and_the_older_track_are_joined_and_each_once() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        take(instances, 0, &[car(100)]);
+        // As near on either side.
+        assert_eq!(take(instances, 1, &[car(70), car(130)]), [1, 2]);
+        let lefts: Vec<i32> = instances.tracks().map(|track| track.pixels.left).collect();
+        assert_eq!(lefts, [70, 130]);
+    });
+    with(&CAPACITY, &any_size(), |instances, _| {
+        take(instances, 0, &[car(70), car(130)]);
+        assert_eq!(take(instances, 1, &[car(100)]), [1], "and not both of them");
+    });
+}
+
+#[test]
+fn a_class_holds_until_others_were_seen_more_often() {
+    let heard = |classes: &[Class]| {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            let hear = |(frame, class): (u32, &Class)| {
+                take(instances, frame, &[Detection { class: *class, ..car(100) }]);
+                instances.tracks().next().unwrap().class
+            };
+            (0..).zip(classes).map(hear).collect::<Vec<_>>()
+        })
+    };
+    use Class::{Car, Truck, Van};
+    assert_eq!(heard(&[Car, Car, Truck, Car, Van, Truck]), [Car, Car, Car, Car, Car, Truck]);
+    assert_eq!(heard(&[Truck, Car, Car]), [Truck, Car, Car]);
+}
+
+#[test]
+fn a_small_thing_that_grows_is_something_though_no_motion_was_measured() {
+    let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
+    let grown = detection(Class::Car, 0.9, &PixelBox { left: 98, top: 28, width: 16, height: 16 }, &MASK[..256]);
+    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+        assert_eq!([take(instances, 0, &[small]), take(instances, 1, &[grown])], [vec![], vec![1]]);
+    });
+}
+
+#[test]
+fn what_a_pixel_shows_is_the_best_thing_whose_mask_holds_it() {
+    with(&Capacity { tracks: 1, ..CAPACITY }, &any_size(), |instances, _| {
+        let half: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 < 30)).collect();
+        let walker = Detection { class: Class::Person, score: 0.5, ..car(100) };
+        take(instances, 0, &[walker, Detection { mask: &half, ..car(100) }]);
+        let shown = |u| instances.at(u, 50).map(|thing| (thing.class, thing.track));
+        assert_eq!([shown(110), shown(140), shown(99)], [Some((Class::Car, Some(1))), Some((Class::Person, None)), None]);
+    });
 }
