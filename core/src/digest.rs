@@ -124,10 +124,11 @@ fn take(lanes: &mut [u64; LANES], stripe: &[u8; STRIPE_BYTES]) {
     }
 }
 
-/// The product of both halves, and the halves swapped.
+/// The product of both halves, and the halves swapped. Two shifts in place of one rotation: that, compilers put into vectors.
 #[inline]
 const fn mixed(x: u64) -> u64 {
-    (x & 0xFFFF_FFFF).wrapping_mul(x >> 32).wrapping_add(x.rotate_left(32))
+    let (low, high) = (x & 0xFFFF_FFFF, x >> 32);
+    low.wrapping_mul(high).wrapping_add(high | x << 32)
 }
 
 /// Spreads every bit over all others, and back no two into one (the finisher of `SplitMix64`).
