@@ -12,7 +12,13 @@
 //! | 8, 8 | fingerprint of the capacity, of the configuration: a digest of their `Debug` text |
 //! | 4, 4, 4 | frames taken, image width and height, px (0 before the first frame) |
 //! | | the last pair, the camera, tracks, masks and objects, the static map |
-//! | 8 | digest of everything before |
+//! | 8 | checksum of everything before |
+//!
+//! What the checksum notices: the walk hands over pieces, and each word of eight bytes of a piece goes into one word of state by steps that can be
+//! undone. So a change within one such word, a flipped bit or a whole byte, ends in another checksum for certain, wherever it is, as long as
+//! as many bytes are read; changes in several words do but for one chance in 2^64. A change that alters how many bytes are read, in a count,
+//! has the walk end before or behind the checksum: the source ends too early, or other bytes are taken for the checksum, with the same
+//! chance. A caller whose source knows its end makes that certain too by asking that nothing is left.
 //!
 //! Memory: none beside the mapper's. Bytes: about those of the blocks in use, and of what waits to be pruned.
 
@@ -22,7 +28,7 @@ use core::fmt::{self, Write};
 /// What a snapshot begins with.
 pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 /// Version of the layout. Another one is refused: there is no conversion.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Why a mapper cannot be restored. There is no mapper then; the slab may be used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,22 +138,47 @@ pub(crate) trait Archive {
     }
 }
 
+/// Of the golden ratio: odd, so that multiplying by it can be undone.
+const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// The checksum under way. Not a [`Digest`], whose steps cannot be undone: two states may become one there, if hardly ever.
+struct Checksum(u64);
+
+impl Checksum {
+    const fn new() -> Self {
+        Self(MULTIPLIER)
+    }
+
+    /// Takes in a piece; its last word is filled up with zeros.
+    fn take(&mut self, piece: &[u8]) {
+        let (words, rest) = piece.as_chunks();
+        words.iter().for_each(|word| self.step(u64::from_le_bytes(*word)));
+        if !rest.is_empty() {
+            self.step(rest.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)));
+        }
+    }
+
+    fn step(&mut self, word: u64) {
+        self.0 = (self.0 ^ word).wrapping_mul(MULTIPLIER).rotate_left(29);
+    }
+}
+
 /// Writes.
 pub(crate) struct Writer<'f, F, E> {
     sink: &'f mut F,
-    digest: Digest,
+    checksum: Checksum,
     failure: Option<E>,
 }
 
 impl<'f, F: FnMut(&[u8]) -> Result<(), E>, E> Writer<'f, F, E> {
     pub fn new(sink: &'f mut F) -> Self {
-        Self { sink, digest: Digest::default(), failure: None }
+        Self { sink, checksum: Checksum::new(), failure: None }
     }
 
-    /// Writes the digest of all that was written.
+    /// Writes the checksum of all that was written.
     pub fn finish(mut self) -> Result<(), E> {
-        let mut digest = self.digest.finish();
-        self.u64(&mut digest);
+        let mut checksum = self.checksum.0;
+        self.u64(&mut checksum);
         self.failure.map_or(Ok(()), Err)
     }
 }
@@ -155,7 +186,7 @@ impl<'f, F: FnMut(&[u8]) -> Result<(), E>, E> Writer<'f, F, E> {
 impl<F: FnMut(&[u8]) -> Result<(), E>, E> Archive for Writer<'_, F, E> {
     fn raw(&mut self, bytes: &mut [u8]) {
         if self.failure.is_none() {
-            self.digest.bytes(bytes);
+            self.checksum.take(bytes);
             self.failure = (self.sink)(bytes).err();
         }
     }
@@ -167,13 +198,13 @@ impl<F: FnMut(&[u8]) -> Result<(), E>, E> Archive for Writer<'_, F, E> {
 /// Reads.
 pub(crate) struct Reader<'f, F, E> {
     source: &'f mut F,
-    digest: Digest,
+    checksum: Checksum,
     failure: Option<RestoreError<E>>,
 }
 
 impl<'f, F: FnMut(&mut [u8]) -> Result<(), E>, E> Reader<'f, F, E> {
     pub fn new(source: &'f mut F) -> Self {
-        Self { source, digest: Digest::default(), failure: None }
+        Self { source, checksum: Checksum::new(), failure: None }
     }
 
     /// Fails with `failure` unless `holds`, or with what failed before.
@@ -185,11 +216,11 @@ impl<'f, F: FnMut(&mut [u8]) -> Result<(), E>, E> Reader<'f, F, E> {
         }
     }
 
-    /// Compares the digest of all that was read with the one that follows.
+    /// Compares the checksum of all that was read with the one that follows.
     pub fn finish(mut self) -> Result<(), RestoreError<E>> {
-        let (expected, mut digest) = (self.digest.finish(), 0);
-        self.u64(&mut digest);
-        self.require(digest == expected, RestoreError::Damaged)
+        let (expected, mut checksum) = (self.checksum.0, 0);
+        self.u64(&mut checksum);
+        self.require(checksum == expected, RestoreError::Damaged)
     }
 }
 
@@ -201,7 +232,7 @@ impl<F: FnMut(&mut [u8]) -> Result<(), E>, E> Archive for Reader<'_, F, E> {
         if self.failure.is_some() {
             bytes.fill(0);
         }
-        self.digest.bytes(bytes);
+        self.checksum.take(bytes);
     }
 
     fn refuse(&mut self) {
@@ -225,4 +256,48 @@ pub(crate) fn fingerprint(value: &impl fmt::Debug) -> u64 {
     // Writing into a digest cannot fail.
     let _ = write!(text, "{value:?}");
     text.0.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// What the multiplier is undone by: each round doubles the bits that are right.
+    fn inverse() -> u64 {
+        (0..6).fold(MULTIPLIER, |inverse, _| inverse.wrapping_mul(2u64.wrapping_sub(MULTIPLIER.wrapping_mul(inverse))))
+    }
+
+    #[test]
+    fn a_step_of_the_checksum_can_be_undone_so_that_one_changed_word_is_never_lost() {
+        assert_eq!(MULTIPLIER.wrapping_mul(inverse()), 1);
+        let mut random = Random::new(3);
+        let mut any = || u64::from(random.below(u32::MAX)) << 32 | u64::from(random.below(u32::MAX));
+        for _ in 0..10_000 {
+            let (state, word) = (any(), any());
+            let mut sum = Checksum(state);
+            sum.step(word);
+            let undone = sum.0.rotate_right(29).wrapping_mul(inverse());
+            assert_eq!((undone ^ word, undone ^ state), (state, word), "the state from the word, and the word from the state");
+        }
+    }
+
+    #[test]
+    fn every_bit_of_a_piece_of_any_length_counts() {
+        let bytes: [u8; 67] = core::array::from_fn(|at| (at * 37) as u8);
+        for len in [1, 7, 8, 9, 64, 67] {
+            let of = |piece: &[u8]| {
+                let mut sum = Checksum::new();
+                sum.take(piece);
+                sum.take(&bytes);
+                sum.0
+            };
+            let clean = of(&bytes[..len]);
+            for bit in 0..8 * len {
+                let mut flipped = bytes;
+                flipped[bit / 8] ^= 1 << (bit % 8);
+                assert_ne!(of(&flipped[..len]), clean, "bit {bit} of {len} bytes");
+            }
+        }
+    }
 }
