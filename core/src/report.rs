@@ -35,6 +35,7 @@ impl Severity {
 
 /// How the camera's pose came about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum PoseOrigin {
     /// The first frame: the camera is the world, or where it is said to be.
     #[default]
@@ -49,6 +50,7 @@ pub enum PoseOrigin {
 
 /// The state of a block pool after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BlockCount {
     /// Blocks in use.
     pub used: u32,
@@ -62,6 +64,7 @@ pub struct BlockCount {
 
 /// One step.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Report {
     /// Number of the frame, from 0.
     pub frame: u32,

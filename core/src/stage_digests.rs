@@ -50,6 +50,7 @@ impl fmt::Display for Digested {
 
 /// The digest of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ObjectDigest {
     /// Number of its track; 0 where there is no object.
     pub id: u32,
@@ -59,6 +60,7 @@ pub struct ObjectDigest {
 
 /// The digests of all objects that have a volume, by id.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ObjectDigests([ObjectDigest; MAX_OBJECTS]);
 
 impl ObjectDigests {
@@ -89,6 +91,7 @@ impl fmt::Display for ObjectDigests {
 
 /// The digests of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StageDigests {
     /// See [`Digested::Input`]: a changed decoder is told from a changed core.
     pub input: u64,

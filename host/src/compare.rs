@@ -121,9 +121,7 @@ impl Run {
         };
         let (frames, config, summary) = (text("frames.csv")?, text("config.toml")?, text("summary.json")?);
         let damaged = |file: &str, reason: String| CompareError::Damaged { path: folder.join(file), reason };
-        let mut settings = BTreeMap::new();
-        let table: toml::Table = toml::from_str(&config).map_err(|error| damaged("config.toml", error.message().to_owned()))?;
-        flatten("", &table, &mut settings);
+        let mut settings = settings(&config).map_err(|error| damaged("config.toml", error.message().to_owned()))?;
         let summary: serde_json::Value = serde_json::from_str(&summary).map_err(|error| damaged("summary.json", error.to_string()))?;
         for key in ["dataset", "profile"] {
             if let Some(value) = summary.get(key).and_then(serde_json::Value::as_str) {
@@ -159,10 +157,18 @@ pub fn compare(a: &Run, b: &Run) -> Result<Comparison, CompareError> {
     Ok(comparison)
 }
 
-fn differing(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Setting> {
+/// The settings of two runs that differ, by key.
+pub(crate) fn differing(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Setting> {
     let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
     let pairs = keys.into_iter().map(|key| Setting { key: key.clone(), values: [a.get(key).cloned(), b.get(key).cloned()] });
     pairs.filter(|setting| setting.values[0] != setting.values[1]).collect()
+}
+
+/// The settings in a `config.toml`, by dotted key.
+pub(crate) fn settings(config_toml: &str) -> Result<BTreeMap<String, String>, toml::de::Error> {
+    let mut settings = BTreeMap::new();
+    flatten("", &toml::from_str(config_toml)?, &mut settings);
+    Ok(settings)
 }
 
 fn flatten(prefix: &str, table: &toml::Table, settings: &mut BTreeMap<String, String>) {

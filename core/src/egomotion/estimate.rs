@@ -21,6 +21,7 @@ const ROUNDS: usize = 3;
 
 /// How an estimate went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MotionStatus {
     /// There is a motion, and its refinement converged.
     #[default]
@@ -37,6 +38,7 @@ pub enum MotionStatus {
 
 /// A motion, or why there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionEstimate {
     /// How it went.
     pub status: MotionStatus,

@@ -2,6 +2,7 @@
 
 /// A kind of thing. One neutral list; names of PASCAL VOC, COCO, Cityscapes and KITTI map to it by [`Class::from_name`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
 pub enum Class {
     /// Nothing that moves by itself, or nothing known.

@@ -58,6 +58,7 @@ impl Detection<'_> {
 
 /// What became of a frame's detections. Each detection is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DetectionCount {
     /// Handed in.
     pub given: u32,

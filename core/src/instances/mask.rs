@@ -12,6 +12,7 @@ const WORD: i32 = 64;
 
 /// A box of pixels: it holds columns `left .. left + width` and rows `top .. top + height`. It may lie partly or wholly beside the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct PixelBox {
     /// First column, px.

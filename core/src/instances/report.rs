@@ -45,6 +45,7 @@ pub struct TrackReport {
 
 /// What became of volumes in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ObjectCount {
     /// Objects with a volume.
     pub objects: u32,
@@ -68,6 +69,7 @@ pub struct ObjectCount {
 
 /// One frame's instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InstancesReport {
     /// What became of the detections.
     pub detections: DetectionCount,

@@ -24,6 +24,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// What is known about a thing's motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
 pub enum State {
     /// It may move or not.

@@ -127,6 +127,7 @@ impl Track {
 
 /// What became of detections and tracks in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TrackCount {
     /// Tracks there are.
     pub tracks: u32,

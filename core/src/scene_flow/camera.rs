@@ -13,6 +13,7 @@ use crate::{
 
 /// Counts of one image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FeatureCount {
     /// Features of the dense pass kept.
     pub dense: u32,

@@ -4,6 +4,7 @@ use super::camera::FeatureCount;
 
 /// How a frame's scene flow went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FlowStatus {
     /// Matches against the previous frame were looked for.
     #[default]
@@ -16,6 +17,7 @@ pub enum FlowStatus {
 
 /// Counts of one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PassCount {
     /// Circles that closed.
     pub closed: u32,
@@ -27,6 +29,7 @@ pub struct PassCount {
 
 /// One frame's scene flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlowReport {
     /// How it went.
     pub status: FlowStatus,

@@ -2,6 +2,7 @@
 
 /// How a frame ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum StereoStatus {
     /// Disparities were computed; how many the counts say.
     #[default]
@@ -22,6 +23,7 @@ pub enum StereoStatus {
 
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StereoReport {
     /// How it ended.
     pub status: StereoStatus,

@@ -23,6 +23,7 @@ const SEEN_ENTRIES: usize = 1 << 14;
 
 /// What one frame's allocation did. Requests refused repeat when several rays ask for the same block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AllocationReport {
     /// Blocks made.
     pub made: u32,

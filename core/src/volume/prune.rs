@@ -10,6 +10,7 @@ use super::{BLOCK_VOXELS, Volume};
 
 /// What pruning did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PruneReport {
     /// Blocks visited.
     pub visited: u32,

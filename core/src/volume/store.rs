@@ -57,6 +57,7 @@ impl BlockStore for NoStore {
 
 /// Blocks that left and came back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EvictionReport {
     /// Blocks that left and were kept.
     pub kept: u32,

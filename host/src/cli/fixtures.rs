@@ -4,6 +4,7 @@ use crate::export::write_whole;
 use crate::fixtures::{self, Blessing, Verdict};
 use anyhow::bail;
 use dynvox_core::Serial;
+use std::io::Write;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -59,7 +60,7 @@ pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
         }
         Action::Pack { fixture, out } => {
             let bytes = fixtures::pack(fixture)?;
-            write_whole(out, &bytes)?;
+            write_whole(out, |file| file.write_all(&bytes))?;
             println!("{} bytes in {}", bytes.len(), out.display());
         }
     }

@@ -24,6 +24,8 @@ Examples:
   dynvox run ~/kitti --sequence 06 --profile small --scale 0.5
   dynvox run --set volume.voxel_size_m=0.1 --set street.seed=7 --out out/coarse
   dynvox run --config out/coarse/config.toml    the same again
+  dynvox run ~/kitti --sequence 06 --snapshot-every 100 --out out/long
+  dynvox run --resume out/long                  what stopped goes on from its last snapshot
   dynvox budget --profile small                 where the bytes of a profile go
   dynvox run ~/kitti --sequence 06 --evaluate lidar     accuracy and completeness of input and map
   dynvox evaluate trajectory out/kitti-odometry-06-001 ~/kitti/poses/06.txt

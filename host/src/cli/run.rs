@@ -1,11 +1,13 @@
 //! `dynvox run`.
 
+mod resume;
+
 use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
 use crate::depth::{self, DepthChoice};
 use crate::export::{self, FolderError, RunFolder, Summary};
-use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, Reference, RunError, RunRecord, Streaming};
+use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, Reference, RunError, RunRecord, Stopped, Streaming};
 use crate::segmentation::{self, Choice};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
@@ -90,6 +92,14 @@ pub struct RunArgs {
     /// Fail when the process holds more than so many MiB [default: the slab and 256]
     #[arg(long, value_name = "MIB")]
     rss_limit_mib: Option<u64>,
+    /// Write a snapshot every N frames, so that a run that was stopped can go on: at most N frames are mapped again. --evaluate holds more than
+    /// a snapshot does, and cannot be had with it
+    #[arg(long, value_name = "N", conflicts_with = "evaluate")]
+    snapshot_every: Option<usize>,
+    /// Let a stopped run go on from its last snapshot, into RUN_FOLDER, where it was to end. Settings and data set are those it was begun with; only
+    /// --threads, --rss-limit-mib, --snapshot-every, --json and --quiet may be given anew
+    #[arg(long, value_name = "RUN_FOLDER", conflicts_with_all = resume::BEGUN)]
+    resume: Option<PathBuf>,
     /// Folder for the results [default: out/<data set>-NNN]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -180,6 +190,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         config: settings.config(dataset.rig()),
         config_toml: settings.to_toml(args.path.is_none())?,
         threads,
+        snapshots: None,
         streaming: (!args.no_stream).then_some(Streaming {
             most_bytes: args.stream_mib.map(|mib| mib.saturating_mul(MIB)),
             keep_file: args.keep_blocks,
@@ -194,29 +205,48 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
 }
 
 /// Maps into a folder, and tells what does not fit with what would.
-fn map(plan: &Plan, folder: &RunFolder) -> anyhow::Result<RunRecord> {
-    harness::run(plan, folder).map_err(|error| match error {
+fn map(plan: &Plan, folder: &RunFolder, stopped: Option<Stopped>) -> anyhow::Result<RunRecord> {
+    harness::run(plan, folder, stopped).map_err(|error| match error {
         RunError::ImageSize { .. } | RunError::Window { .. } => anyhow::anyhow!("{error}\n\n{}", super::budget::table(&plan.config.volume)),
+        error @ (RunError::Resume(_) | RunError::Reopen(_)) => error.into(),
+        error if folder.snapshot().is_file() => {
+            anyhow::anyhow!(
+                "{error}.\nWhat was mapped before is kept: `dynvox run --resume {}` lets the run go on",
+                folder.target().display()
+            )
+        }
         error => error.into(),
     })
 }
 
 /// A run of which no folder stays.
 pub fn record(args: &RunArgs, workshop: &Path) -> anyhow::Result<RunRecord> {
-    map(&plan(args)?, &RunFolder::begin(workshop, true)?)
+    map(&plan(args)?, &RunFolder::begin(workshop, true)?, None)
 }
 
 pub fn run(args: &RunArgs) -> anyhow::Result<()> {
-    let plan = plan(args)?;
+    if let Some(target) = &args.resume {
+        return resume::run(args, target);
+    }
+    let mut plan = plan(args)?;
+    plan.snapshots = args.snapshot_every.map(|every| resume::snapshots(&plan, every)).transpose()?;
     let target = args.out.clone().unwrap_or_else(|| RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name()));
     let folder = RunFolder::begin(&target, args.overwrite)?;
     if !args.silent() {
         introduce(&plan);
+        if plan.snapshots.is_some() {
+            eprintln!("note: should it be stopped, `dynvox run --resume {}` lets it go on", target.display());
+        }
     }
-    let record = map(&plan, &folder)?;
+    finish(args, &plan, folder, None)
+}
+
+/// Maps, writes what there is to say of it, and puts the folder in its place.
+fn finish(args: &RunArgs, plan: &Plan, folder: RunFolder, stopped: Option<Stopped>) -> anyhow::Result<()> {
+    let record = map(plan, &folder, stopped)?;
     let summary = Summary::of(&record);
     write(&folder, &record, &summary)?;
-    let place = folder.commit()?;
+    let place = folder.commit(&record.served())?;
     if args.json {
         println!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {
@@ -312,7 +342,7 @@ fn conclude(run: &RunRecord, place: &Path) {
 fn lost_because(run: &RunRecord) -> String {
     match &run.shelf_failure {
         Some(failure) => format!("map.blocks took no more ({failure}). Free the disk, or raise --stream-mib"),
-        None if run.streaming => "map.blocks could not be read back whole. Look after the disk".to_owned(),
+        None if run.streaming.is_some() => "map.blocks could not be read back whole. Look after the disk".to_owned(),
         None => "the pool was full. Run without --no-stream, or choose a larger --profile".to_owned(),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::dataset::ExactFrame;
 use dynvox_core::image::View;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Farthest pixels compared, m: as far as depth is fused.
 const FAR_M: f32 = 20.0;
@@ -31,7 +31,7 @@ pub struct ExactFigures {
 }
 
 /// Collects errors over frames in a histogram: memory does not grow.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct ExactErrors {
     errors: Vec<u64>,
     depths: Vec<u64>,

@@ -11,7 +11,7 @@ use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::View;
 use dynvox_core::volume::Triangle;
 use nalgebra::Point3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// Side of the cells samples are made of, m.
@@ -37,7 +37,7 @@ pub struct TrueView<'a> {
 }
 
 /// What was seen of a thing while it was fused.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct SeenSide {
     /// Sum of the points in a cell, and their number.
     cells: HashMap<[i32; 3], [f64; 4]>,
@@ -47,7 +47,7 @@ pub struct SeenSide {
 }
 
 /// A mesh against the true surface.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceFigures {
     /// Median distance of the mesh's triangles to what was seen of the true surface, m; `None` where the most lie beyond the reach.
     #[serde(skip_serializing_if = "Option::is_none")]

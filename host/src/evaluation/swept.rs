@@ -4,8 +4,9 @@
 
 use crate::dataset::TrueObject;
 use dynvox_core::geometry::Transform;
-use hashbrown::HashMap;
 use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -18,7 +19,7 @@ const SIDE_M: f64 = 0.1;
 const SQUARE_M: f64 = 4.0;
 
 /// A box of one frame.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 struct SweptBox {
     t_object_map: Transform,
     /// Width, height, length.
@@ -33,7 +34,7 @@ impl SweptBox {
 }
 
 /// The volume moving things swept.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Swept {
     boxes: Vec<SweptBox>,
     /// The boxes that may reach into each square of ground.

@@ -74,7 +74,7 @@ fn an_abandoned_run_folder_leaves_nothing_and_a_finished_one_stands_whole() {
     let folder = RunFolder::begin(&target, false).unwrap();
     fs::write(folder.file("summary.json"), "{}").unwrap();
     assert!(!target.exists(), "not before it is whole");
-    assert_eq!(folder.commit().unwrap(), target);
+    assert_eq!(folder.commit(&[]).unwrap(), target);
     assert!(RunFolder::begin(&target, false).unwrap_err().to_string().contains("--overwrite"));
     let folder = RunFolder::begin(&target, true).unwrap();
     fs::write(folder.file("summary.json"), "{2}").unwrap();
@@ -82,7 +82,7 @@ fn an_abandoned_run_folder_leaves_nothing_and_a_finished_one_stands_whole() {
     assert_eq!(fs::read_to_string(target.join("summary.json")).unwrap(), "{}", "a failed run does not touch the one before");
     let folder = RunFolder::begin(&target, true).unwrap();
     fs::write(folder.file("new"), "").unwrap();
-    folder.commit().unwrap();
+    folder.commit(&[]).unwrap();
     assert!(target.join("new").exists() && !target.join("summary.json").exists());
     assert_eq!(fs::read_dir(root.path().join("a")).unwrap().count(), 1);
     assert!(RunFolder::begin(&target, true).unwrap_err().to_string().contains("is not a run folder"), "another's folder is left alone");

@@ -1,6 +1,6 @@
 //! Why a run ends early, in sentences.
 
-use super::Reference;
+use super::{Reference, ResumeError};
 use crate::dataset::DatasetError;
 use crate::export::FolderError;
 use crate::store::StoreError;
@@ -95,7 +95,13 @@ pub enum RunError {
     },
     /// The block file.
     #[error("blocks that leave the pool cannot be kept: {0}. Free the disk, or run with --no-stream")]
-    Store(#[from] StoreError),
+    Store(StoreError),
+    /// The block file of a run that goes on.
+    #[error(transparent)]
+    Reopen(StoreError),
+    /// A stopped run that cannot go on.
+    #[error(transparent)]
+    Resume(#[from] ResumeError),
     /// A strict run's map was harmed.
     #[error("frame {frame} harms the map: {cause}. Without --strict the run goes on and counts it")]
     Strict {

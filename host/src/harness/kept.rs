@@ -1,18 +1,21 @@
 //! Objects that leave the mapper: their meshes and where they were, written as they go.
 
 use crate::evaluation::surfaces::{SeenSide, SurfaceFigures};
-use crate::export::{FolderError, PlyWriter, portrait, write_numbered};
+use crate::export::{FolderError, PlyWriter, RunFolder, portrait, write_numbered};
 use dynvox_core::geometry::Transform;
 use dynvox_core::instances::{Class, ObjectSink, RetiredObject, State};
 use dynvox_core::volume::{MeshConfig, Triangle};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+/// Name of their folder in the run folder.
+const FOLDER: &str = "objects";
 /// Objects shown with a picture, at most: those fused most often.
 const PORTRAITS: usize = 24;
 
 /// An object handed over by the mapper.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct KeptObject {
     /// Number of its track.
     pub id: u32,
@@ -36,19 +39,26 @@ pub struct KeptObject {
     pub portrait_png: Vec<u8>,
 }
 
-/// Takes objects that leave the mapper and writes their meshes.
+/// Objects that left the mapper, and what is known of those still in it.
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Kept {
-    folder: PathBuf,
-    mesh: MeshConfig,
     /// Where each object that is still in the mapper was when it was fused: by track and chain.
     paths: BTreeMap<(u32, u32), Vec<(usize, Transform)>>,
     /// What was really there of each, where that is known.
     sides: BTreeMap<(u32, u32), SeenSide>,
     kept: Vec<KeptObject>,
+}
+
+/// Takes objects as they leave, and writes their meshes.
+pub struct KeptSink<'r> {
+    into: &'r mut Kept,
+    /// Made with the first object.
+    folder: PathBuf,
+    mesh: &'r MeshConfig,
     failed: Option<FolderError>,
 }
 
-impl ObjectSink for Kept {
+impl ObjectSink for KeptSink<'_> {
     fn retire(&mut self, object: RetiredObject<'_, '_>) {
         // The run ends with the first failure; there is nothing to be done about more.
         if self.failed.is_none() {
@@ -58,16 +68,27 @@ impl ObjectSink for Kept {
 }
 
 impl Kept {
-    /// A sink that writes into `folder`, which is made with the first object.
-    pub(super) fn new(folder: PathBuf, mesh: MeshConfig) -> Self {
-        Self {
-            folder,
-            mesh,
-            paths: BTreeMap::new(),
-            sides: BTreeMap::new(),
-            kept: Vec::new(),
-            failed: None,
+    /// A sink for the objects that leave during a step, whose meshes go into the run folder.
+    pub(super) fn sink<'r>(&'r mut self, run: &RunFolder, mesh: &'r MeshConfig) -> KeptSink<'r> {
+        KeptSink { into: self, folder: run.file(FOLDER), mesh, failed: None }
+    }
+
+    /// Removes files of objects that left after the run had been stopped: they will leave again.
+    pub(super) fn tidy(&self, run: &RunFolder) -> Result<(), FolderError> {
+        let folder = run.file(FOLDER);
+        let failed = |source| FolderError::Write { path: folder.clone(), source };
+        if !folder.is_dir() {
+            return Ok(());
         }
+        for entry in folder.read_dir().map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let known = |one: &KeptObject| files(&one.name).iter().any(|file| entry.file_name() == file.as_str());
+            if !self.kept.iter().any(known) {
+                std::fs::remove_file(entry.path()).map_err(failed)?;
+            }
+        }
+        // Where none is left there is no folder either.
+        if self.kept.is_empty() { std::fs::remove_dir(&folder).map_err(failed) } else { Ok(()) }
     }
 
     /// Notes where an object is in a frame.
@@ -81,49 +102,8 @@ impl Kept {
     }
 
     /// All objects written, in that order.
-    pub(super) fn finish(&mut self) -> Result<Vec<KeptObject>, FolderError> {
-        match self.failed.take() {
-            Some(failed) => Err(failed),
-            None => Ok(std::mem::take(&mut self.kept)),
-        }
-    }
-
-    fn take(&mut self, object: &RetiredObject<'_, '_>) -> Result<(), FolderError> {
-        let summary = &object.summary;
-        let poses = self.paths.remove(&(summary.id, summary.chain)).unwrap_or_default();
-        let side = self.sides.remove(&(summary.id, summary.chain));
-        let mut triangles: Vec<Triangle> = Vec::new();
-        object.volume.triangles(&self.mesh, &mut |triangle| triangles.push(triangle));
-        if triangles.is_empty() {
-            return Ok(());
-        }
-        let before = self.kept.iter().filter(|known| known.id == summary.id).count();
-        let name = if before == 0 { summary.id.to_string() } else { format!("{}-{}", summary.id, before + 1) };
-        let path = self.folder.join(format!("{name}.ply"));
-        let written = std::fs::create_dir_all(&self.folder).and_then(|()| {
-            let mut ply = PlyWriter::begin_in(&path, "the object's own frame: the camera's when it was first seen")?;
-            triangles.iter().for_each(|one| ply.triangle(one.vertices.map(|vertex| (vertex.position_m, vertex.colour))));
-            ply.finish()
-        });
-        written.map_err(|source| FolderError::Write { path, source })?;
-        let path = self.folder.join(format!("{name}_kitti.txt"));
-        let mut text = Vec::new();
-        let written = write_numbered(&mut text, &poses).and_then(|()| std::fs::write(&path, text));
-        written.map_err(|source| FolderError::Write { path, source })?;
-        self.kept.push(KeptObject {
-            id: summary.id,
-            chain: summary.chain,
-            name,
-            class: summary.class,
-            state: summary.state,
-            frames: summary.frames,
-            blocks: object.volume.pool().len(),
-            triangles: triangles.len() as u64,
-            surface: side.and_then(|side| side.compare(&triangles, f64::from(object.volume.config().voxel_size_m))),
-            portrait_png: portrait(&triangles),
-        });
-        self.thin_portraits();
-        Ok(())
+    pub(super) fn finish(&mut self) -> Vec<KeptObject> {
+        std::mem::take(&mut self.kept)
     }
 
     /// Lets the picture of the object fused least often go when there are too many.
@@ -136,4 +116,55 @@ impl Kept {
             least.portrait_png = Vec::new();
         }
     }
+}
+
+impl KeptSink<'_> {
+    /// Whether all that left was written.
+    pub(super) fn end(self) -> Result<(), FolderError> {
+        self.failed.map_or(Ok(()), Err)
+    }
+
+    fn take(&mut self, object: &RetiredObject<'_, '_>) -> Result<(), FolderError> {
+        let summary = &object.summary;
+        let poses = self.into.paths.remove(&(summary.id, summary.chain)).unwrap_or_default();
+        let side = self.into.sides.remove(&(summary.id, summary.chain));
+        let mut triangles: Vec<Triangle> = Vec::new();
+        object.volume.triangles(self.mesh, &mut |triangle| triangles.push(triangle));
+        if triangles.is_empty() {
+            return Ok(());
+        }
+        let before = self.into.kept.iter().filter(|known| known.id == summary.id).count();
+        let name = if before == 0 { summary.id.to_string() } else { format!("{}-{}", summary.id, before + 1) };
+        let [mesh, poses_file] = files(&name);
+        let path = self.folder.join(mesh);
+        let written = std::fs::create_dir_all(&self.folder).and_then(|()| {
+            let mut ply = PlyWriter::begin_in(&path, "the object's own frame: the camera's when it was first seen")?;
+            triangles.iter().for_each(|one| ply.triangle(one.vertices.map(|vertex| (vertex.position_m, vertex.colour))));
+            ply.finish()
+        });
+        written.map_err(|source| FolderError::Write { path, source })?;
+        let path = self.folder.join(poses_file);
+        let mut text = Vec::new();
+        let written = write_numbered(&mut text, &poses).and_then(|()| std::fs::write(&path, text));
+        written.map_err(|source| FolderError::Write { path, source })?;
+        self.into.kept.push(KeptObject {
+            id: summary.id,
+            chain: summary.chain,
+            name,
+            class: summary.class,
+            state: summary.state,
+            frames: summary.frames,
+            blocks: object.volume.pool().len(),
+            triangles: triangles.len() as u64,
+            surface: side.and_then(|side| side.compare(&triangles, f64::from(object.volume.config().voxel_size_m))),
+            portrait_png: portrait(&triangles),
+        });
+        self.into.thin_portraits();
+        Ok(())
+    }
+}
+
+/// The files of an object: its mesh, and where it was.
+fn files(name: &str) -> [String; 2] {
+    [format!("{name}.ply"), format!("{name}_kitti.txt")]
 }

@@ -1,17 +1,17 @@
 //! What moves or could, over a run: objects as they leave the mapper, tracks, both against truth.
 
+use super::FrameRow;
 use super::kept::{Kept, KeptObject};
 use super::tracks::{TrackRecord, TrackRow, track_records};
-use super::{FrameRow, Plan};
 use crate::dataset::StereoImages;
 use crate::evaluation::objects::{Judged, ObjectErrors, ObjectFigures};
 use crate::evaluation::surfaces::TrueView;
 use crate::evaluation::swept::Swept;
-use crate::export::{FolderError, RunFolder};
+use crate::export::FolderError;
 use crate::segmentation::Refusals;
-use dynvox_core::geometry::StereoRig;
-use dynvox_core::instances::{DetectionCount, InstancesConfig, TrackReport};
-use dynvox_core::{Mapper, Report};
+use dynvox_core::instances::{DetectionCount, TrackReport};
+use dynvox_core::{Config, Mapper, Report};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// What moved or could, over the whole run.
@@ -34,53 +34,40 @@ pub struct ObjectsRecord {
 }
 
 /// The objects of a run under way.
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct ObjectsAtWork {
-    /// Takes retired objects.
-    pub sink: Kept,
+    /// What left the mapper.
+    pub(super) kept: Kept,
     errors: ObjectErrors,
     swept: Option<Swept>,
-    instances: InstancesConfig,
-    rig: StereoRig,
 }
 
 impl ObjectsAtWork {
-    /// Objects go into `objects` of the run folder; it is made with the first.
-    pub fn new(folder: &RunFolder, plan: &Plan) -> Self {
-        let sink = Kept::new(folder.file("objects"), plan.config.mesh);
-        Self {
-            sink,
-            errors: ObjectErrors::default(),
-            swept: None,
-            instances: plan.config.instances,
-            rig: plan.config.rig,
-        }
-    }
-
     /// Notes a frame; returns the tracks seen in it.
-    pub fn note(&mut self, frame: usize, mapper: &Mapper<'_>, images: &StereoImages, report: &Report) -> Vec<TrackRow> {
+    pub fn note(&mut self, config: &Config, frame: usize, mapper: &Mapper<'_>, images: &StereoImages, report: &Report) -> Vec<TrackRow> {
         let tracks: Vec<TrackReport> = mapper.tracks().filter(|track| track.seen).collect();
         for (summary, _) in mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame) {
-            self.sink.follow(frame, summary.id, summary.chain, summary.t_world_object);
+            self.kept.follow(frame, summary.id, summary.chain, summary.t_world_object);
         }
         if let Some(truth) = &images.objects {
             let width = images.left.width();
-            self.errors.add(&tracks, &report.t_world_camera, truth, |pixels| self.instances.large_enough(pixels.area(), width));
+            self.errors.add(&tracks, &report.t_world_camera, truth, |pixels| config.instances.large_enough(pixels.area(), width));
             if let Some(exact) = &images.exact {
                 let t_map_world = report.t_world_camera * truth.t_world_camera.inverse();
                 let swept = self.swept.get_or_insert_default();
                 truth.objects.iter().for_each(|object| swept.add(object, &t_map_world));
                 let Some(depth_m) = exact.depth_m.view() else { return tracks.iter().map(TrackRow::from).collect() };
                 let view = TrueView {
-                    rig: &self.rig,
+                    rig: &config.rig,
                     depth_m,
                     t_world_camera: truth.t_world_camera,
-                    far_m: f64::from(self.instances.volume.far_m),
+                    far_m: f64::from(config.instances.volume.far_m),
                 };
                 for (summary, _) in mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame) {
                     let thing = self.errors.truth_of(summary.id).and_then(|id| truth.objects.iter().find(|thing| thing.id == id));
                     if let Some(thing) = thing {
                         let t_thing_object = thing.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
-                        self.sink.side(summary.id, summary.chain).add(&view, thing, &t_thing_object);
+                        self.kept.side(summary.id, summary.chain).add(&view, thing, &t_thing_object);
                     }
                 }
             }
@@ -89,19 +76,18 @@ impl ObjectsAtWork {
     }
 
     /// Sums up. Call it when the mapper has handed over its last object.
-    pub fn finish(&mut self, rows: &[FrameRow]) -> Result<ObjectsRecord, FolderError> {
-        let kept = self.sink.finish()?;
+    pub fn finish(&mut self, rows: &[FrameRow]) -> ObjectsRecord {
         let mut refusals = Refusals::default();
         rows.iter().for_each(|row| refusals.add(&row.refusals));
-        Ok(ObjectsRecord {
+        ObjectsRecord {
             tracks: track_records(rows, &self.errors.tracks()),
-            kept,
+            kept: self.kept.finish(),
             figures: self.errors.figures(),
             judged: self.errors.rows(),
             swept_triangles: None,
             refusals,
             detections: rows.iter().fold(DetectionCount::default(), |sum, row| summed(sum, &row.report.instances.detections)),
-        })
+        }
     }
 
     /// Triangles of the finished static map where something drove.

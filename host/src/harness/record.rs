@@ -1,6 +1,6 @@
 //! What is remembered of a run: a row per frame, a few pictures, the figures at the end.
 
-use super::{LidarRecord, ObjectsRecord, ShelfUse, StageTime, TrackRow};
+use super::{LidarRecord, ObjectsRecord, ShelfUse, StageTime, Streaming, TrackRow, shelf};
 use crate::evaluation::{exact::ExactFigures, trajectory::TrajectoryErrors};
 use crate::export::Mesh;
 use crate::segmentation::Refusals;
@@ -11,9 +11,10 @@ use dynvox_core::instances::State;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Capacity, PoseOrigin, Report, Severity, Stage};
+use serde::{Deserialize, Serialize};
 
 /// One frame.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FrameRow {
     /// Number of the frame in the data set.
     pub frame: usize,
@@ -102,7 +103,7 @@ impl FrameRow {
 }
 
 /// Pictures of one frame, as PNG files.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Keyframe {
     /// Number of the frame in the data set.
     pub frame: usize,
@@ -174,8 +175,8 @@ pub struct RunRecord {
     pub rss_peak_bytes: Option<u64>,
     /// Blocks of the map in memory in the end.
     pub blocks: usize,
-    /// Whether blocks that left the pool were kept on disk.
-    pub streaming: bool,
+    /// How blocks that left the pool were kept on disk, if they were.
+    pub streaming: Option<Streaming>,
     /// What was kept.
     pub shelf: ShelfUse,
     /// Why nothing more was kept, if the disk failed.
@@ -196,6 +197,12 @@ impl RunRecord {
     /// Frames a second, over mapping and waiting for images.
     pub fn fps(&self) -> f64 {
         if self.mapping_seconds > 0.0 { self.rows.len() as f64 / self.mapping_seconds } else { 0.0 }
+    }
+
+    /// Files in the run folder that only served the making.
+    pub fn served(&self) -> Vec<&'static str> {
+        let stays = self.shelf.records > 0 && self.streaming.is_some_and(|streaming| streaming.keep_file);
+        if stays { Vec::new() } else { vec![shelf::FILE] }
     }
 
     /// Frames whose motion was held.

@@ -1,14 +1,14 @@
 //! Where blocks go that leave the pool during a run, and how pool and file become one mesh.
 
 use crate::export::{FolderError, Mesh, PlyWriter, RunFolder};
-use crate::store::{self, BlockFile, StoreError};
+use crate::store::{self, BlockFile, Position, StoreError};
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictionReport, LeavingBlock, ReturningBlock, Triangle};
 use dynvox_core::{Capacity, Config, Mapper};
 use hashbrown::HashSet;
 use std::fs::File;
 
 /// Name of the file in the run folder.
-const FILE: &str = "map.blocks";
+pub const FILE: &str = "map.blocks";
 
 /// How blocks that leave the pool are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,6 +55,19 @@ impl Shelf {
         Ok(Self(Some(file)))
     }
 
+    /// Opens the file of a run that goes on, as it was when it stopped.
+    pub fn resume(streaming: Option<Streaming>, folder: &RunFolder, config: &Config, at: Option<&Position>) -> Result<Self, StoreError> {
+        let (Some(streaming), Some(at)) = (streaming, at) else { return Ok(Self(None)) };
+        let mut file = BlockFile::reopen(&folder.file(FILE), config.volume.voxel_size_m, config.volume.truncation_m, at)?;
+        file.limit(streaming.most_bytes.unwrap_or(u64::MAX));
+        Ok(Self(Some(file)))
+    }
+
+    /// How far the file has come, if there is one; it is on the disk as far as that.
+    pub fn mark(&self) -> std::io::Result<Option<Position>> {
+        self.0.as_ref().map(BlockFile::mark).transpose()
+    }
+
     /// Why blocks are kept no longer, if so.
     pub fn failure(&self) -> Option<String> {
         self.0.as_ref().and_then(BlockFile::failure).map(ToString::to_string)
@@ -93,12 +106,11 @@ impl MeshOutput {
         self.shelf.failure()
     }
 
-    /// Adds what is on the shelf, reading it piece by piece into `slab`, and ends the file. The shelf goes unless it is to stay.
+    /// Adds what is on the shelf, reading it piece by piece into `slab`, and ends the file.
     pub fn finish(
         mut self,
         slab: &mut [u8],
         (capacity, config): (&Capacity, &Config),
-        keep_file: bool,
         folder: &RunFolder,
     ) -> Result<(Mesh, ShelfUse), FolderError> {
         let mut shelf_use = ShelfUse { end: self.report, ..ShelfUse::default() };
@@ -118,10 +130,6 @@ impl MeshOutput {
             self.ply.finish()
         })();
         let mesh = written.map_err(|source| FolderError::Write { path: folder.file("map.ply"), source })?;
-        if self.shelf.0.take().is_some() && !(keep_file && shelf_use.records > 0) {
-            let path = folder.file(FILE);
-            std::fs::remove_file(&path).map_err(|source| FolderError::Write { path, source })?;
-        }
         Ok((mesh, shelf_use))
     }
 }

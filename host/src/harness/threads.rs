@@ -6,6 +6,7 @@
 
 use cpu_time::ThreadTime;
 use dynvox_core::{Executor, Stage};
+use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -13,7 +14,7 @@ use std::time::{Duration, Instant};
 const STAGES: usize = Stage::ALL.len();
 
 /// What one stage took.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageTime {
     /// Wall time, ms.
     pub wall_ms: f64,

@@ -3,10 +3,11 @@
 use super::FrameRow;
 use crate::evaluation::objects::{TrackErrors, median};
 use dynvox_core::instances::{Class, PixelBox, State, TrackReport};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A track seen in a frame: what a run remembers of its report. 64 bytes, so that a long drive may have many.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrackRow {
     /// Its number.
     pub id: u32,

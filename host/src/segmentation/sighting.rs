@@ -2,6 +2,7 @@
 
 use crate::dataset::Image;
 use dynvox_core::instances::{Class, Detection, PixelBox};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Masks kept of one frame at most; the core takes fewer. Of more the lowest scores go, and are counted.
@@ -79,7 +80,7 @@ impl Sighting {
 }
 
 /// What a source said and could not be used, or not as it was said. Nothing is dropped without being counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusals {
     /// Frames without a file of masks: nothing is seen in them.
     pub missing: u32,

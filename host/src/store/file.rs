@@ -10,6 +10,7 @@ use super::places::{Places, Tile, tile_of};
 use super::record::{self, HEADER, Header, LONGEST};
 use dynvox_core::volume::{BlockCoord, BlockStore, LeavingBlock, ReturningBlock};
 use hashbrown::HashMap;
+use serde::{Deserialize, Serialize};
 use std::{
     fs::{File, OpenOptions},
     io::{self, BufReader, Read, Seek, SeekFrom, Write},
@@ -40,6 +41,20 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
+    /// It was there when the run stopped.
+    #[error("{path} is missing: it holds the blocks that had left the pool. Put it back, or begin the run again with --overwrite")]
+    Missing {
+        /// Where it was.
+        path: PathBuf,
+    },
+    /// It was changed after the run stopped.
+    #[error("{path} is not as the run left it: its first {bytes} bytes were cut short or changed. Begin the run again with --overwrite")]
+    Parted {
+        /// The store.
+        path: PathBuf,
+        /// Bytes it had then.
+        bytes: u64,
+    },
     /// The store was written with other voxels.
     #[error(
         "{path} holds blocks of {found_voxel_m} m voxels with {found_truncation_m} m truncation, not {voxel_m} m with {truncation_m} m; \
@@ -68,6 +83,19 @@ pub struct Opened {
     pub cut_bytes: u64,
 }
 
+/// How far a store had come, for a run that goes on from there: records are only ever added, so what it holds up to there is what it held then.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Position {
+    /// Bytes of the file.
+    pub bytes: u64,
+    records: u64,
+    /// CRC-32 of all records.
+    checksum: u32,
+    unreadable: u64,
+    /// Why keeping had ended, if it had.
+    failure: Option<String>,
+}
+
 /// A store over a file, or over anything that reads, writes and seeks.
 #[derive(Debug)]
 pub struct BlockFile<F> {
@@ -75,6 +103,8 @@ pub struct BlockFile<F> {
     places: Places,
     records: u64,
     end: u64,
+    /// Of all records.
+    checksum: crc32fast::Hasher,
     /// Bytes the file may grow to.
     most: u64,
     /// Why keeping ended.
@@ -91,10 +121,6 @@ impl BlockFile<File> {
         let at = |source| StoreError::Io { path: path.to_owned(), source };
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(at)?;
         let len = file.metadata().map_err(at)?.len();
-        let mut preamble = [0; PREAMBLE];
-        preamble[..8].copy_from_slice(&MAGIC);
-        preamble[8..12].copy_from_slice(&voxel_m.to_le_bytes());
-        preamble[12..].copy_from_slice(&truncation_m.to_le_bytes());
         let mut store = Self::over(file);
         if len < PREAMBLE as u64 {
             // New, or torn within its first bytes: nothing can have been kept in it.
@@ -102,14 +128,60 @@ impl BlockFile<File> {
                 return Err(StoreError::Foreign { path: path.to_owned() });
             }
             store.file.set_len(0).map_err(at)?;
+            let preamble = preamble(voxel_m, truncation_m);
             store.file.seek(SeekFrom::Start(0)).and_then(|_| store.file.write_all(&preamble)).map_err(at)?;
             return Ok((store, Opened { records: 0, cut_bytes: len }));
         }
-        let found = store.head(PREAMBLE as u64).map_err(at)?;
+        store.require(path, voxel_m, truncation_m)?;
+        store.scan(u64::MAX).map_err(at)?;
+        store.file.set_len(store.end).map_err(at)?;
+        let opened = Opened { records: store.records, cut_bytes: len - store.end };
+        Ok((store, opened))
+    }
+
+    /// Opens the store of a run that goes on, as it was at `position`; what was kept since is cut off.
+    pub fn reopen(path: &Path, voxel_m: f32, truncation_m: f32, position: &Position) -> Result<Self, StoreError> {
+        let at = |source| StoreError::Io { path: path.to_owned(), source };
+        let file = OpenOptions::new().read(true).write(true).open(path).map_err(|source| match source.kind() {
+            io::ErrorKind::NotFound => StoreError::Missing { path: path.to_owned() },
+            _ => at(source),
+        })?;
+        let mut store = Self::over(file);
+        let parted = || StoreError::Parted { path: path.to_owned(), bytes: position.bytes };
+        if store.file.metadata().map_err(at)?.len() < PREAMBLE as u64 {
+            return Err(parted());
+        }
+        store.require(path, voxel_m, truncation_m)?;
+        store.scan(position.bytes).map_err(at)?;
+        let checksum = store.checksum.clone().finalize();
+        if (store.end, store.records, checksum) != (position.bytes, position.records, position.checksum) {
+            return Err(parted());
+        }
+        store.file.set_len(store.end).map_err(at)?;
+        store.unreadable = position.unreadable;
+        store.failure = position.failure.clone().map(io::Error::other);
+        Ok(store)
+    }
+
+    /// Puts what is kept on the disk itself, and says how far that is.
+    pub fn mark(&self) -> io::Result<Position> {
+        self.file.sync_data()?;
+        Ok(Position {
+            bytes: self.end,
+            records: self.records,
+            checksum: self.checksum.clone().finalize(),
+            unreadable: self.unreadable,
+            failure: self.failure.as_ref().map(ToString::to_string),
+        })
+    }
+
+    /// Refuses a file that is no store, or one of other voxels.
+    fn require(&mut self, path: &Path, voxel_m: f32, truncation_m: f32) -> Result<(), StoreError> {
+        let found = self.head(PREAMBLE as u64).map_err(|source| StoreError::Io { path: path.to_owned(), source })?;
         if found[..8] != MAGIC {
             return Err(StoreError::Foreign { path: path.to_owned() });
         }
-        if found != preamble {
+        if found != preamble(voxel_m, truncation_m) {
             let float = |at: usize| f32::from_le_bytes([found[at], found[at + 1], found[at + 2], found[at + 3]]);
             return Err(StoreError::Otherwise {
                 path: path.to_owned(),
@@ -119,11 +191,16 @@ impl BlockFile<File> {
                 truncation_m,
             });
         }
-        store.scan().map_err(at)?;
-        store.file.set_len(store.end).map_err(at)?;
-        let opened = Opened { records: store.records, cut_bytes: len - store.end };
-        Ok((store, opened))
+        Ok(())
     }
+}
+
+fn preamble(voxel_m: f32, truncation_m: f32) -> [u8; PREAMBLE] {
+    let mut preamble = [0; PREAMBLE];
+    preamble[..8].copy_from_slice(&MAGIC);
+    preamble[8..12].copy_from_slice(&voxel_m.to_le_bytes());
+    preamble[12..].copy_from_slice(&truncation_m.to_le_bytes());
+    preamble
 }
 
 impl<F: Read + Write + Seek> BlockFile<F> {
@@ -135,6 +212,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
             places: Places::default(),
             records: 0,
             end: PREAMBLE as u64,
+            checksum: crc32fast::Hasher::new(),
             most: u64::MAX,
             failure: None,
             unreadable: 0,
@@ -235,12 +313,12 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         Ok(bytes)
     }
 
-    /// Indexes every whole record; `end` is behind the last one.
-    fn scan(&mut self) -> io::Result<()> {
+    /// Indexes every whole record that begins before `until`; `end` is behind the last one.
+    fn scan(&mut self, until: u64) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(PREAMBLE as u64))?;
         let mut reader = BufReader::with_capacity(1 << 20, &mut self.file);
         let (mut header, mut payload) = ([0; HEADER], Vec::with_capacity(LONGEST));
-        loop {
+        while self.end < until {
             match reader.read_exact(&mut header) {
                 Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(()),
                 read => read?,
@@ -252,9 +330,12 @@ impl<F: Read + Write + Seek> BlockFile<F> {
                 return Ok(());
             }
             self.places.enter(read.coord, self.end);
+            self.checksum.update(&header);
+            self.checksum.update(&payload);
             self.records += 1;
             self.end += (HEADER + read.len) as u64;
         }
+        Ok(())
     }
 
     /// The payload of the record at `at`, into `record`.
@@ -287,6 +368,7 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
         match self.append() {
             Ok(()) => {
                 self.places.enter(block.coord, self.end);
+                self.checksum.update(&self.record);
                 self.records += 1;
                 self.end += self.record.len() as u64;
                 true

@@ -7,5 +7,5 @@ mod record;
 #[cfg(test)]
 mod tests;
 
-pub use file::{BlockFile, Opened, StoreError};
+pub use file::{BlockFile, Opened, Position, StoreError};
 pub use places::Tile;

@@ -169,3 +169,53 @@ fn a_full_disk_ends_the_keeping_and_what_was_kept_stays() {
     }
     assert_eq!(store.unreadable(), 0);
 }
+
+#[test]
+fn a_store_is_reopened_where_it_was_marked_and_what_came_after_is_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.blocks");
+    let (mut store, _) = BlockFile::open(&path, 0.05, 0.3).unwrap();
+    let empty = store.mark().unwrap();
+    (0..5).for_each(|place| assert!(keep(&mut store, place, place)));
+    let marked = store.mark().unwrap();
+    assert!(keep(&mut store, 3, 30) && keep(&mut store, 9, 9));
+    let after = store.mark().unwrap();
+    drop(store);
+    let whole = fs::read(&path).unwrap();
+    let mut store = BlockFile::reopen(&path, 0.05, 0.3, &marked).unwrap();
+    assert_eq!((store.records(), store.bytes(), fs::metadata(&path).unwrap().len()), (5, marked.bytes, marked.bytes));
+    assert!(is_back(&mut store, 3, 3) && !store.holds(coord(9)));
+    // What is kept again is what was kept.
+    assert!(keep(&mut store, 3, 30) && keep(&mut store, 9, 9));
+    assert_eq!(store.mark().unwrap(), after);
+    assert!(fs::read(&path).unwrap() == whole);
+    drop(store);
+    for at in (16..marked.bytes as usize).step_by(7) {
+        let mut changed = whole.clone();
+        changed[at] ^= 1 << (at % 8);
+        fs::write(&path, &changed).unwrap();
+        assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Parted { .. })), "byte {at}");
+        assert!(fs::read(&path).unwrap() == changed, "it stays as it is");
+    }
+    fs::write(&path, &whole[..marked.bytes as usize - 1]).unwrap();
+    assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Parted { .. })));
+    fs::write(&path, &whole).unwrap();
+    assert_eq!(BlockFile::reopen(&path, 0.05, 0.3, &empty).unwrap().records(), 0);
+    fs::remove_file(&path).unwrap();
+    assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Missing { .. })));
+    assert!(!path.exists(), "none is made");
+}
+
+#[test]
+fn a_store_that_took_no_more_takes_no_more_when_it_is_reopened() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.blocks");
+    let (mut store, _) = BlockFile::open(&path, 0.05, 0.3).unwrap();
+    assert!(keep(&mut store, 1, 1));
+    store.limit(store.bytes() + 1);
+    assert!(!keep(&mut store, 2, 2));
+    let (marked, said) = (store.mark().unwrap(), store.failure().unwrap().to_string());
+    let mut store = BlockFile::reopen(&path, 0.05, 0.3, &marked).unwrap();
+    assert!(!keep(&mut store, 2, 2) && is_back(&mut store, 1, 1));
+    assert_eq!(store.failure().unwrap().to_string(), said);
+}

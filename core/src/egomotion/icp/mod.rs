@@ -41,6 +41,7 @@ const NORMAL_ONE: f64 = 127.0;
 
 /// How tracking went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum IcpStatus {
     /// There is a motion, and nothing speaks against it.
     #[default]
@@ -73,6 +74,7 @@ impl IcpStatus {
 
 /// What the tracker made of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IcpReport {
     /// How it went.
     pub status: IcpStatus,

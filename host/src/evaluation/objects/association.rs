@@ -8,7 +8,7 @@
 //! labels say nothing are not spurious.
 
 use dynvox_core::instances::PixelBox;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How well tracks stay with things.
@@ -31,7 +31,7 @@ pub struct AssociationFigures {
 }
 
 /// Counts pairs over frames.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Association {
     pairs: BTreeMap<(u32, u32), u64>,
     tracks: BTreeMap<u32, u64>,

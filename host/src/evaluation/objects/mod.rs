@@ -20,6 +20,7 @@ use crate::dataset::{ObjectsTruth, TrueObject};
 use association::Association;
 use dynvox_core::geometry::Transform;
 use dynvox_core::instances::{PixelBox, State, TrackReport};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Least overlap of a track's box with a thing's.
@@ -32,7 +33,7 @@ pub const NEAR_M: f64 = 20.0;
 pub const FAR_M: f64 = 32.0;
 
 /// A track in a frame, against its truth.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Judged {
     /// The frame's position in the run.
     pub at: usize,
@@ -55,7 +56,7 @@ pub struct Judged {
 }
 
 /// Collects errors frame by frame.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct ObjectErrors {
     frame: u32,
     /// Poses of the frame before.

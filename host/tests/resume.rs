@@ -1,0 +1,239 @@
+//! A run that was killed or failed goes on from its last snapshot as if nothing had happened; what is not the same run is refused by name.
+#![allow(missing_docs)]
+
+mod binary;
+
+use binary::{dynvox, names, rig, said};
+use image::GrayImage;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// A street with traffic whose map outgrows its pool.
+const STREET: [&str; 14] = [
+    "run",
+    "--profile",
+    "tiny",
+    "--set",
+    "street.width=320",
+    "--set",
+    "street.height=96",
+    "--set",
+    "street.frames=24",
+    "--set",
+    "volume.voxel_size_m=0.07",
+    "--set",
+    "volume.prune_lag=6",
+    "--out",
+];
+
+/// Runs the binary until it says that it has mapped a frame, and kills it there.
+fn killed_at(folder: &Path, args: &[&str], line: &str) {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
+        .args(args)
+        .current_dir(folder)
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let said = BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap).find(|said| said.starts_with(line));
+    // SIGKILL: nothing of it can clean up.
+    run.kill().unwrap();
+    assert!(!run.wait().unwrap().success() && said.is_some(), "it was under way");
+}
+
+/// Whether a column of frames.csv tells of the machine and not of the run.
+fn of_the_machine(column: &str) -> bool {
+    column.ends_with("_ms") || column == "rss_bytes" || column == "probes_most"
+}
+
+/// The rows of frames.csv without times.
+fn rows(folder: &Path) -> Vec<String> {
+    let text = fs::read_to_string(folder.join("frames.csv")).unwrap();
+    let columns: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let kept = |line: &str| {
+        let cells = line.split(',').zip(&columns).filter(|(_, column)| !of_the_machine(column));
+        cells.map(|(cell, _)| cell).collect::<Vec<_>>().join(",")
+    };
+    text.lines().map(kept).collect()
+}
+
+/// The summary without times.
+fn summary(folder: &Path) -> serde_json::Value {
+    let mut summary: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    for key in ["seconds", "fps", "stages", "rss_peak_bytes"] {
+        assert!(!summary[key].is_null());
+        summary[key] = serde_json::Value::Null;
+    }
+    summary["health"]["probes_most"] = serde_json::Value::Null;
+    summary
+}
+
+fn assert_same(root: &Path, whole: &str, resumed: &str) {
+    let diff = dynvox(root, &["diff", whole, resumed]);
+    assert!(diff.status.success(), "{}", String::from_utf8_lossy(&diff.stdout));
+    let [a, b] = [whole, resumed].map(|name| root.join(name));
+    assert_eq!(names(&a), names(&b));
+    assert_eq!(rows(&a), rows(&b));
+    assert_eq!(summary(&a), summary(&b));
+    for name in names(&a).iter().filter(|name| !["frames.csv", "summary.json", "report.html", "objects"].contains(&name.as_str())) {
+        assert!(fs::read(a.join(name)).unwrap() == fs::read(b.join(name)).unwrap(), "{name}");
+    }
+    if a.join("objects").is_dir() {
+        assert_eq!(names(&a.join("objects")), names(&b.join("objects")));
+        for name in names(&a.join("objects")) {
+            assert!(fs::read(a.join("objects").join(&name)).unwrap() == fs::read(b.join("objects").join(&name)).unwrap(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_street_killed_three_times_is_the_street_that_never_stopped() {
+    let root = TempDir::new().unwrap();
+    let street = |out: &'static str, more: &[&'static str]| [&STREET[..], &[out], more].concat();
+    assert!(dynvox(root.path(), &street("whole", &["--quiet", "--threads", "1"])).status.success());
+    killed_at(root.path(), &street("stopped", &["--snapshot-every", "4", "--threads", "2"]), "frame 9/24");
+    assert!(!root.path().join("stopped").exists(), "not before it is whole");
+    // What a kill in the middle of writing leaves.
+    let partial = root.path().join(".stopped.partial");
+    fs::create_dir_all(partial.join("objects")).unwrap();
+    for torn in [".run.snapshot.partial", "objects/77.ply", "objects/77.faces", "map.faces"] {
+        fs::write(partial.join(torn), "torn").unwrap();
+    }
+    // Blocks that left after the last snapshot, and a torn one.
+    fs::OpenOptions::new()
+        .append(true)
+        .open(partial.join("map.blocks"))
+        .and_then(|mut file| std::io::Write::write_all(&mut file, &[7; 99]))
+        .unwrap();
+    killed_at(root.path(), &["run", "--resume", "stopped"], "frame 18/24");
+    let elsewhere = root.path().join("elsewhere");
+    fs::create_dir(&elsewhere).unwrap();
+    // In the end, when the mesh is made; the last snapshot is that of the last frame.
+    killed_at(&elsewhere, &["run", "--resume", "../stopped", "--threads", "1"], "frame 24/24");
+    let last = dynvox(root.path(), &["run", "--resume", "stopped", "--json"]);
+    assert!(last.status.success(), "{}", said(&last));
+    assert!(serde_json::from_slice::<serde_json::Value>(&last.stdout).is_ok() && said(&last).is_empty());
+    assert_eq!(names(root.path()), ["elsewhere", "stopped", "whole"]);
+    let of = summary(&root.path().join("whole"));
+    assert!(of["evict"]["back"].as_u64().unwrap() > 0 && of["objects"].as_array().unwrap().len() > 2, "{of}");
+    assert!(!names(&root.path().join("whole/objects")).is_empty());
+    // The threads are those of the last stretch.
+    let path = root.path().join("stopped/summary.json");
+    let threads = fs::read_to_string(&path).unwrap().replace("\"threads\": 2", "\"threads\": 1");
+    fs::write(&path, threads).unwrap();
+    assert_same(root.path(), "whole", "stopped");
+}
+
+/// A run of a stereo folder that fails at its sixth frame, behind a snapshot of four.
+fn stopped() -> TempDir {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 8);
+    fs::write(root.path().join("settings.toml"), "[volume]\nvoxel_size_m = 0.08\n").unwrap();
+    let whole = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--config", "settings.toml", "--quiet", "--out", "whole"]);
+    assert!(whole.status.success(), "{}", said(&whole));
+    let image = root.path().join("rig/left/005.png");
+    fs::rename(&image, root.path().join("005.png")).unwrap();
+    GrayImage::new(50, 50).save(&image).unwrap();
+    let args = ["run", "rig", "--profile", "tiny", "--config", "settings.toml", "--quiet", "--out", "out/it", "--snapshot-every", "2"];
+    let run = dynvox(root.path(), &args);
+    assert_eq!(run.status.code(), Some(1));
+    assert!(
+        said(&run).contains("left/005.png is 50 x 50 px") && said(&run).contains("`dynvox run --resume out/it` lets the run go on"),
+        "{}",
+        said(&run)
+    );
+    fs::rename(root.path().join("005.png"), &image).unwrap();
+    assert_eq!(names(&root.path().join("out")), [".it.partial"]);
+    assert_eq!(names(&root.path().join("out/.it.partial")), ["map.blocks", "run.snapshot"]);
+    root
+}
+
+#[test]
+fn a_run_that_failed_goes_on_when_the_cause_is_mended() {
+    let root = stopped();
+    let again = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "out/it"]);
+    assert!(said(&again).contains("a run was stopped on its way to out/it"), "{}", said(&again));
+    let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
+    assert!(resumed.status.success(), "{}", said(&resumed));
+    assert_same(root.path(), "whole", "out/it");
+    let twice = dynvox(root.path(), &["run", "--resume", "out/it"]);
+    assert!(said(&twice).contains("the one there is finished"), "{}", said(&twice));
+}
+
+#[test]
+fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
+    let root = stopped();
+    let path = |name: &str| root.path().join(name);
+    let (snapshot, blocks) = (path("out/.it.partial/run.snapshot"), path("out/.it.partial/map.blocks"));
+    let refused = |sentence: &str| {
+        let before = fs::read(&snapshot).unwrap();
+        let run = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
+        assert_eq!(run.status.code(), Some(1));
+        assert!(said(&run).starts_with("error: ") && said(&run).contains(sentence), "{sentence}: {}", said(&run));
+        assert_eq!(names(&path("out")), [".it.partial"]);
+        assert!(fs::read(&snapshot).unwrap() == before);
+    };
+    // While `name` holds `bytes`.
+    let with = |name: &Path, bytes: &[u8], sentence: &str| {
+        let whole = fs::read(name).unwrap();
+        fs::write(name, bytes).unwrap();
+        refused(sentence);
+        fs::write(name, whole).unwrap();
+    };
+    let whole = fs::read(&snapshot).unwrap();
+    let changed = |at: usize, byte: u8| {
+        let mut bytes = whole.clone();
+        bytes[at] = byte;
+        bytes
+    };
+    with(&snapshot, b"P5 3 1 255", "is not a snapshot of a run");
+    with(&snapshot, &changed(8, 0), "is a snapshot of version 0; this dynvox takes version 1");
+    for at in [15, 20, 30, 5_000, whole.len() / 2, whole.len() - 1] {
+        with(&snapshot, &changed(at, !whole[at]), "run.snapshot is damaged");
+    }
+    with(&snapshot, &whole[..whole.len() - 1], "run.snapshot is damaged");
+    with(&snapshot, &[&whole[..], b"1"].concat(), "run.snapshot is damaged");
+    with(&path("settings.toml"), b"[volume]\nvoxel_size_m = 0.09\n", "volume.voxel_size_m was 0.08 and is 0.09");
+    let calibration = fs::read_to_string(path("rig/calib.txt")).unwrap().replace("baseline_m 0.5", "baseline_m 0.6");
+    with(&path("rig/calib.txt"), calibration.as_bytes(), "the data set's rig was ");
+    let image = path("rig/right/003.png");
+    let mut pixels = image::open(&image).unwrap().into_luma8();
+    pixels.get_pixel_mut(80, 40).0[0] ^= 1;
+    pixels.save(path("other.png")).unwrap();
+    with(&image, &fs::read(path("other.png")).unwrap(), "the data set's frame 3 is not what it was");
+    let [last, away] = ["rig/left/007.png", "away.png"].map(path);
+    fs::rename(&last, &away).unwrap();
+    fs::rename(path("rig/right/007.png"), path("away-right.png")).unwrap();
+    refused("the data set's number of frames was 8 and is 7");
+    fs::rename(&away, &last).unwrap();
+    fs::rename(path("away-right.png"), path("rig/right/007.png")).unwrap();
+    fs::rename(&blocks, path("blocks")).unwrap();
+    refused("map.blocks is missing");
+    fs::rename(path("blocks"), &blocks).unwrap();
+    with(&blocks, b"dynvox", "map.blocks is not as the run left it");
+    for (args, sentence) in [
+        (vec!["run", "--resume", "out/it", "--profile", "small"], "cannot be used with"),
+        (vec!["run", "--resume", "nowhere"], "no run can go on to"),
+        (vec!["run", "--snapshot-every", "0", "--out", "x"], "--snapshot-every begins at 1"),
+        (vec!["run", "--snapshot-every", "9", "--evaluate", "exact"], "cannot be used with"),
+    ] {
+        let run = dynvox(root.path(), &args);
+        assert!(!run.status.success() && said(&run).contains(sentence), "{args:?}: {}", said(&run));
+    }
+    // And as it was it goes on, or makes place.
+    let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
+    assert!(resumed.status.success(), "{}", said(&resumed));
+    assert_same(root.path(), "whole", "out/it");
+}
+
+#[test]
+fn a_stopped_run_makes_place_for_another_when_that_is_asked_for() {
+    let root = stopped();
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--frames", "2", "--out", "out/it", "--overwrite"]);
+    assert!(run.status.success(), "{}", said(&run));
+    assert_eq!(names(&root.path().join("out")), ["it"]);
+    assert!(!names(&root.path().join("out/it")).contains(&"run.snapshot".to_owned()));
+}
