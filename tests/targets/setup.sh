@@ -55,7 +55,7 @@ pack() {
 hosted() {
   pack
   CARGO_TARGET_DIR=$1 CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 cargo build --quiet --release --locked \
-    --features hosted --manifest-path "$targets/firmware/Cargo.toml"
+    --features hosted,snapshots --manifest-path "$targets/firmware/Cargo.toml"
   elf=$1/release/dynvox-firmware
 }
 
@@ -87,15 +87,17 @@ replay() {
     exit 1
   fi
   grep '^stack of a step [1-9]' "$build/lines" || true
-  local ms=$((($(date +%s%N) - start) / 1000000)) elsewhere=$(sed -n 's/^elsewhere //p' "$build/lines")
-  [ "$name" = x86-64 ] || same_elsewhere "$elsewhere"
-  echo "$name: $(grep -cE '^[0-9]+ [0-9a-f]{16} ' "$build/lines") frames in $ms ms, every digest the one on file; elsewhere $elsewhere"
+  local ms=$((($(date +%s%N) - start) / 1000000)) elsewhere=$(grep '^elsewhere' "$build/lines") snapshot=$(grep '^snapshot' "$build/lines" || true)
+  [ "$name" = x86-64 ] || same_here "$elsewhere" ${snapshot:+"$snapshot"}
+  echo "$name: $(grep -cE '^[0-9]+ [0-9a-f]{16} ' "$build/lines") frames in $ms ms, every digest the one on file; $elsewhere${snapshot:+; $snapshot}"
 }
 
-# The ways the fixture does not come to have no digest on file: they must give what they give on this machine.
-same_elsewhere() {
-  local reference=$(dirname "$build")/reference
+# same_here LINE...: the ways the fixture does not come to, and snapshots, have no digest on file: they must give what they give on this machine.
+same_here() {
+  local reference=$(dirname "$build")/reference line
   hosted "$reference"
-  local here=$("$elf" | sed -n 's/^elsewhere //p')
-  [ "$1" = "$here" ] || { echo "$name: FAILED elsewhere: $1, here it is $here"; exit 1; }
+  "$elf" >"$build/here"
+  for line; do
+    grep -qx "$line" "$build/here" || { echo "$name: FAILED: $line, here it is $(grep "^${line%% *}" "$build/here")"; exit 1; }
+  done
 }

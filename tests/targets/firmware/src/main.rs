@@ -13,6 +13,8 @@ mod line;
 #[cfg_attr(feature = "hosted", path = "platform/hosted.rs")]
 mod platform;
 mod reach;
+#[cfg(feature = "snapshots")]
+mod snapshots;
 #[cfg_attr(not(all(target_arch = "arm", target_os = "none")), path = "stack/unknown.rs")]
 #[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "stack/painted.rs")]
 mod stack;
@@ -56,6 +58,12 @@ fn run() -> u8 {
     });
     let missing = expected.count() as u32;
     platform::put(&Line::new().str("elsewhere ").hex(reach::digest(&clip, &mut slab.0)).str("\n"));
+    #[cfg(feature = "snapshots")]
+    {
+        let snapshot = snapshots::digest(&clip, &mut slab.0);
+        platform::put(&Line::new().str("snapshot ").hex(snapshot).str("\n"));
+        wrong += u32::from(snapshot == 0);
+    }
     platform::put(&Line::new().str("stack of a step ").decimal(step).str(", of everything ").decimal(whole).str("\n"));
     #[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
     platform::put(&Line::new().hex(faults::all(CLIP.len())).str("\n"));
