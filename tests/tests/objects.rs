@@ -1,12 +1,14 @@
 //! What moves stays out of the static map, is followed and reconstructed apart; shown on the synthetic street with exact masks.
 
+use dynvox::dataset::TrueObject;
+use dynvox::evaluation::surfaces::{SeenSide, TrueView};
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::{
     Capacity, Config, Mapper, Report, Serial, StereoFrame,
     geometry::Transform,
     image::View,
     instances::{Class, Detection, NoSink, State, TrackReport},
-    volume::{NoStore, Raycaster},
+    volume::{MeshConfig, NoStore, Raycaster},
 };
 use dynvox_tests::HeapSlab;
 use std::collections::BTreeMap;
@@ -256,4 +258,53 @@ fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
         assert!(refused > 0, "cars beyond the first are counted");
         assert_eq!((begun > 0, blocks > 0), (objects > 0, objects > 0), "{objects} objects of {object_blocks} blocks");
     }
+}
+
+#[test]
+fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_seen_of_them() {
+    let drive = Drive::new();
+    let rig = drive.street.rig();
+    let mut sides: BTreeMap<u32, SeenSide> = BTreeMap::new();
+    let (mut medians_m, mut complete) = (Vec::new(), Vec::new());
+    drive.run(true, false, |index, report, mapper| {
+        let (frame, seen) = &drive.frames[index];
+        let t_map_world = report.t_world_camera * frame.t_world_camera.inverse();
+        let tracks: BTreeMap<u32, TrackReport> = mapper.tracks().map(|track| (track.id, track)).collect();
+        for (summary, _) in mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame) {
+            let Some(car) = tracks.get(&summary.id).and_then(|track| truth(frame, seen, track)) else { continue };
+            let thing = TrueObject {
+                id: car.id,
+                pixels: tracks[&summary.id].pixels,
+                t_world_object: car.t_world_object,
+                dimensions_m: car.dimensions_m,
+                moving: car.moving,
+                speed_m_s: car.speed_m_s,
+            };
+            let view = TrueView {
+                rig: &rig,
+                depth_m: View::new(&frame.depth_m, frame.width, frame.height).unwrap(),
+                t_world_camera: frame.t_world_camera,
+                far_m: 20.0,
+            };
+            let t_thing_object = car.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
+            sides.entry(summary.id).or_default().add(&view, &thing, &t_thing_object);
+        }
+        if index + 1 < drive.frames.len() {
+            return;
+        }
+        for (summary, object) in mapper.objects() {
+            let mut triangles = Vec::new();
+            object.volume().triangles(&MeshConfig::default(), &mut |triangle| triangles.push(triangle));
+            let Some(figures) = sides.get(&summary.id).and_then(|side| side.compare(&triangles, 0.05)) else { continue };
+            println!("object {}, {}: {figures:?}", summary.id, summary.state.name());
+            // One seen more seldom, or from farther away, is not done yet.
+            if figures.nearest_m < 12.0 && figures.frames >= 9 {
+                medians_m.push(figures.median_m.unwrap_or(1.0));
+                complete.push(figures.completeness);
+            }
+        }
+    });
+    assert!(medians_m.len() >= 3, "{medians_m:?}");
+    assert!(medians_m.iter().all(|median_m| *median_m <= 0.05), "{medians_m:?}");
+    assert!(complete.iter().all(|share| *share >= 0.75), "{complete:?}");
 }

@@ -3,7 +3,7 @@
 use crate::{
     config::{Problems, require},
     egomotion::EgomotionConfig,
-    volume::{VolumeConfig, WhenFull},
+    volume::{ObservationWeight, VolumeConfig, WhenFull},
 };
 
 /// Image width to which areas in px refer.
@@ -291,11 +291,14 @@ pub struct ObjectVolumeConfig {
     pub truncation_m: f32,
     /// Farthest depth fused, m; above the map's `near_m`; 20.
     pub far_m: f32,
-    /// How far from the object's median depth a pixel may lie, m: what shows through windows and at the rim stays out; above 0.
+    /// How far from the object's median depth a pixel may lie, m: what shows through windows and at the rim stays out; above 0; 3. Of a bus
+    /// seen lengthwise a frame shows no more than twice this.
     pub extent_m: f32,
-    /// Weight at which the average stops forgetting less, 1 to 255; 50.
+    /// What one observation of a voxel weighs; by depth (the original: one).
+    pub observation_weight: ObservationWeight,
+    /// Weight at which the average stops forgetting less, 1 to 255; 200.
     pub max_weight: u8,
-    /// Voxels seen at most this often go when the object is pruned; 0 is off; 1.
+    /// Voxels that weigh at most this go when the object is pruned; 0 is off; 8: what was seen once from beyond 11 m.
     pub prune_weight: u8,
     /// Fused frames from one pruning of the whole object to the next; 1 to 255. With 1 a voxel must weigh more than `prune_weight` in its
     /// first frame to stay.
@@ -308,9 +311,10 @@ impl Default for ObjectVolumeConfig {
             voxel_size_m: 0.05,
             truncation_m: 0.3,
             far_m: 20.0,
-            extent_m: 5.0,
-            max_weight: 50,
-            prune_weight: 1,
+            extent_m: 3.0,
+            observation_weight: ObservationWeight::Depth,
+            max_weight: 200,
+            prune_weight: 8,
             prune_frames: 4,
         }
     }
@@ -323,6 +327,7 @@ impl ObjectVolumeConfig {
             voxel_size_m: self.voxel_size_m,
             truncation_m: self.truncation_m,
             far_m: self.far_m,
+            observation_weight: self.observation_weight,
             max_weight: self.max_weight,
             when_full: WhenFull::Refuse,
             prune_weight: 0,

@@ -1,6 +1,8 @@
 //! What a frame shows of one object: its virtual frame, cut to the object's box (Section III-B of the paper).
 //!
-//! A crop is the disparity under the copy mask, 0 elsewhere, and the picture of the box. Crops of objects whose motion is not known yet wait
+//! A crop is the disparity under the copy mask, 0 elsewhere, and the picture of the box. Beside an edge the matcher's surface runs on behind
+//! what is in front, and would hang on the object like a flag that no later frame takes down: pixels just beside much nearer ones are left out.
+//! Crops of objects whose motion is not known yet wait
 //! in a ring until it is; when the ring is full the oldest crop goes, and is counted.
 //!
 //! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of 144 bytes.
@@ -22,8 +24,22 @@ const BINS: usize = 512;
 /// Disparity units in a half pixel.
 const BIN: u16 = 128;
 
-/// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 beside the mask and where the depth is farther than
-/// `extent_m` from the median. Returns how many pixels have one.
+/// How far an edge spoils what is behind it, px.
+const EDGE_REACH_PX: i32 = 3;
+/// What is nearer by more disparity than this is an edge: on a surface that wide a step is not that high unless it is seen edge-on.
+const EDGE_Q8: u16 = 384;
+
+/// Whether a pixel of that disparity lies just behind an edge.
+fn is_behind_edge(disparity_q8: View<'_, u16>, u: i32, v: i32, disparity: u16) -> bool {
+    let nearer = |u: i32, v: i32| {
+        let pixel = usize::try_from(u).ok().zip(usize::try_from(v).ok());
+        pixel.and_then(|(u, v)| disparity_q8.get(u, v)).is_some_and(|other| other > disparity.saturating_add(EDGE_Q8))
+    };
+    (1..=EDGE_REACH_PX).any(|px| nearer(u - px, v) || nearer(u + px, v) || nearer(u, v - px) || nearer(u, v + px))
+}
+
+/// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 beside the mask, just behind edges, and where the depth is
+/// farther than `extent_m` from the median. Returns how many pixels have one.
 pub(super) fn cut(
     rig: &StereoRig,
     extent_m: f32,
@@ -57,9 +73,13 @@ pub(super) fn cut(
         if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
     });
     let mut kept = 0;
-    for disparity in crop {
-        *disparity = if *disparity >= low && *disparity <= high { *disparity } else { 0 };
-        kept += u32::from(*disparity > 0);
+    for (v, row) in (top..top + height.max(0)).zip(crop.chunks_exact_mut(width.max(1) as usize)) {
+        for (u, disparity) in (left..).zip(row) {
+            // What has none lies below `low`, or is found 0.
+            let near = *disparity >= low && *disparity <= high;
+            *disparity = if near && !is_behind_edge(disparity_q8, u, v, *disparity) { *disparity } else { 0 };
+            kept += u32::from(*disparity > 0);
+        }
     }
     kept
 }

@@ -287,6 +287,11 @@ impl<'m, 's> ScaledMask<'m, 's> {
         Self { store, place, pixels: place.pixels.scaled(permille) }
     }
 
+    /// The same elsewhere in the image.
+    pub fn moved(self, shift: [i32; 2]) -> Self {
+        Self { pixels: self.pixels.moved(shift), ..self }
+    }
+
     /// Whether a pixel of the image belongs to the scaled mask.
     pub fn contains(&self, u: i32, v: i32) -> bool {
         if !self.pixels.contains(u, v) {

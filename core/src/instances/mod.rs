@@ -8,7 +8,7 @@
 //!    camera's egomotion which to listen to: none on a dynamic object, none on a large one of unknown state, for that one may be most of
 //!    what there is to see; of others RANSAC decides;
 //! 3. [`Instances::follow`]: each track's motion, state and pose;
-//! 4. [`Instances::clear`]: the static map's depth is 0 under every delete mask, tracked or not;
+//! 4. [`Instances::clear`]: the static map's depth is 0 under every delete mask, tracked or not, and where a thing missed for a frame would be;
 //! 5. [`Instances::reconstruct`]: each object's virtual frame, its copy mask's pixels, goes into a volume of its own.
 //!
 //! # Motion over ground

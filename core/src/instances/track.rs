@@ -108,6 +108,12 @@ impl Track {
         self.small == 1 && !self.filter.is_known()
     }
 
+    /// How far its mask moved since it was last seen, `gap` frames ago, if it went on as it did, px.
+    pub fn drifted(&self, gap: u32) -> [i32; 2] {
+        let frames = gap.min(4) as i32;
+        self.drift.map(|px| px.clamp(-4096, 4096) * frames)
+    }
+
     /// Whether it is known to move.
     pub fn moves(&self) -> bool {
         self.judgement.state() == State::Dynamic
@@ -340,11 +346,7 @@ fn affinity(config: &InstancesConfig, frame: u32, detection: &Taken, track: &Tra
         _ => 0.25,
     };
     let overlap = match config.overlap {
-        Overlap::Mask => {
-            let frames = gap.min(4) as i32;
-            let moved = track.drift.map(|px| px.clamp(-4096, 4096) * frames);
-            masks.now.overlap(&detection.place, masks.before, &track.place, moved)
-        }
+        Overlap::Mask => masks.now.overlap(&detection.place, masks.before, &track.place, track.drifted(gap)),
         Overlap::Box => detection.place.pixels.overlap(&track.place.pixels),
     };
     overlap * libm::sqrtf(detection.score * track.score) * discount

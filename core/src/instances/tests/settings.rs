@@ -53,7 +53,7 @@ fn each_setting_out_of_its_range_is_named() {
         (|c| c.volume.far_m = 0.0, "volume.far_m"),
         (|c| c.volume.extent_m = 0.0, "volume.extent_m"),
         (|c| c.volume.max_weight = 0, "volume.max_weight"),
-        (|c| c.volume.prune_weight = 50, "volume.prune_weight"),
+        (|c| c.volume.prune_weight = 200, "volume.prune_weight"),
         (|c| c.volume.prune_frames = 0, "volume.prune_frames"),
         (|c| c.volume.far_m = f32::NAN, "volume.far_m"),
         (|c| c.delete_permille = 4001, "delete_permille"),

@@ -10,10 +10,14 @@ fn car(left: i32) -> Detection<'static> {
 
 fn take(instances: &mut Instances<'_>, frame: u32, detections: &[Detection<'_>]) -> Vec<u32> {
     instances.admit(frame, detections, [WIDTH, HEIGHT]);
+    settle(instances);
+    instances.tracks().filter(|track| track.seen).map(|track| track.id).collect()
+}
+
+fn settle(instances: &mut Instances<'_>) {
     let (now, before) = instances.masks.split_at_mut(1);
     let (now, before) = if instances.now == 0 { (&mut now[0], &before[0]) } else { (&mut before[0], &now[0]) };
     instances.tracks.settle(instances.detections.all(), now, before, &mut instances.report.tracks);
-    instances.tracks().filter(|track| track.seen).map(|track| track.id).collect()
 }
 
 #[test]
@@ -189,5 +193,44 @@ fn what_a_pixel_shows_is_the_best_thing_whose_mask_holds_it() {
         take(instances, 0, &[walker, Detection { mask: &half, ..car(100) }]);
         let shown = |u| instances.at(u, 50).map(|thing| (thing.class, thing.track));
         assert_eq!([shown(110), shown(140), shown(99)], [Some((Class::Car, Some(1))), Some((Class::Person, None)), None]);
+    });
+}
+
+/// The box cleared of depth in a frame without detections, and how many pixels of it.
+fn cleared(instances: &mut Instances<'_>, frame: u32) -> Option<(PixelBox, u32)> {
+    instances.admit(frame, &[], [WIDTH, HEIGHT]);
+    let mut depth = vec![5.0f32; WIDTH * HEIGHT];
+    instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+    settle(instances);
+    let pixels = || (0..).zip(&depth).filter(|(_, depth)| **depth == 0.0).map(|(at, _)| (at % WIDTH as i32, at / WIDTH as i32));
+    let (left, right) = (pixels().map(|(u, _)| u).min()?, pixels().map(|(u, _)| u).max()?);
+    let (top, bottom) = (pixels().map(|(_, v)| v).min()?, pixels().map(|(_, v)| v).max()?);
+    let pixels = PixelBox { left, top, width: right + 1 - left, height: bottom + 1 - top };
+    Some((pixels, instances.report.pixels_cleared))
+}
+
+#[test]
+fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_it_would_be() {
+    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+        take(instances, 0, &[car(100)]);
+        take(instances, 1, &[car(110)]);
+        for (frame, left) in [(2, 120), (3, 130), (4, 140)] {
+            let expected = PixelBox { left, top: 30, width: 60, height: 60 }.scaled(1200);
+            assert_eq!(cleared(instances, frame), Some((expected, 72 * 72)), "frame {frame}");
+        }
+        assert_eq!(cleared(instances, 5), None, "it may be anywhere");
+    });
+}
+
+#[test]
+fn what_was_seen_once_and_never_again_is_not_kept_out_longer_nor_what_is_too_small() {
+    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+        take(instances, 0, &[car(100)]);
+        assert_eq!(cleared(instances, 1), None, "a ghost");
+    });
+    let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
+    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+        (0..3).for_each(|frame| drop(take(instances, frame, &[small])));
+        assert_eq!(cleared(instances, 3), None);
     });
 }

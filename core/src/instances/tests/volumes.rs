@@ -17,13 +17,13 @@ fn content(instances: &Instances<'_>) -> (Vec<BlockCoord>, u8) {
 }
 
 /// Shows a parked car, too wide in the frames `wide` says; the blocks after each frame and what the sink gets in the end.
-fn parked(frames: u32, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize) {
+fn parked(frames: u32, z: f64, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize) {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         let blocks = (0..frames)
             .map(|frame| {
                 let board = if wide(frame) { &WIDE } else { &SMALL };
-                drive.step(Transform::identity(), &[(board, Some(shift(0.0, 0.0, 9.0)))]);
+                drive.step(Transform::identity(), &[(board, Some(shift(0.0, 0.0, z)))]);
                 content(drive.instances).0.len()
             })
             .collect();
@@ -36,21 +36,28 @@ fn parked(frames: u32, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize) {
 #[test]
 fn what_was_seen_once_goes_at_every_fourth_fused_frame_and_before_the_object_leaves() {
     // Known to stand in frame 3: the volume's first frame; the seventh is its fourth.
-    let (blocks, _) = parked(8, |frame| frame == 5);
-    let (careful, _) = parked(8, |_| false);
+    let (blocks, _) = parked(8, 15.0, |frame| frame == 5);
+    let (careful, _) = parked(8, 15.0, |_| false);
     assert_eq!(blocks[..5], careful[..5]);
     assert!(blocks[5] > blocks[4], "{blocks:?}");
     assert_eq!(blocks[6], careful[6], "it was a mistake");
-    let (blocks, handed) = parked(9, |frame| frame == 8);
-    let (careful, expected) = parked(9, |_| false);
+    let (blocks, handed) = parked(9, 15.0, |frame| frame == 8);
+    let (careful, expected) = parked(9, 15.0, |_| false);
     assert!(blocks[8] > careful[8]);
     assert_eq!(handed, expected);
 }
 
 #[test]
+fn what_was_seen_once_from_near_stays() {
+    let (blocks, handed) = parked(8, 9.0, |frame| frame == 5);
+    let (careful, expected) = parked(8, 9.0, |_| false);
+    assert!(blocks[7] > careful[7] && handed > expected, "{blocks:?} {careful:?}");
+}
+
+#[test]
 fn of_an_object_seen_but_for_a_moment_everything_is_handed_over() {
-    let (blocks, handed) = parked(6, |frame| frame == 5);
-    let (careful, expected) = parked(6, |_| false);
+    let (blocks, handed) = parked(6, 15.0, |frame| frame == 5);
+    let (careful, expected) = parked(6, 15.0, |_| false);
     assert!(blocks[5] > careful[5] && handed > expected, "{handed} and {expected} blocks");
 }
 
@@ -61,7 +68,11 @@ fn each_crop_that_waited_is_fused_once() {
         for _ in 0..4 {
             drive.step(Transform::identity(), &[(&SMALL, Some(shift(0.0, 0.0, 9.0)))]);
         }
-        assert_eq!((content(drive.instances).1, drive.instances.crops.len()), (4, 0), "three that waited and this frame's");
+        assert_eq!(
+            (content(drive.instances).1, drive.instances.crops.len()),
+            (40, 0),
+            "three that waited and this frame's, each of weight 10"
+        );
     });
 }
 
@@ -125,29 +136,46 @@ fn a_post_before_a_car_is_no_part_of_it() {
     });
 }
 
-#[test]
-fn a_crop_is_what_lies_under_the_mask_and_near_the_middle_depth() {
-    let pixels = PixelBox { left: 20, top: 10, width: 40, height: 30 };
+/// The columns that are left of a crop 60 px wide whose mask is its left 54, of a picture with these disparities, px, in each row.
+fn cropped(disparity_px: impl Fn(i32) -> f64) -> Vec<i32> {
+    let pixels = PixelBox { left: 20, top: 10, width: 60, height: 30 };
     let mut words = vec![0; 1000];
     let mut store = MaskStore::new(&mut words);
     let place = store.take(pixels).unwrap();
-    // The left four fifths of the box.
-    (10..40).for_each(|v| store.enter_row(&place, v, 20, &[1; 32]));
-    // 10 m, and a column each at 14, 16, 6 and 4 m.
-    let at = |depth_m: f64| (RIG.focal_baseline_px_m() / depth_m * 256.0) as u16;
-    let mut disparity = vec![at(10.0); WIDTH * HEIGHT];
-    let columns = [(22, 14.0), (24, 16.0), (26, 6.0), (28, 4.0)];
-    for row in disparity.chunks_exact_mut(WIDTH) {
-        columns.iter().for_each(|&(u, depth_m)| row[u] = at(depth_m));
-    }
+    (10..40).for_each(|v| store.enter_row(&place, v, 20, &[1; 54]));
+    let row: Vec<u16> = (0..WIDTH as i32).map(|u| (disparity_px(u - 20) * 256.0) as u16).collect();
+    let disparity = row.repeat(HEIGHT);
     let mut crop = vec![7u16; pixels.area() as usize];
     let kept = crop::cut(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &place, &mut crop);
-    assert_eq!(kept, 30 * (32 - 2));
-    for row in crop.chunks_exact(40) {
-        let there: Vec<usize> = (0..40).filter(|&u| row[u] > 0).collect();
-        let expected: Vec<usize> = (0..32).filter(|u| ![4, 8].contains(u)).collect();
-        assert_eq!(there, expected);
-    }
+    let columns = |row: &[u16]| (0..60).filter(|&u| row[u as usize] > 0).collect::<Vec<i32>>();
+    let first = columns(&crop[..60]);
+    assert!(crop.chunks_exact(60).all(|row| columns(row) == first));
+    assert_eq!(kept, 30 * first.len() as u32);
+    first
+}
+
+#[test]
+fn a_crop_is_what_lies_under_the_mask_and_near_the_middle_depth() {
+    // Stripes at 10, 14, 16, 6, 4 and again 10 m, with nothing known between.
+    let depth_m = |u: i32| match u {
+        0..20 | 53..60 => 10.0,
+        24..28 => 14.0,
+        32..36 => 16.0,
+        40..44 => 6.0,
+        48..50 => 4.0,
+        _ => f64::INFINITY,
+    };
+    let expected: Vec<i32> = (0..20).chain(24..28).chain(40..44).chain([53]).collect();
+    assert_eq!(cropped(|u| 150.0 / depth_m(u)), expected);
+}
+
+#[test]
+fn what_the_matcher_lets_run_on_behind_an_edge_is_left_out_and_a_slope_is_not() {
+    // 1.6 px from surface to surface, then 1.4.
+    let step = |height_px: f64| cropped(|u| if (20..40).contains(&u) { 15.0 + height_px } else { 15.0 });
+    assert_eq!(step(1.6), (0..17).chain(20..40).chain(43..54).collect::<Vec<_>>());
+    assert_eq!(step(1.4), (0..54).collect::<Vec<_>>());
+    assert_eq!(cropped(|u| 14.0 + 0.3 * f64::from(u)), (0..54).collect::<Vec<_>>(), "the side of a car seen from behind");
 }
 
 #[test]
