@@ -6,6 +6,7 @@ use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
 use crate::depth::{self, DepthChoice};
+use crate::evaluation::objects::Medians;
 use crate::export::{self, FolderError, RunFolder, Summary};
 use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, Reference, RunError, RunRecord, Stopped, Streaming};
 use crate::segmentation::{self, Choice};
@@ -315,6 +316,24 @@ fn conclude(run: &RunRecord, place: &Path) {
                 );
             }
         }
+    }
+    if let Some(figures) = &run.objects.figures {
+        let (near, far) = (&figures.late_near, &figures.late_far);
+        line(
+            "tracks against truth",
+            format!(
+                "{} of {} late within 20 m, {} of {} at 20 to 32 m; {} flips",
+                near.late, near.tracks, far.late, far.tracks, figures.flips
+            ),
+        );
+        let error = |of: &Medians| match (of.t_m, of.r_deg) {
+            (Some(t_m), Some(r_deg)) => format!("{:.1} cm, {r_deg:.2} deg", 100.0 * t_m),
+            _ => "-".to_owned(),
+        };
+        line(
+            "",
+            format!("motion of what drives: {} within 20 m, {} at 20 to 32 m", error(&figures.moving_near), error(&figures.moving_far)),
+        );
     }
     line("map", format!("{} triangles, {} of {} blocks used at most", run.mesh.triangles, run.blocks_peak(), run.capacity.blocks));
     let refused = run.blocks_refused();

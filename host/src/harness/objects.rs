@@ -9,7 +9,7 @@ use crate::evaluation::surfaces::TrueView;
 use crate::evaluation::swept::Swept;
 use crate::export::FolderError;
 use crate::segmentation::Refusals;
-use dynvox_core::instances::{DetectionCount, TrackReport};
+use dynvox_core::instances::{DetectionCount, PixelBox, TrackReport};
 use dynvox_core::{Config, Mapper, Report};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -50,8 +50,9 @@ impl ObjectsAtWork {
             self.kept.follow(frame, summary.id, summary.chain, summary.t_world_object);
         }
         if let Some(truth) = &images.objects {
-            let width = images.left.width();
-            self.errors.add(&tracks, &report.t_world_camera, truth, |pixels| config.instances.large_enough(pixels.area(), width));
+            let size = (images.left.width(), images.left.height());
+            let large_enough = |pixels: &PixelBox| config.instances.large_enough(pixels.area(), size.0);
+            self.errors.add(&tracks, &report.t_world_camera, truth, size, large_enough);
             if let Some(exact) = &images.exact {
                 let t_map_world = report.t_world_camera * truth.t_world_camera.inverse();
                 let swept = self.swept.get_or_insert_default();

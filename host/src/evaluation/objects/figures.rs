@@ -1,7 +1,7 @@
 //! Errors over all tracks.
 
 use super::association::AssociationFigures;
-use super::{FAR_M, Judged, NEAR_M, TrackErrors, median};
+use super::{FAR_M, Judged, Late, NEAR_M, TrackErrors, median};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -17,6 +17,10 @@ pub struct ObjectFigures {
     pub confusion: [[u32; 3]; 2],
     /// Tracks with a state not right in time, within [`FAR_M`].
     pub tracks_late: usize,
+    /// Tracks whose state was due within [`NEAR_M`].
+    pub late_near: Late,
+    /// Tracks whose state was due from [`NEAR_M`] to [`FAR_M`].
+    pub late_far: Late,
     /// Changes between static and dynamic of things that did not change.
     pub flips: u32,
     /// Moving things within [`NEAR_M`]: frames, median translation error (m) and rotation error (degrees).
@@ -57,6 +61,8 @@ impl ObjectFigures {
             tracks: tracks.len(),
             association,
             tracks_late: tracks.iter().filter(|track| track.late_frames > 0).count(),
+            late_near: Late::of(judged, 0.0..NEAR_M),
+            late_far: Late::of(judged, NEAR_M..FAR_M),
             flips: tracks.iter().map(|track| track.flips).sum(),
             moving_near: medians(true, 0.0, NEAR_M),
             moving_far: medians(true, NEAR_M, FAR_M),

@@ -9,11 +9,13 @@
 
 pub mod association;
 mod figures;
+mod late;
 #[cfg(test)]
 mod tests;
 mod track;
 
 pub use figures::{Medians, ObjectFigures};
+pub use late::Late;
 pub use track::TrackErrors;
 
 use crate::dataset::{ObjectsTruth, TrueObject};
@@ -32,6 +34,42 @@ pub const NEAR_M: f64 = 20.0;
 /// See [`NEAR_M`].
 pub const FAR_M: f64 = 32.0;
 
+/// Width or height below which little can be known of a thing, px.
+pub const SMALL_PX: i32 = 30;
+
+/// How much of a thing a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Showing {
+    /// All that nothing hides, and enough of it.
+    Whole,
+    /// Less than [`SMALL_PX`] of it across or down.
+    Small,
+    /// It reaches the picture's border.
+    Cut,
+}
+
+impl Showing {
+    /// Name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Whole => "whole",
+            Self::Small => "small",
+            Self::Cut => "cut",
+        }
+    }
+
+    fn of(thing: &PixelBox, size: (usize, usize)) -> Self {
+        let (right, bottom) = (thing.left + thing.width, thing.top + thing.height);
+        if thing.left <= 0 || thing.top <= 0 || right >= size.0 as i32 || bottom >= size.1 as i32 {
+            Self::Cut
+        } else if thing.width < SMALL_PX || thing.height < SMALL_PX {
+            Self::Small
+        } else {
+            Self::Whole
+        }
+    }
+}
+
 /// A track in a frame, against its truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Judged {
@@ -47,12 +85,26 @@ pub struct Judged {
     pub settled: u32,
     /// Distance of the true thing along the camera's axis, m.
     pub distance_m: f64,
+    /// How much of the true thing is in the picture.
+    pub view: Showing,
     /// Error of the motion, m and degrees; `None` where none was estimated or the thing was not there before.
     pub error: Option<[f64; 2]>,
     /// True speed, m/s.
     pub true_speed_m_s: f64,
     /// Estimated speed, m/s.
     pub speed_m_s: Option<f64>,
+}
+
+impl Judged {
+    /// Whether the state has had its time to settle.
+    fn is_due(&self) -> bool {
+        self.settled >= SETTLING_FRAMES
+    }
+
+    /// Whether the state is due and not the true one.
+    fn is_late(&self) -> bool {
+        self.is_due() && self.state != if self.moving { State::Dynamic } else { State::Static }
+    }
 }
 
 /// Collects errors frame by frame.
@@ -69,13 +121,14 @@ pub struct ObjectErrors {
 }
 
 impl ObjectErrors {
-    /// Compares the tracks seen in a frame; call it for every frame. `large_enough` tells which boxes are large enough for a detection: of
-    /// others it is no fault to miss them.
+    /// Compares the tracks seen in a frame, whose images have `size`; call it for every frame. `large_enough` tells which boxes are large
+    /// enough for a detection: of others it is no fault to miss them.
     pub fn add(
         &mut self,
         tracks: &[TrackReport],
         t_world_camera: &Transform,
         truth: &ObjectsTruth,
+        size: (usize, usize),
         large_enough: impl Fn(&PixelBox) -> bool,
     ) {
         let boxes: Vec<(u32, PixelBox)> = tracks.iter().filter(|track| track.seen).map(|track| (track.id, track.pixels)).collect();
@@ -107,6 +160,7 @@ impl ObjectErrors {
                 state: track.state,
                 settled: frame - first.max(changed),
                 distance_m: (truth.t_world_camera.inverse() * object.t_world_object).translation.vector.z,
+                view: Showing::of(&object.pixels, size),
                 error,
                 true_speed_m_s: object.speed_m_s,
                 speed_m_s: track.speed_m_s.map(|[speed, _]| f64::from(speed)),

@@ -4,6 +4,7 @@ use dynvox_core::geometry::exp;
 use dynvox_core::instances::{Class, PixelBox};
 use nalgebra::Vector3;
 
+const SIZE: (usize, usize) = (640, 192);
 const PIXELS: PixelBox = PixelBox { left: 100, top: 50, width: 80, height: 40 };
 
 fn truth(frame: u32, moving: bool) -> ObjectsTruth {
@@ -55,7 +56,7 @@ fn drive(states: &[State], moving: &[bool], drift: &Transform, error: &Transform
         let now = truth(frame, moving);
         let before = truth(frame.saturating_sub(1), moving).objects[0].t_world_object;
         let motion = before * (before.inverse() * now.objects[0].t_world_object * error) * before.inverse();
-        errors.add(&[track(state, drift * motion * drift.inverse())], &(drift * now.t_world_camera), &now, |_| true);
+        errors.add(&[track(state, drift * motion * drift.inverse())], &(drift * now.t_world_camera), &now, SIZE, |_| true);
     }
     errors
 }
@@ -89,7 +90,7 @@ fn what_overlaps_nothing_true_is_not_compared() {
     let mut errors = ObjectErrors::default();
     let elsewhere = TrackReport { pixels: PIXELS.moved([70, 0]), ..track(State::Dynamic, Transform::identity()) };
     let unseen = TrackReport { seen: false, ..track(State::Dynamic, Transform::identity()) };
-    errors.add(&[elsewhere, unseen], &Transform::identity(), &truth(0, true), |_| true);
+    errors.add(&[elsewhere, unseen], &Transform::identity(), &truth(0, true), SIZE, |_| true);
     assert!(errors.tracks().is_empty() && errors.figures().is_none());
 }
 
@@ -119,4 +120,43 @@ fn every_comparison_is_a_row_in_the_order_of_frames() {
     let figures = errors.figures().unwrap();
     assert_eq!((figures.association.unwrap().hota, figures.tracks), (1.0, 1));
     assert_eq!((errors.tracks()[&1].motions, errors.tracks()[&1].moving.len()), (2, 3));
+}
+
+#[test]
+fn late_tracks_are_counted_by_distance_and_by_what_could_be_seen_of_them() {
+    use State::{Static as S, Uncertain as U};
+    let one = |settled: u32, distance_m: f64, state: State, view: Showing| Judged {
+        at: settled as usize,
+        truth: 7,
+        moving: false,
+        state,
+        settled,
+        distance_m,
+        view,
+        error: None,
+        true_speed_m_s: 0.0,
+        speed_m_s: None,
+    };
+    let tracks = [
+        // Not due yet; then late far away, in time near by.
+        vec![one(4, 28.0, U, Showing::Whole), one(5, 27.0, U, Showing::Whole), one(6, 19.0, S, Showing::Whole)],
+        // Late only while it leaves the picture.
+        vec![one(5, 12.0, S, Showing::Whole), one(6, 11.0, U, Showing::Cut)],
+        // Late while there is little of it, cut once.
+        vec![one(5, 12.0, U, Showing::Small), one(6, 11.0, U, Showing::Cut)],
+        // Never due, and too far.
+        vec![one(3, 12.0, U, Showing::Whole)],
+        vec![one(9, 32.5, U, Showing::Whole)],
+    ];
+    let judged = (1..).zip(tracks).collect();
+    assert_eq!(Late::of(&judged, 0.0..NEAR_M), Late { tracks: 3, late: 2, late_cut: 1, late_small: 1 });
+    assert_eq!(Late::of(&judged, NEAR_M..FAR_M), Late { tracks: 1, late: 1, late_cut: 0, late_small: 0 });
+}
+
+#[test]
+fn a_thing_at_the_border_is_cut_and_one_of_few_pixels_small() {
+    let of = |left, top, width, height| Showing::of(&PixelBox { left, top, width, height }, SIZE);
+    assert_eq!([of(1, 1, 30, 30), of(1, 1, 638, 190)], [Showing::Whole; 2]);
+    assert_eq!([of(1, 1, 29, 90), of(1, 1, 90, 29)], [Showing::Small; 2]);
+    assert_eq!([of(0, 1, 90, 90), of(1, 0, 9, 9), of(550, 1, 90, 90), of(1, 102, 90, 90)], [Showing::Cut; 4]);
 }

@@ -1,6 +1,6 @@
 //! Errors of one track.
 
-use super::{FAR_M, Judged, SETTLING_FRAMES, median, rms};
+use super::{FAR_M, Judged, median, rms};
 use dynvox_core::instances::State;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -58,10 +58,9 @@ impl TrackErrors {
             };
             confusion[usize::from(one.moving)][state] += 1;
             *votes.entry(one.truth).or_default() += 1;
-            let right = one.state == if one.moving { State::Dynamic } else { State::Static };
-            late_frames += u32::from(!right && one.settled >= SETTLING_FRAMES && one.distance_m < FAR_M);
+            late_frames += u32::from(one.is_late() && one.distance_m < FAR_M);
             if one.state != State::Uncertain {
-                let same = |before: &&Judged| before.truth == one.truth && before.moving == one.moving && one.settled >= SETTLING_FRAMES;
+                let same = |before: &&Judged| before.truth == one.truth && before.moving == one.moving && one.is_due();
                 flips += u32::from(last.filter(same).is_some_and(|before| before.state != one.state));
                 last = Some(one);
             }

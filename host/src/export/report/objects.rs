@@ -1,6 +1,7 @@
 //! What moves or could: tracks over time in the colours of their states, a table, and the objects' meshes.
 
 use super::{escaped, grouped};
+use crate::evaluation::objects::{Late, Medians};
 use crate::evaluation::surfaces::SurfaceFigures;
 use crate::export::state_name;
 use crate::harness::{KeptObject, RunRecord, TrackRecord};
@@ -55,7 +56,7 @@ pub fn section(run: &RunRecord) -> String {
 fn truth(run: &RunRecord) -> String {
     let mut html = String::new();
     if let Some(figures) = &run.objects.figures {
-        let errors = |name: &str, of: &crate::evaluation::objects::Medians| match (of.t_m, of.r_deg) {
+        let errors = |name: &str, of: &Medians| match (of.t_m, of.r_deg) {
             (Some(t_m), Some(r_deg)) => format!("; {name}: {:.1} cm and {r_deg:.2}° in {} motions", 100.0 * t_m, of.frames),
             _ => String::new(),
         };
@@ -70,6 +71,19 @@ fn truth(run: &RunRecord) -> String {
             errors("moving within 20 m", &figures.moving_near),
             errors("moving at 20 to 32 m", &figures.moving_far),
             errors("standing within 20 m", &figures.standing_near)
+        );
+        let late = |name: &str, of: &Late| {
+            let apart = match (of.late_cut, of.late_small) {
+                (0, 0) => String::new(),
+                (cut, small) => format!(" ({cut} of them only while the picture's border cut the thing, {small} while it was small)"),
+            };
+            format!("{name} {} of {}{apart}", of.late, of.tracks)
+        };
+        let _ = write!(
+            html,
+            "<p class=\"small\">Tracks with a state not right in time, of those whose state was due: {}; {}.</p>",
+            late("within 20 m", &figures.late_near),
+            late("at 20 to 32 m", &figures.late_far)
         );
         let [still, moving] = figures.confusion;
         let cells = |counts: [u32; 3]| counts.map(|count| format!("<td class=n>{count}")).concat();
