@@ -14,7 +14,7 @@ use crate::{
     frame::StereoFrame,
     geometry::{Transform, depth_from_disparity},
     image::{View, ViewMut},
-    instances::{CameraMotion, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, ThingAt, TrackReport},
+    instances::{CameraMotion, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, Seen, ThingAt, TrackReport},
     memory::{Carver, SlabError, region_bytes},
     report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
@@ -182,7 +182,12 @@ impl<'s> Mapper<'s> {
         let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous: moved, known };
         // (D) The objects' motions.
         executor.stage(Stage::Instances, || {
-            self.instances.follow(&config.rig, self.scene_flow.refined(), self.scene_flow.sparse(), &camera, &mut self.estimator);
+            let seen = Seen {
+                refined: self.scene_flow.refined(),
+                sparse: self.scene_flow.sparse(),
+                images: Some((&self.scene_flow, self.stereo.disparity_q8())),
+            };
+            self.instances.follow(&config.rig, &seen, &camera, &mut self.estimator);
         });
         // (E) What the camera sees goes into the map, but for what might move, which has maps of its own; unless the pose is a guess
         // or the frame's turn has not come.

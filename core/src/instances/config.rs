@@ -237,8 +237,11 @@ pub struct StateConfig {
     pub sigmas: f32,
     /// How many sigmas are "likely"; at least 0. The published code: 0.
     pub static_sigmas: f32,
-    /// Frames in a row that must say so before an uncertain object gets a state; 1 to 100. The published code: 1.
+    /// Frames in a row that must say so before an uncertain object counts as moving; 1 to 100. The published code: 1.
     pub confirm_frames: u8,
+    /// The same before it counts as standing; 1 to 100; 2: the filter that says so has made its way through several frames by then. The
+    /// published code: 1.
+    pub standing_frames: u8,
     /// Frames in a row that must say so before a moving object counts as standing, or the other way round; 1 to 100. The published code
     /// knows no such change.
     pub change_frames: u8,
@@ -258,6 +261,7 @@ impl Default for StateConfig {
             sigmas: 2.5,
             static_sigmas: 1.0,
             confirm_frames: 3,
+            standing_frames: 2,
             change_frames: 2,
             static_frames: 5,
             dynamic_frames: 3,
@@ -277,6 +281,7 @@ impl StateConfig {
         let likely = self.static_sigmas.is_finite() && self.static_sigmas >= 0.0;
         require(problems, likely, "instances.state.static_sigmas", "must be at least 0");
         require(problems, (1..=100).contains(&self.confirm_frames), "instances.state.confirm_frames", "must be in 1..=100");
+        require(problems, (1..=100).contains(&self.standing_frames), "instances.state.standing_frames", "must be in 1..=100");
         require(problems, (1..=100).contains(&self.change_frames), "instances.state.change_frames", "must be in 1..=100");
     }
 }

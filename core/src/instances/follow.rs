@@ -3,6 +3,7 @@
 use super::{
     CameraMotion, Instances, InstancesConfig, State,
     claim::{near, pixel},
+    look::{Outline, Seen, look},
     measure::{Ground, measure},
     pose::{numbers, transform},
     state::Evidence,
@@ -19,9 +20,11 @@ const SEED: u64 = 0x006F_626A_6563_7473;
 
 impl<'s> Instances<'s> {
     /// Each track's motion, state and pose in this frame, from the matches handed to [`Instances::claim`].
-    pub fn follow(&mut self, rig: &StereoRig, refined: &[Match], sparse: &[Match], camera: &CameraMotion, estimator: &mut Estimator<'_>) {
+    pub fn follow(&mut self, rig: &StereoRig, seen: &Seen<'_, '_>, camera: &CameraMotion, estimator: &mut Estimator<'_>) {
+        let Seen { refined, sparse, images } = *seen;
         let [a, b] = &self.masks;
-        let before = if self.now == 0 { b } else { a };
+        let (now, before) = if self.now == 0 { (a, b) } else { (b, a) };
+        let (detections, looked) = (self.detections.all(), &mut *self.looked);
         let known = |track: &Track| track.judgement.state() != State::Uncertain;
         for track in self.tracks.all_mut() {
             let was_known = known(track);
@@ -46,7 +49,12 @@ impl<'s> Instances<'s> {
                 let own = own.chain(sparse.iter().zip(&*self.sparse_owner).filter(mine).map(|(m, _)| m));
                 let ground = Ground { rig, t_world_camera: &camera.t_world_camera, t_current_previous, interval_s };
                 let seed = SEED ^ u64::from(track.id) << 32 ^ u64::from(self.frame);
-                let seen = measure(&self.config.motion, &ground, own, &mut track.filter, seed, estimator);
+                let detection = track.detection.checked_sub(1).and_then(|at| detections.get(at as usize));
+                let look = images.zip(detection).filter(|_| !enough).map(|(images, detection)| {
+                    let outline = Outline { now: (now, detection.place), before: (before, place) };
+                    (move |motion: &Transform, found: &mut [Match]| look(images, rig, &outline, motion, found), &mut *looked)
+                });
+                let seen = measure(&self.config.motion, &ground, own, look, &mut track.filter, seed, estimator);
                 (track.matches, track.inliers, track.measured) = (seen.matches, seen.inliers, u32::from(seen.measured));
             }
             judge(&self.config, rig, camera, track);

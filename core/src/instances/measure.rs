@@ -83,14 +83,35 @@ fn disparity(m: &Match) -> f64 {
 }
 
 /// Estimates a motion from an object's matches and lets the filter, already predicted, take in those it explains.
+///
+/// `look`, where matches are few, finds more of them where a motion from the previous camera to the current one puts them, and writes them to the
+/// slice beside it: the motion so far or, of a thing seen for the first time, that of the few; where they have none, that of a thing that stands.
 pub(super) fn measure<'m>(
     config: &MotionConfig,
     ground: &Ground<'_>,
     matches: impl Iterator<Item = &'m Match> + Clone,
+    look: Option<(impl FnOnce(&Transform, &mut [Match]) -> usize, &'m mut [Match])>,
     filter: &mut Filter,
     seed: u64,
     estimator: &mut Estimator<'_>,
 ) -> Measured {
+    let settings = config.estimator();
+    // Where the motion so far would take the object, seen from the camera.
+    let camera_world = ground.t_world_camera.inverse();
+    let motion_camera = camera_world * filter.motion(ground.interval_s) * ground.t_world_camera;
+    let mut expected = renormalised(&(motion_camera * ground.t_current_previous));
+    let mut found: &'m [Match] = &[];
+    if let Some((look, room)) = look {
+        if !filter.is_known() {
+            let reach = Reach::of(config, ground.rig, matches.clone());
+            let matches = matches.clone().filter(|m| reach.holds(m));
+            let guess = estimator.estimate(&settings, ground.rig, matches, &mut Random::new(seed), Some(&expected));
+            expected = guess.t_current_previous.unwrap_or(expected);
+        }
+        let count = look(&expected, room);
+        found = room.get(..count).unwrap_or(&[]);
+    }
+    let matches = matches.chain(found);
     let reach = Reach::of(config, ground.rig, matches.clone());
     let matches = matches.filter(move |m| reach.holds(m));
     let points = matches.clone().count() as u32;
@@ -99,11 +120,6 @@ pub(super) fn measure<'m>(
     if points < u32::from(needed) {
         return measured;
     }
-    // Where the motion so far would take the object, seen from the camera.
-    let camera_world = ground.t_world_camera.inverse();
-    let motion_camera = camera_world * filter.motion(ground.interval_s) * ground.t_world_camera;
-    let expected = renormalised(&(motion_camera * ground.t_current_previous));
-    let settings = config.estimator();
     let estimate = estimator.estimate(&settings, ground.rig, matches.clone(), &mut Random::new(seed), Some(&expected));
     if estimate.t_current_previous.is_none() {
         return measured;

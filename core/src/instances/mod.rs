@@ -26,14 +26,15 @@
 //! # Which matches
 //!
 //! Those whose current left keypoint lies under the delete mask (and under no other's copy mask) and whose previous one lay in the track's
-//! previous mask: the matches refined below the pixel and, where these are fewer than `matches_enough`, sparse ones of other features:
-//! they are found also where few neighbours move alike. At least `matches_min` the first time, at least `matches_again` once there is a
-//! motion to go by. The estimator sorts out the outliers, beginning at the motion so far,
-//! with draws of its own for each track and frame; the filter ([`MotionConfig`]) takes the rest in.
+//! previous mask: the matches refined below the pixel and, where these are fewer than `matches_enough`, sparse ones of other features, which
+//! are found also where few neighbours move alike, and those that a closer look finds where the thing must be ([`Seen::images`]). At least
+//! `matches_min` the first time, at least `matches_again` once there is a motion to go by. The estimator sorts out the outliers, beginning at the
+//! motion so far, with draws of its own for each track and frame; the filter ([`MotionConfig`]) takes the rest in.
 //!
 //! # Memory
 //!
-//! Two buffers of `mask_words` 8-byte words; the tables of detections and tracks; a byte a match; crops and volumes as their rooms say.
+//! Two buffers of `mask_words` 8-byte words; the tables of detections and tracks; a byte a match; 256 matches for a closer look; crops and
+//! volumes as their rooms say.
 //!
 //! # What can go wrong
 //!
@@ -52,6 +53,7 @@ mod detection;
 mod digest;
 mod filter;
 mod follow;
+mod look;
 mod mask;
 mod measure;
 mod object;
@@ -70,6 +72,7 @@ pub use class::{Class, Treatment};
 pub use config::{InstancesConfig, MotionConfig, ObjectVolumeConfig, Overlap, StateConfig};
 pub use crop::{CROPS_MAX, Picture};
 pub use detection::{Detection, DetectionCount, MAX_DETECTIONS};
+pub use look::Seen;
 pub use mask::{MaskPlace, MaskStore, PixelBox, ScaledMask};
 pub use object::{MAX_OBJECTS, NoSink, Object, ObjectSink, ObjectSummary, RetiredObject, Retirement};
 pub use placed::PlacedObject;
@@ -78,6 +81,7 @@ pub use state::{Evidence, State};
 pub use track::TrackCount;
 
 use crate::memory::{Capacity, Carver, Footprint, SlabError, region_bytes};
+use crate::scene_flow::Match;
 use crop::{Crop, Crops};
 use detection::Detections;
 use object::Objects;
@@ -95,6 +99,8 @@ pub struct Instances<'s> {
     /// For each refined match the position of the detection it lies on, plus 1; and for each sparse one.
     owner: &'s mut [u8],
     sparse_owner: &'s mut [u8],
+    /// Matches found by a closer look at one thing.
+    looked: &'s mut [Match],
     crops: Crops<'s>,
     objects: Objects<'s>,
     frame: u32,
@@ -109,6 +115,7 @@ impl<'s> Instances<'s> {
             + Tracks::bytes(capacity)
             + region_bytes::<u8>(capacity.matches)
             + region_bytes::<u8>(capacity.matches)
+            + region_bytes::<Match>(look::LOOKS)
             + Crops::bytes(capacity)
             + Objects::bytes(capacity)
     }
@@ -126,6 +133,7 @@ impl<'s> Instances<'s> {
             tracks: Tracks::carve(capacity, carver)?,
             owner: carver.cut("instances.owner", capacity.matches)?,
             sparse_owner: carver.cut("instances.sparse_owner", capacity.matches)?,
+            looked: carver.cut("instances.looked", look::LOOKS)?,
             crops: Crops::carve(capacity, carver)?,
             objects: Objects::carve(capacity, &config.volume, carver)?,
             frame: 0,

@@ -8,7 +8,7 @@
 //! rule (Section III-D).
 //!
 //! ```text
-//!            confirm_frames agree                      change_frames agree
+//!      standing_frames or confirm_frames agree         change_frames agree
 //! uncertain ----------------------> static or dynamic <-------------------> the other
 //!     ^                                    |
 //!     +------------------------------------+  no motion for more than static_frames or dynamic_frames frames
@@ -123,10 +123,15 @@ impl Judgement {
         match evidence {
             Some(evidence) => {
                 self.since_motion = 0;
-                let vote = evidence.vote(config, self.state()) as u32;
-                self.streak = if vote == self.vote { self.streak.saturating_add(1) } else { 1 };
-                self.vote = vote;
-                let needed = if self.state() == State::Uncertain { config.confirm_frames } else { config.change_frames };
+                let vote = evidence.vote(config, self.state());
+                self.streak = if vote as u32 == self.vote { self.streak.saturating_add(1) } else { 1 };
+                self.vote = vote as u32;
+                let needed = match (self.state(), vote) {
+                    (State::Uncertain, State::Static) => config.standing_frames,
+                    (State::Uncertain, _) => config.confirm_frames,
+                    _ => config.change_frames,
+                };
+                let vote = vote as u32;
                 if vote != State::Uncertain as u32 && self.streak >= u32::from(needed) {
                     self.state = vote;
                 }
@@ -158,6 +163,7 @@ mod tests {
         sigmas: 0.0,
         static_sigmas: 0.0,
         confirm_frames: 1,
+        standing_frames: 1,
         change_frames: 2,
         static_frames: 5,
         dynamic_frames: 1,
@@ -223,6 +229,14 @@ mod tests {
     }
 
     #[test]
+    fn standing_and_moving_are_confirmed_by_counts_of_their_own() {
+        let config = StateConfig { confirm_frames: 3, standing_frames: 2, ..PUBLISHED };
+        assert_eq!(states(&config, &[seen(0.0), seen(0.0)]), [Uncertain, Static]);
+        assert_eq!(states(&config, &[seen(1.0), seen(1.0), seen(1.0)]), [Uncertain, Uncertain, Dynamic]);
+        assert_eq!(states(&config, &[seen(0.0), seen(0.2), seen(0.0), seen(0.0)]), [Uncertain, Uncertain, Uncertain, Static]);
+    }
+
+    #[test]
     fn a_frame_without_a_motion_does_not_undo_what_those_before_spoke_for_but_two_do() {
         let config = StateConfig { confirm_frames: 3, ..PUBLISHED };
         let last = |script: &[Option<Evidence>]| *states(&config, script).last().unwrap();
@@ -233,7 +247,12 @@ mod tests {
 
     #[test]
     fn what_may_stand_and_is_slower_than_a_walker_stands_but_what_moved_must_be_seen_to_stop() {
-        let config = StateConfig { confirm_frames: 1, change_frames: 1, ..StateConfig::default() };
+        let config = StateConfig {
+            confirm_frames: 1,
+            standing_frames: 1,
+            change_frames: 1,
+            ..StateConfig::default()
+        };
         let far = |speed_m_s| Some(Evidence { speed_m_s, sigma_m_s: 0.5, spread_m_s: 0.5, bias_m_s: 0.0 });
         assert_eq!(states(&config, &[far(0.6)]), [Static]);
         assert_eq!(states(&config, &[far(0.8)]), [Uncertain], "it may be walking");

@@ -8,7 +8,7 @@ use super::{
     circle::{Corners, Reach},
     matches::Match,
     prior::Prior,
-    refine::{Images, Pixels, refine},
+    refine::{Images, Pixels, find_back, refine},
     report::{FlowReport, FlowStatus, PassCount},
     support::{Motion, support},
 };
@@ -30,6 +30,8 @@ pub struct FlowMatcher<'s> {
     right: Camera<'s>,
     /// Width and height of the last frame, if there is one.
     last: Option<[usize; 2]>,
+    /// Whether the frame before it was matched with it.
+    matched: bool,
     capacity: [usize; 2],
     traced: &'s mut [[u32; 3]],
     prior: Prior<'s>,
@@ -102,6 +104,7 @@ impl<'s> FlowMatcher<'s> {
             left: Camera::carve(capacity, carver, &LEFT)?,
             right: Camera::carve(capacity, carver, &RIGHT)?,
             last: None,
+            matched: false,
             capacity: [capacity.image_width, capacity.image_height],
             traced: carver.cut("scene_flow.circle", capacity.features)?,
             prior: Prior::carve(capacity, carver)?,
@@ -136,6 +139,16 @@ impl<'s> FlowMatcher<'s> {
     /// The matches selected for egomotion.
     pub fn bucketed(&self) -> impl Iterator<Item = &Match> + Clone {
         self.selection().iter().filter_map(|&index| self.refined().get(index as usize))
+    }
+
+    /// Looks for a scene point where it is expected: the patch around its current left position, a whole pixel, is found again below the
+    /// pixel in the other three images. `None` without a frame before, where it is expected outside an image or at no number, and where it is
+    /// lost: no texture, or nothing alike within 1.75 px.
+    pub fn find(&self, expected: &Match) -> Option<Match> {
+        let [width, height] = self.last.filter(|_| self.matched)?;
+        let inside = |at: [f32; 2]| at[0] >= 0.0 && at[1] >= 0.0 && at[0] < width as f32 && at[1] < height as f32;
+        let places = [expected.previous_left, expected.previous_right, expected.current_left, expected.current_right];
+        places.into_iter().all(inside).then(|| find_back(expected, images(&self.left, &self.right, [width, height])))?
     }
 
     #[cfg(test)]
@@ -182,6 +195,7 @@ impl<'s> FlowMatcher<'s> {
 
     fn clear(&mut self) {
         (self.sparse_len, self.refined_len, self.selection_len) = (0, 0, 0);
+        self.matched = false;
     }
 
     /// Takes in a stereo frame and matches it with the one before.
@@ -199,6 +213,7 @@ impl<'s> FlowMatcher<'s> {
             report.status = FlowStatus::First;
             return report;
         }
+        self.matched = true;
         report.sparse = self.sparse_pass(config, size, executor);
         let closed;
         (report.dense, closed) = self.dense_pass(config, size, executor);
@@ -265,15 +280,7 @@ impl<'s> FlowMatcher<'s> {
 
     /// Refines the supported among the first `closed` matches, in four fixed bands, and closes the gaps the others leave.
     fn refine_supported<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], closed: usize, executor: &E) {
-        let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
-        let pixels = |data| Pixels { data, width };
-        let size = width * height;
-        let images = Images {
-            previous_left: pixels(left_before.pixels.get(..size).unwrap_or(&[])),
-            previous_right: pixels(right_before.pixels.get(..size).unwrap_or(&[])),
-            current_left: pixels(left.pixels.get(..size).unwrap_or(&[])),
-            current_right: pixels(right.pixels.get(..size).unwrap_or(&[])),
-        };
+        let images = images(&self.left, &self.right, [width, height]);
         let band = |band: (&mut [Match], &mut [u8], &mut [f32])| {
             for ((m, keep), score) in band.0.iter_mut().zip(band.1).zip(band.2).filter(|((_, keep), _)| **keep == 1) {
                 *score = 0.0;
@@ -302,6 +309,18 @@ impl<'s> FlowMatcher<'s> {
             }
         }
         self.refined_len = len;
+    }
+}
+
+/// The last two pairs, of that size.
+fn images<'a>(left: &'a Camera<'_>, right: &'a Camera<'_>, [width, height]: [usize; 2]) -> Images<'a> {
+    let ((left_before, left), (right_before, right)) = (left.frames(), right.frames());
+    let pixels = |data: &'a [u8]| Pixels { data: data.get(..width * height).unwrap_or(&[]), width };
+    Images {
+        previous_left: pixels(left_before.pixels),
+        previous_right: pixels(right_before.pixels),
+        current_left: pixels(left.pixels),
+        current_right: pixels(right.pixels),
     }
 }
 

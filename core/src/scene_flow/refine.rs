@@ -16,6 +16,10 @@ const STEPS: usize = 8;
 const FARTHEST_PX: f64 = 1.75;
 /// A step below this is the last one, px.
 const SMALL_STEP_PX: f64 = 0.06;
+/// The same where a motion was supposed: what is left of the way errs towards that motion in every patch alike, and would confirm it.
+const GUESSED_STEP_PX: f64 = 0.01;
+/// Correlation with the template below which a patch that no descriptor vouches for is another.
+const ALIKE_MIN: f64 = 0.8;
 /// Smallest eigenvalue of a patch's structure matrix (of doubled gradients) below which it cannot be placed.
 const TEXTURE_MIN: f64 = 2_000.0;
 
@@ -39,6 +43,8 @@ struct Template {
     inverse: [f64; 3],
     /// Its smaller eigenvalue.
     texture: f64,
+    /// Sum of squares of the pixels about their mean.
+    pattern: f64,
 }
 
 fn sum_products(a: &[[i16; SIDE]; SIDE], b: &[[i16; SIDE]; SIDE]) -> i32 {
@@ -94,11 +100,12 @@ impl Template {
             share: with.map(|with| with / pattern),
             inverse,
             texture,
+            pattern,
         })
     }
 
-    /// Where the patch is in another image, begun at (u, v).
-    fn find(&self, image: Pixels<'_>, [u, v]: [f32; 2]) -> Option<[f32; 2]> {
+    /// Where the patch is in another image, begun at (u, v); the first step below `small_step_px` is the last one.
+    fn find(&self, image: Pixels<'_>, [u, v]: [f32; 2], small_step_px: f64) -> Option<[f32; 2]> {
         let begin = [f64::from(u), f64::from(v)];
         let mut at = begin;
         for _ in 0..STEPS {
@@ -113,11 +120,25 @@ impl Template {
                 return None;
             }
             at = next;
-            if moved < SMALL_STEP_PX * SMALL_STEP_PX {
+            if moved < small_step_px * small_step_px {
                 return Some(at.map(|x| x as f32));
             }
         }
         None
+    }
+
+    /// Whether another image shows the patch at a place: whether its pattern there is that of the template, whatever the light.
+    fn is_alike(&self, image: Pixels<'_>, at: [f32; 2]) -> bool {
+        let corner = at.map(|x| libm::floor(16.0 * (f64::from(x) - HALF) + 0.5) as i32);
+        let Some(error) = self.error(image, corner) else { return false };
+        let total = f64::from(sum(&error));
+        let with = (f64::from(sum_products(&self.pixel, &error)) - self.mean[0] * total) / 32.0;
+        // Not by `sum_products`: a square of 13 bits, 64 times over, is 32 bits.
+        let squares: f64 = error.as_flattened().iter().map(|&error| f64::from(error) * f64::from(error)).sum();
+        let own = (squares - total * total / AREA) / 1024.0;
+        // Covariance with the template, and the patch's own variance.
+        let (both, there) = (self.pattern + with, self.pattern + 2.0 * with + own);
+        both > 0.0 && both * both > ALIKE_MIN * ALIKE_MIN * self.pattern * there
     }
 
     /// The image minus the template, in 1/32 grey levels, with the patch's corner at `corner` sixteenths of a pixel.
@@ -160,6 +181,22 @@ impl Template {
     }
 }
 
+/// The patch around a match's current left position, which is a whole pixel, found again near where the match says it is in the other three
+/// images; `None` where it is lost.
+pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
+    let [u, v] = m.current_left.map(|x| x as usize);
+    let template = Template::cut(images.current_left, u, v)?;
+    let find = |image, at| template.find(image, at, GUESSED_STEP_PX).filter(|&at| template.is_alike(image, at));
+    let found = Match {
+        previous_left: find(images.previous_left, m.previous_left)?,
+        previous_right: find(images.previous_right, m.previous_right)?,
+        current_left: m.current_left,
+        current_right: find(images.current_right, m.current_right)?,
+    };
+    let seen = found.previous_disparity_px() > 0.0 && found.current_disparity_px() > 0.0;
+    seen.then_some(found)
+}
+
 /// The four images.
 #[derive(Clone, Copy)]
 pub(super) struct Images<'a> {
@@ -176,9 +213,9 @@ pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
     let template = Template::cut(images.previous_left, u, v)?;
     let refined = Match {
         previous_left: m.previous_left,
-        previous_right: template.find(images.previous_right, m.previous_right)?,
-        current_left: template.find(images.current_left, m.current_left)?,
-        current_right: template.find(images.current_right, m.current_right)?,
+        previous_right: template.find(images.previous_right, m.previous_right, SMALL_STEP_PX)?,
+        current_left: template.find(images.current_left, m.current_left, SMALL_STEP_PX)?,
+        current_right: template.find(images.current_right, m.current_right, SMALL_STEP_PX)?,
     };
     let seen = refined.previous_disparity_px() > 0.0 && refined.current_disparity_px() > 0.0;
     seen.then_some((refined, template.texture as f32))

@@ -6,7 +6,7 @@ use super::{
     features::{DESCRIPTOR, Features, Window, table},
     prior::Prior,
     refine::{Images, Pixels, refine},
-    room::{HEIGHT, WIDTH, see},
+    room::{HEIGHT, RIG, WIDTH, see},
     support::support,
     suppression::{CLASSES, Candidate},
 };
@@ -319,4 +319,46 @@ impl FlowMatcher<'_> {
         let numbers: &mut [u32; 8] = bytemuck::cast_mut(self.refined_mut(at));
         numbers[coordinate] ^= 1 << bit;
     }
+}
+
+#[test]
+fn a_point_is_found_where_it_is_and_not_where_it_was_expected() {
+    let mut slab = slab();
+    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap()).unwrap();
+    let expected = |at: [f32; 2], off: f32| {
+        // The far wall, 14 m away before and 13.7 m now.
+        let [f, b] = [RIG.focal_px, RIG.baseline_m];
+        let (x, y) = ((f64::from(at[0]) - RIG.center_u_px) * 13.7 / f, (f64::from(at[1]) - RIG.center_v_px) * 13.7 / f);
+        let project = |x: f64, z: f64| [(x * f / z + RIG.center_u_px) as f32 + off, (y * f / z + RIG.center_v_px) as f32];
+        Match {
+            previous_left: project(x, 14.0),
+            previous_right: project(x - b, 14.0),
+            current_left: at,
+            current_right: project(x - b, 13.7),
+        }
+    };
+    let push = |matcher: &mut FlowMatcher<'_>, z: f64| {
+        let images = see(&Transform::translation(0.0, 0.0, z));
+        let [left, right] = [0, 1].map(|side| View::new(&images[side], WIDTH, HEIGHT).unwrap());
+        matcher.push(&SceneFlowConfig::default(), left, right, &Serial);
+    };
+    push(&mut matcher, 0.0);
+    assert_eq!(matcher.find(&expected([200.0, 80.0], 0.0)), None, "there is no frame before");
+    push(&mut matcher, 0.3);
+    let (mut found, mut sought) = (0, 0);
+    for (u, v) in (150..240).step_by(10).flat_map(|u| (60..100).step_by(10).map(move |v| (u as f32, v as f32))) {
+        sought += 1;
+        let truth = expected([u, v], 0.0);
+        let Some(m) = matcher.find(&expected([u, v], 0.8)) else { continue };
+        let near = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 0.15 && (a[1] - b[1]).abs() < 0.15;
+        found += i32::from(
+            near(m.previous_left, truth.previous_left)
+                && near(m.previous_right, truth.previous_right)
+                && near(m.current_right, truth.current_right),
+        );
+    }
+    assert!(found * 10 > sought * 7, "{found} of {sought}");
+    assert_eq!(matcher.find(&expected([WIDTH as f32 + 3.0, 80.0], 0.0)), None);
+    assert_eq!(matcher.find(&expected([f32::NAN, 80.0], 0.0)), None);
+    assert_eq!(matcher.find(&expected([200.0, 80.0], f32::INFINITY)), None);
 }

@@ -99,7 +99,7 @@ fn of_volumes_fused_last_in_the_same_frame_that_of_the_older_track_goes() {
 /// The cars at 9 m of `small` m and, if there is one, of `large` m half a width, parked, until their motion is known; crops dropped, and such
 /// fused in the end.
 fn waited(crop_pixels: usize, small: f64, large: Option<f64>) -> (u32, u32) {
-    with(&Capacity { crop_pixels, ..CAPACITY }, &any_size(), |instances, estimator| {
+    with(&Capacity { crop_pixels, ..CAPACITY }, &known_in_the_fourth_frame(), |instances, estimator| {
         let boards: Vec<Board> = [Some(small), large].into_iter().flatten().map(|x| Board { half_m: [x, 0.5], ..Board::CAR }).collect();
         let mut drive = Drive::new(instances, estimator);
         let (mut dropped, mut caught_up) = (0, 0);
@@ -123,7 +123,7 @@ fn a_crop_larger_than_the_ring_is_counted_and_costs_no_other_its_place() {
 
 #[test]
 fn the_ring_of_crops_begins_anew_where_the_next_would_not_fit() {
-    with(&Capacity { crop_pixels: 5_000, ..CAPACITY }, &any_size(), |instances, estimator| {
+    with(&Capacity { crop_pixels: 5_000, ..CAPACITY }, &known_in_the_fourth_frame(), |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         for frame in 0..3 {
             drive.step(shift(0.0, 0.0, 0.5 * f64::from(frame)), &[(&Board::CAR, Some(shift(1.0, 0.3, 10.0)))]);
@@ -136,7 +136,7 @@ fn the_ring_of_crops_begins_anew_where_the_next_would_not_fit() {
 #[test]
 fn of_more_crops_than_there_are_entries_the_latest_wait() {
     let config = InstancesConfig {
-        state: StateConfig { confirm_frames: 255, ..StateConfig::default() },
+        state: StateConfig { confirm_frames: 255, standing_frames: 255, ..StateConfig::default() },
         ..any_size()
     };
     with(&Capacity { crop_pixels: 400_000, ..CAPACITY }, &config, |instances, estimator| {
@@ -157,7 +157,7 @@ fn of_more_crops_than_there_are_entries_the_latest_wait() {
 #[test]
 fn a_volume_that_is_full_keeps_what_it_has() {
     let board = Board { half_m: [0.8, 0.5], ..Board::CAR };
-    with(&Capacity { object_blocks: 75, ..CAPACITY }, &any_size(), |instances, estimator| {
+    with(&Capacity { object_blocks: 75, ..CAPACITY }, &known_in_the_fourth_frame(), |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         let coords = |drive: &Drive<'_, '_, '_>| {
             let (_, object) = drive.instances.objects().next().unwrap();

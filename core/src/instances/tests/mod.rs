@@ -3,6 +3,7 @@
 mod detections;
 mod full;
 mod gaps;
+mod looks;
 mod masks;
 mod matches;
 mod motions;
@@ -165,7 +166,7 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
         };
         self.instances.admit(self.frame, &detections, [WIDTH, HEIGHT]);
         self.instances.claim(&matches, &[]);
-        self.instances.follow(&RIG, &matches, &[], &camera, self.estimator);
+        self.instances.follow(&RIG, &Seen { refined: &matches, sparse: &[], images: None }, &camera, self.estimator);
         let grey = vec![128u8; WIDTH * HEIGHT];
         let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
         let disparity = View::new(&disparity, WIDTH, HEIGHT).unwrap();
@@ -201,7 +202,7 @@ pub(super) fn take_frame(
     };
     instances.admit(frame, detections, [WIDTH, HEIGHT]);
     instances.claim(refined, sparse);
-    instances.follow(&RIG, refined, sparse, &camera, estimator);
+    instances.follow(&RIG, &Seen { refined, sparse, images: None }, &camera, estimator);
     let (grey, nothing) = (vec![128u8; WIDTH * HEIGHT], vec![0u16; WIDTH * HEIGHT]);
     let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
     instances.reconstruct(&RIG, &picture, View::new(&nothing, WIDTH, HEIGHT).unwrap(), &camera, &Serial, &mut NoSink);
@@ -210,6 +211,12 @@ pub(super) fn take_frame(
 /// No detection is too small.
 pub(super) fn any_size() -> InstancesConfig {
     InstancesConfig { area_min_px: 0, ..InstancesConfig::default() }
+}
+
+/// The same where standing takes as long to confirm as moving: either is known in the fourth frame.
+pub(super) fn known_in_the_fourth_frame() -> InstancesConfig {
+    let state = StateConfig { standing_frames: 3, ..StateConfig::default() };
+    InstancesConfig { state, ..any_size() }
 }
 
 impl Instances<'_> {

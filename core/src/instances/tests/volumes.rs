@@ -18,7 +18,7 @@ fn content(instances: &Instances<'_>) -> (Vec<BlockCoord>, u8) {
 
 /// Shows a parked car, too wide in the frames `wide` says; the blocks after each frame and what the sink gets in the end.
 fn parked(frames: u32, z: f64, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize) {
-    with(&CAPACITY, &any_size(), |instances, estimator| {
+    with(&CAPACITY, &known_in_the_fourth_frame(), |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         let blocks = (0..frames)
             .map(|frame| {
