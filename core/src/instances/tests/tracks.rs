@@ -196,9 +196,9 @@ fn what_a_pixel_shows_is_the_best_thing_whose_mask_holds_it() {
     });
 }
 
-/// The box cleared of depth in a frame without detections, and how many pixels of it.
-fn cleared(instances: &mut Instances<'_>, frame: u32) -> Option<(PixelBox, u32)> {
-    instances.admit(frame, &[], [WIDTH, HEIGHT]);
+/// The box cleared of depth in a frame, and how many pixels of it.
+fn cleared(instances: &mut Instances<'_>, frame: u32, detections: &[Detection<'_>]) -> Option<(PixelBox, u32)> {
+    instances.admit(frame, detections, [WIDTH, HEIGHT]);
     let mut depth = vec![5.0f32; WIDTH * HEIGHT];
     instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
     settle(instances);
@@ -216,9 +216,12 @@ fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_i
         take(instances, 1, &[car(110)]);
         for (frame, left) in [(2, 120), (3, 130), (4, 140)] {
             let expected = PixelBox { left, top: 30, width: 60, height: 60 }.scaled(1200);
-            assert_eq!(cleared(instances, frame), Some((expected, 72 * 72)), "frame {frame}");
+            assert_eq!(cleared(instances, frame, &[]), Some((expected, 72 * 72)), "frame {frame}");
         }
-        assert_eq!(cleared(instances, 5), None, "it may be anywhere");
+        assert_eq!(cleared(instances, 5, &[]), None, "it may be anywhere");
+        let found = PixelBox { left: 150, top: 30, width: 60, height: 60 }.scaled(1200);
+        assert_eq!(cleared(instances, 6, &[car(150)]), Some((found, 72 * 72)), "found again: nowhere else");
+        assert_eq!(instances.tracks().next().map(|track| (track.id, track.seen)), Some((1, true)));
     });
 }
 
@@ -226,11 +229,11 @@ fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_i
 fn what_was_seen_once_and_never_again_is_not_kept_out_longer_nor_what_is_too_small() {
     with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
         take(instances, 0, &[car(100)]);
-        assert_eq!(cleared(instances, 1), None, "a ghost");
+        assert_eq!(cleared(instances, 1, &[]), None, "a ghost");
     });
     let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
     with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
         (0..3).for_each(|frame| drop(take(instances, frame, &[small])));
-        assert_eq!(cleared(instances, 3), None);
+        assert_eq!(cleared(instances, 3, &[]), None);
     });
 }
