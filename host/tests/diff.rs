@@ -1,4 +1,4 @@
-//! `dynvox diff` as a user meets it: one pixel, one setting, one frame fewer, and folders that are none.
+//! `dynvox diff` as a user meets it: one pixel, one stage, one setting, one frame fewer, and folders that are none.
 #![allow(missing_docs)]
 
 mod binary;
@@ -41,6 +41,31 @@ fn one_bit_of_one_pixel_is_found_as_input_of_its_frame() {
     run(root.path(), "dirty", &[]);
     let (code, said) = diff(root.path(), &["clean", "dirty"]);
     assert_eq!((code, said.as_str()), (1, "the runs part at frame 2, first in: input\n"));
+}
+
+/// What one bit of a voxel, a match, a pose or a track does to a stage's digest is in the core's tests; here, that the stage is named.
+#[test]
+fn one_bit_of_a_stages_digest_names_the_stage() {
+    let root = prepared();
+    run(root.path(), "dirty", &[]);
+    let csv = root.path().join("dirty/frames.csv");
+    let clean = fs::read_to_string(&csv).unwrap();
+    let table: Vec<Vec<&str>> = clean.lines().map(|line| line.split(',').collect()).collect();
+    for stage in ["input", "disparity", "matches", "egomotion", "tracks", "background", "objects"] {
+        let column = table[0].iter().position(|name| *name == format!("{stage}_digest")).unwrap();
+        let mut dirty: Vec<Vec<String>> = table.iter().map(|row| row.iter().map(|&cell| cell.to_owned()).collect()).collect();
+        let cell = &mut dirty[3][column];
+        // No car drives through these images: an object's digest is one too many.
+        *cell = match u64::from_str_radix(cell, 16) {
+            Ok(digest) => format!("{:016x}", digest ^ 1 << 40),
+            Err(_) => "7:0000010000000000".to_owned(),
+        };
+        let lines: Vec<String> = dirty.iter().map(|row| row.join(",") + "\n").collect();
+        fs::write(&csv, lines.concat()).unwrap();
+        let (code, said) = diff(root.path(), &["clean", "dirty"]);
+        let named = if stage == "objects" { "object 7" } else { stage };
+        assert_eq!((code, said), (1, format!("the runs part at frame 2, first in: {named}\n")));
+    }
 }
 
 #[test]
