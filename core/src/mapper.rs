@@ -12,7 +12,7 @@ use crate::{
     config::{Config, Problem},
     egomotion::{Egomotion, Estimator, MotionEstimate},
     frame::StereoFrame,
-    geometry::{Transform, depth_from_disparity},
+    geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
     instances::{CameraMotion, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, Seen, ThingAt, TrackReport},
     memory::{Carver, SlabError, region_bytes},
@@ -87,7 +87,6 @@ pub struct Mapper<'s> {
     /// Width and height of the frames, known from the first one on.
     size: Option<[usize; 2]>,
     frame: u32,
-    footprint: Footprint,
 }
 
 impl Capacity {
@@ -100,6 +99,15 @@ impl Capacity {
             + region_bytes::<f32>(self.pixels())
             + Volume::bytes(self)
             + Raycaster::bytes(self)
+    }
+
+    /// Every region a mapper of this capacity cuts out of its slab.
+    pub fn footprint(&self) -> Footprint {
+        let mut carver = Carver::without_slab();
+        // Regions depend on the capacity alone: any rig will do.
+        let rig = StereoRig { focal_px: 1.0, center_u_px: 0.0, center_v_px: 0.0, baseline_m: 1.0 };
+        Mapper::cut(self, &Config::for_rig(rig), &mut carver);
+        carver.into_footprint()
     }
 }
 
@@ -114,28 +122,33 @@ const _: () = assert!(Capacity::DESKTOP.bytes() < 2048 * MIB);
 impl<'s> Mapper<'s> {
     /// Cuts a mapper out of `slab`, which must begin at a multiple of [`crate::memory::SLAB_ALIGN`] bytes and hold at least
     /// `capacity.bytes()`.
-    // Never inlined: what it needs of the stack, some copies of the mapper, must not stay in its caller's frame.
+    // Never inlined: what it needs of the stack must not stay in its caller's frame.
     #[inline(never)]
     pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {
         if let Some(problem) = config.validate().first() {
             return Err(NewError::Config(*problem));
         }
         let mut carver = Carver::new(slab, capacity.bytes())?;
-        Ok(Self {
+        let mapper = Self::cut(capacity, config, &mut carver);
+        carver.check()?;
+        Ok(mapper)
+    }
+
+    fn cut(capacity: &Capacity, config: &Config, carver: &mut Carver<'s>) -> Self {
+        Self {
             config: *config,
             capacity: *capacity,
-            stereo: StereoMatcher::carve(capacity, &mut carver)?,
-            scene_flow: FlowMatcher::carve(capacity, &mut carver)?,
-            estimator: Estimator::carve(capacity, &mut carver)?,
+            stereo: StereoMatcher::carve(capacity, carver),
+            scene_flow: FlowMatcher::carve(capacity, carver),
+            estimator: Estimator::carve(capacity, carver),
             camera: Egomotion::default(),
-            instances: Instances::carve(capacity, &config.instances, &mut carver)?,
-            depth_m: carver.cut("depth_m", capacity.pixels())?,
-            background: Volume::carve(capacity, &config.volume, &mut carver)?,
-            raycaster: Raycaster::carve(capacity, &config.raycast, &mut carver)?,
+            instances: Instances::carve(capacity, &config.instances, carver),
+            depth_m: carver.cut("depth_m", capacity.pixels()),
+            background: Volume::carve(capacity, &config.volume, carver),
+            raycaster: Raycaster::carve(capacity, &config.raycast, carver),
             size: None,
             frame: 0,
-            footprint: carver.into_footprint(),
-        })
+        }
     }
 
     /// Takes one frame: depth, motion, map. Never allocates, never panics; what could not be done is counted in the report. Blocks that
@@ -352,7 +365,7 @@ impl<'s> Mapper<'s> {
 
     /// Every region of the slab, with its use now and at most.
     pub fn footprint(&self) -> Footprint {
-        let mut footprint = self.footprint.clone();
+        let mut footprint = self.capacity.footprint();
         self.background.note_use(&mut footprint);
         self.instances.note_use(&mut footprint);
         self.raycaster.note_use(&mut footprint);

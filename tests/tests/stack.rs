@@ -1,9 +1,10 @@
-//! P1: a step on one thread stays within 32 KiB of stack, measured by painting it.
+//! P1: making a mapper, a step on one thread, saving and restoring each stay within 32 KiB of stack, measured by painting it.
 #![expect(unsafe_code, reason = "the stack below a frame can only be written to through a pointer")]
 
-use dynvox_core::{Capacity, Serial};
-use dynvox_tests::Clip;
-use std::thread;
+use dynvox::segmentation::Sighting;
+use dynvox_core::{Capacity, Mapper, Serial, StereoFrame};
+use dynvox_tests::{Clip, HeapSlab};
+use std::{convert::Infallible, hint::black_box, thread};
 
 const PAINTED: usize = 512 * 1024;
 /// Not painted: what the painter itself stands on.
@@ -14,7 +15,7 @@ const PAINT: u8 = 0xA5;
 #[inline(never)]
 fn stack_pointer() -> *mut u8 {
     let mut here = 0u8;
-    std::hint::black_box(&raw mut here)
+    black_box(&raw mut here)
 }
 
 #[inline(never)]
@@ -35,27 +36,50 @@ fn used() -> usize {
     PAINTED - kept
 }
 
+/// What `work` gives, in its caller's frame, and the stack it took below that.
+#[inline(never)]
+fn painted<R>(work: impl FnOnce() -> R) -> (R, usize) {
+    paint();
+    let result = work();
+    (result, used())
+}
+
 #[test]
-fn a_step_stays_within_32_kib_of_stack() {
-    let clip = Clip::street(320, 96, 12);
-    let peak = thread::Builder::new()
-        .stack_size(4 << 20)
-        .spawn(move || {
-            clip.with_mapper(&Capacity::TINY, |mapper| {
-                let mut peak = 0;
-                for frame in clip.stereo() {
-                    paint();
-                    let report = mapper.step(&frame, &Serial);
-                    peak = peak.max(used());
-                    assert!(report.is_ok());
-                }
-                peak
-            })
-        })
-        .expect("a thread")
-        .join()
-        .expect("no panic");
-    println!("stack of a step: {peak} bytes at most");
-    assert!(peak > 1_000, "the paint shows something");
-    assert!(peak <= 32 * 1024, "{peak} bytes");
+fn making_a_mapper_a_step_saving_and_restoring_stay_within_32_kib_of_stack() {
+    let drive = || {
+        let clip = Clip::street(320, 96, 12);
+        let mut slab = HeapSlab::of(&Capacity::TINY);
+        let config = clip.config();
+        let (mut made, making) = painted(|| Mapper::new(&Capacity::TINY, &config, slab.bytes()));
+        let mapper = made.as_mut().expect("a slab that fits");
+        let mut step = 0;
+        for (frame, seen) in clip.stereo().zip(clip.sightings()) {
+            let detections: Vec<_> = seen.iter().map(Sighting::detection).collect();
+            let (report, bytes) = painted(|| mapper.step(&StereoFrame { detections: &detections, ..frame }, &Serial));
+            assert!(report.is_ok());
+            step = step.max(bytes);
+        }
+        assert!(mapper.objects().next().is_some(), "cars have maps of their own");
+        let mut snapshot = Vec::with_capacity(8 << 20);
+        let mut sink = |bytes: &[u8]| -> Result<(), Infallible> {
+            snapshot.extend_from_slice(bytes);
+            Ok(())
+        };
+        let (_, saving) = painted(|| mapper.save(&mut sink));
+        drop(made);
+        let mut rest = &snapshot[..];
+        let mut source = |bytes: &mut [u8]| -> Result<(), Infallible> {
+            bytes.copy_from_slice(rest.split_off(..bytes.len()).expect("as many as were saved"));
+            Ok(())
+        };
+        let (restored, restoring) = painted(|| Mapper::restore(&Capacity::TINY, &config, slab.bytes(), &mut source));
+        assert!(restored.is_ok());
+        [("making", making), ("a step", step), ("saving", saving), ("restoring", restoring)]
+    };
+    let peaks = thread::Builder::new().stack_size(4 << 20).spawn(drive).expect("a thread").join().expect("no panic");
+    println!("stack, bytes at most: {peaks:?}; the mapper itself: {}", size_of::<Mapper<'_>>());
+    for (what, peak) in peaks {
+        assert!(peak > 1_000, "{what}: the paint shows something");
+        assert!(peak <= 32 * 1024, "{what}: {peak} bytes");
+    }
 }

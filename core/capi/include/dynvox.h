@@ -313,7 +313,7 @@ size_t dynvox_alignment(void);
 DynvoxStatus dynvox_bytes(DynvoxProfile profile, size_t *bytes);
 
 // Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nobody else may read,
-// write, move or free it. What it holds before does not matter. Takes up to 64 KiB of stack, once; a step takes less than 32 KiB.
+// write, move or free it. What it holds before does not matter. Takes less than 32 KiB of stack, as a step does.
 //
 // # Safety
 // `config` is null or points to a configuration, `buffer` is null or to `len` bytes that are nobody else's, `mapper` is null or to room for

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     geometry::{StereoRig, Transform},
-    memory::{Capacity, Carver, SlabError, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
     random::Random,
     scene_flow::Match,
 };
@@ -85,12 +85,12 @@ impl<'s> Estimator<'s> {
     }
 
     /// Cuts its regions.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self {
-            points: Points::carve(capacity.matches, carver)?,
-            inliers: carver.cut("egomotion.inlier", capacity.matches)?,
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self {
+            points: Points::carve(capacity.matches, carver),
+            inliers: carver.cut("egomotion.inlier", capacity.matches),
             inlier_len: 0,
-        })
+        }
     }
 
     /// Positions, in the order handed in, of the matches the last estimate explains.

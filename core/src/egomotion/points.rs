@@ -4,7 +4,7 @@
 
 use crate::{
     geometry::{StereoRig, Transform},
-    memory::{Carver, SlabError, region_bytes},
+    memory::{Carver, region_bytes},
     scene_flow::Match,
 };
 
@@ -45,10 +45,10 @@ impl<'s> Points<'s> {
         region_bytes::<f32>(COLUMNS * matches) + region_bytes::<u32>(matches)
     }
 
-    pub(super) fn carve(matches: usize, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        let mut columns = carver.cut("egomotion.point", COLUMNS * matches)?;
+    pub(super) fn carve(matches: usize, carver: &mut Carver<'s>) -> Self {
+        let mut columns = carver.cut("egomotion.point", COLUMNS * matches);
         let mut column = || columns.split_off_mut(..matches).unwrap_or_default();
-        Ok(Self {
+        Self {
             x: column(),
             y: column(),
             z: column(),
@@ -56,9 +56,9 @@ impl<'s> Points<'s> {
             left_v: column(),
             right_u: column(),
             right_v: column(),
-            source: carver.cut("egomotion.source", matches)?,
+            source: carver.cut("egomotion.source", matches),
             len: 0,
-        })
+        }
     }
 
     pub(super) fn len(&self) -> usize {

@@ -12,7 +12,7 @@ use crate::{
     digest::Digest,
     geometry::StereoRig,
     image::View,
-    memory::{Capacity, Carver, SlabError, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
     snapshot::Archive,
 };
 use bytemuck::{Pod, Zeroable};
@@ -140,16 +140,16 @@ impl<'s> Crops<'s> {
             + region_bytes::<Crop>(CROPS_MAX)
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let pixels = capacity.crop_pixels;
-        Ok(Self {
-            disparity_q8: carver.cut("instances.crop_disparity", pixels)?,
-            grey: carver.cut("instances.crop_grey", pixels)?,
-            colour: if capacity.colour { carver.cut("instances.crop_colour", pixels)? } else { &mut [] },
-            entries: carver.cut("instances.crop", CROPS_MAX)?,
+        Self {
+            disparity_q8: carver.cut("instances.crop_disparity", pixels),
+            grey: carver.cut("instances.crop_grey", pixels),
+            colour: if capacity.colour { carver.cut("instances.crop_colour", pixels) } else { &mut [] },
+            entries: carver.cut("instances.crop", CROPS_MAX),
             len: 0,
             next: 0,
-        })
+        }
     }
 
     /// Puts a crop, its disparity given row by row, into the ring. Returns how many crops still waiting went for it, or `None` when it is

@@ -14,7 +14,7 @@
 use super::{Class, InstancesConfig, MaskPlace, MaskStore, PixelBox, Treatment, mask::ScaledMask};
 use crate::{
     digest::Digest,
-    memory::{Capacity, Carver, SlabError, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
 };
 use bytemuck::{Pod, Zeroable};
 use heapless::Vec;
@@ -157,8 +157,8 @@ impl<'s> Detections<'s> {
         region_bytes::<Taken>(capacity.detections)
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self { taken: carver.cut("instances.detection", capacity.detections)?, len: 0 })
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self { taken: carver.cut("instances.detection", capacity.detections), len: 0 }
     }
 
     pub fn all(&self) -> &[Taken] {

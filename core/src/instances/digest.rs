@@ -1,6 +1,6 @@
 //! Digests of tracks and objects.
 
-use super::{Instances, Object};
+use super::Instances;
 use crate::{digest::Digest, stage_digests::ObjectDigests};
 
 impl Instances<'_> {
@@ -17,6 +17,6 @@ impl Instances<'_> {
 
     /// Digests of the objects.
     pub fn object_digests(&self) -> ObjectDigests {
-        ObjectDigests::of(self.objects.objects.iter().filter_map(Object::digest))
+        ObjectDigests::of(self.objects.objects.iter().filter_map(|object| object.digest()))
     }
 }

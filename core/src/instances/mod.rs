@@ -80,7 +80,7 @@ pub use report::{InstancesReport, ObjectCount, TrackReport};
 pub use state::{Evidence, State};
 pub use track::TrackCount;
 
-use crate::memory::{Capacity, Carver, Footprint, SlabError, region_bytes};
+use crate::memory::{Capacity, Carver, Footprint, region_bytes};
 use crate::scene_flow::Match;
 use crop::{Crop, Crops};
 use detection::Detections;
@@ -121,24 +121,24 @@ impl<'s> Instances<'s> {
     }
 
     /// Cuts its regions.
-    pub fn carve(capacity: &Capacity, config: &InstancesConfig, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self {
+    pub fn carve(capacity: &Capacity, config: &InstancesConfig, carver: &mut Carver<'s>) -> Self {
+        Self {
             config: *config,
             masks: [
-                MaskStore::new(carver.cut("instances.mask0", capacity.mask_words)?),
-                MaskStore::new(carver.cut("instances.mask1", capacity.mask_words)?),
+                MaskStore::new(carver.cut("instances.mask0", capacity.mask_words)),
+                MaskStore::new(carver.cut("instances.mask1", capacity.mask_words)),
             ],
             now: 0,
-            detections: Detections::carve(capacity, carver)?,
-            tracks: Tracks::carve(capacity, carver)?,
-            owner: carver.cut("instances.owner", capacity.matches)?,
-            sparse_owner: carver.cut("instances.sparse_owner", capacity.matches)?,
-            looked: carver.cut("instances.looked", look::LOOKS)?,
-            crops: Crops::carve(capacity, carver)?,
-            objects: Objects::carve(capacity, &config.volume, carver)?,
+            detections: Detections::carve(capacity, carver),
+            tracks: Tracks::carve(capacity, carver),
+            owner: carver.cut("instances.owner", capacity.matches),
+            sparse_owner: carver.cut("instances.sparse_owner", capacity.matches),
+            looked: carver.cut("instances.looked", look::LOOKS),
+            crops: Crops::carve(capacity, carver),
+            objects: Objects::carve(capacity, &config.volume, carver),
             frame: 0,
             report: InstancesReport::default(),
-        })
+        }
     }
 
     fn masks_now(&self) -> &MaskStore<'s> {

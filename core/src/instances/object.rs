@@ -15,13 +15,13 @@
 //! Every `prune_frames` fused frames, and before it retires, the whole volume is rid of voxels seen at most `prune_weight` times: the paper
 //! prunes objects whole at every frame (Section III-F); a voxel then needs the time to be seen twice, hence the interval.
 //!
-//! Memory: `capacity.objects` times a [`Volume`] of `capacity.object_blocks` blocks, and 4 bytes a pixel of the largest image.
+//! Memory: `capacity.objects` times a [`Volume`] of `capacity.object_blocks` blocks and 640 bytes, and 6 bytes a pixel of the largest image.
 
 use super::{Class, ObjectVolumeConfig, State};
 use crate::{
     digest::Digest,
     geometry::Transform,
-    memory::{Capacity, Carver, SlabError, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
     stage_digests::ObjectDigest,
     volume::Volume,
 };
@@ -140,10 +140,14 @@ const fn bounds(capacity: &Capacity) -> Capacity {
     }
 }
 
+/// Room for an [`Object`] with pointers as wide as they come.
+const OBJECT_BYTES: usize = 640;
+const _: () = assert!(size_of::<Object<'_>>() <= OBJECT_BYTES);
+
 /// All object volumes.
 #[derive(Debug)]
 pub(super) struct Objects<'s> {
-    pub objects: Vec<Object<'s>, MAX_OBJECTS>,
+    pub objects: Vec<&'s mut Object<'s>, MAX_OBJECTS>,
     /// Depth of one crop, m.
     pub depth_m: &'s mut [f32],
     /// Disparity of one crop.
@@ -151,31 +155,31 @@ pub(super) struct Objects<'s> {
 }
 
 impl<'s> Objects<'s> {
-    const fn room(capacity: &Capacity) -> usize {
-        let objects = if capacity.objects < MAX_OBJECTS { capacity.objects } else { MAX_OBJECTS };
-        objects * Volume::bytes(&bounds(capacity))
+    const fn volumes(capacity: &Capacity) -> usize {
+        if capacity.objects < MAX_OBJECTS { capacity.objects } else { MAX_OBJECTS }
     }
 
     pub const fn bytes(capacity: &Capacity) -> usize {
-        region_bytes::<u8>(Self::room(capacity)) + region_bytes::<f32>(capacity.pixels()) + region_bytes::<u16>(capacity.pixels())
+        Self::volumes(capacity) * (Volume::bytes(&bounds(capacity)) + region_bytes::<u8>(OBJECT_BYTES))
+            + region_bytes::<f32>(capacity.pixels())
+            + region_bytes::<u16>(capacity.pixels())
     }
 
-    pub fn carve(capacity: &Capacity, config: &ObjectVolumeConfig, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        let bounds = bounds(capacity);
-        let one = Volume::bytes(&bounds);
-        let mut objects = Vec::new();
-        // One region in the footprint for all: so many volumes would have too many names.
-        let mut rest = carver.cut::<u8>("instances.volumes", Self::room(capacity))?;
-        while let Some(room) = rest.split_off_mut(..one).filter(|_| one > 0) {
-            let volume = Volume::carve(&bounds, &config.volume(), &mut Carver::new(room, one)?)?;
-            let _ = objects.push(Object { volume, summary: None });
+    pub fn carve(capacity: &Capacity, config: &ObjectVolumeConfig, carver: &mut Carver<'s>) -> Self {
+        let (bounds, config, pixels) = (bounds(capacity), config.volume(), capacity.pixels());
+        let mut made = Self {
+            depth_m: carver.cut("instances.depth_m", pixels),
+            disparity_q8: carver.cut("instances.disparity", pixels),
+            objects: Vec::new(),
+        };
+        for _ in 0..Self::volumes(capacity) {
+            let object = carver.as_one("instances.volumes", |carver| {
+                let volume = Volume::carve(&bounds, &config, carver);
+                carver.put("object", OBJECT_BYTES, Object { volume, summary: None })
+            });
+            object.and_then(|object| made.objects.push(object).err());
         }
-        let pixels = capacity.pixels();
-        Ok(Self {
-            objects,
-            depth_m: carver.cut("instances.depth_m", pixels)?,
-            disparity_q8: carver.cut("instances.disparity", pixels)?,
-        })
+        made
     }
 
     /// Position of the object of a track.

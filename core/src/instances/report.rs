@@ -125,6 +125,6 @@ impl<'s> Instances<'s> {
 
     /// The objects that have a volume now.
     pub fn objects(&self) -> impl Iterator<Item = (&ObjectSummary, &Object<'s>)> {
-        self.objects.objects.iter().filter_map(|object| Some((object.summary()?, object)))
+        self.objects.objects.iter().filter_map(|object| Some((object.summary()?, &**object)))
     }
 }

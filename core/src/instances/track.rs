@@ -12,7 +12,7 @@
 
 use super::{Class, InstancesConfig, MaskPlace, MaskStore, State, config::Overlap, detection::Taken, filter::Filter, state::Judgement};
 use crate::digest::Digest;
-use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::memory::{Capacity, Carver, region_bytes};
 use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
 
@@ -171,13 +171,13 @@ impl<'s> Tracks<'s> {
         region_bytes::<Track>(capacity.tracks) + region_bytes::<f32>(capacity.tracks * capacity.detections)
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self {
-            tracks: carver.cut("instances.track", capacity.tracks)?,
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self {
+            tracks: carver.cut("instances.track", capacity.tracks),
             len: 0,
             next_id: 1,
-            scores: carver.cut("instances.affinity", capacity.tracks * capacity.detections)?,
-        })
+            scores: carver.cut("instances.affinity", capacity.tracks * capacity.detections),
+        }
     }
 
     /// Writes or reads all tracks.

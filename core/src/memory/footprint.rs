@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 /// Most regions one slab can be cut into.
-const MAX_REGIONS: usize = 128;
+const MAX_REGIONS: usize = 96;
 
 /// One named region of the slab. All figures in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,8 +25,13 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    pub(super) fn add(&mut self, region: Region) -> Result<(), Region> {
-        self.regions.push(region)
+    /// Books so many bytes under a name: to the last region if that is its name, else to a new one. Whether there was room for it.
+    pub(super) fn book(&mut self, name: &'static str, bytes: usize) -> bool {
+        if let Some(last) = self.regions.last_mut().filter(|last| last.name == name) {
+            (last.bytes, last.used, last.peak) = (last.bytes + bytes, last.used + bytes, last.peak + bytes);
+            return true;
+        }
+        self.regions.push(Region { name, bytes, used: bytes, peak: bytes }).is_ok()
     }
 
     /// All regions, in slab order.

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     image::View,
-    memory::{Capacity, Carver, SlabError, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
     snapshot::Archive,
 };
 
@@ -81,28 +81,28 @@ impl<'s> Camera<'s> {
             + region_bytes::<Candidate>(capacity.features)
     }
 
-    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Result<Self, SlabError> {
+    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Self {
         let pixels = capacity.pixels();
         let sets = [capacity.features, sparse(capacity)];
         let features = 2 * (sets[0] + sets[1]);
-        let mut image = carver.cut(names.pixels, 2 * pixels)?;
-        let mut position = carver.cut(names.position, features)?;
-        let mut descriptor = carver.cut(names.descriptor, features)?;
-        let mut cell = carver.cut(names.cell, 4 * table(capacity))?;
+        let mut image = carver.cut(names.pixels, 2 * pixels);
+        let mut position = carver.cut(names.position, features);
+        let mut descriptor = carver.cut(names.descriptor, features);
+        let mut cell = carver.cut(names.cell, 4 * table(capacity));
         let mut frame = || {
             let [dense, sparse] =
                 sets.map(|count| Features::new(part(&mut position, count), part(&mut descriptor, count), part(&mut cell, table(capacity))));
             Frame { pixels: part(&mut image, pixels), dense, sparse }
         };
-        Ok(Self {
+        Self {
             frames: [frame(), frame()],
             current: false,
-            gradient: carver.cut(names.gradient, pixels)?,
-            blob: carver.cut(names.blob, pixels)?,
-            corner: carver.cut(names.corner, pixels)?,
-            sums: carver.cut(names.sums, COLUMN_SUMS * capacity.image_width)?,
-            candidates: carver.cut(names.candidate, capacity.features)?,
-        })
+            gradient: carver.cut(names.gradient, pixels),
+            blob: carver.cut(names.blob, pixels),
+            corner: carver.cut(names.corner, pixels),
+            sums: carver.cut(names.sums, COLUMN_SUMS * capacity.image_width),
+            candidates: carver.cut(names.candidate, capacity.features),
+        }
     }
 
     /// The previous and the current frame.

@@ -3,7 +3,7 @@
 //! Memory: 4 bytes per match and per cell of [`CELL_MIN_PX`].
 
 use super::matches::Match;
-use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::memory::{Capacity, Carver, region_bytes};
 
 /// Side of the smallest cells, px.
 pub(super) const CELL_MIN_PX: usize = 16;
@@ -46,11 +46,11 @@ impl<'s> Cells<'s> {
         region_bytes::<u32>(table(capacity)) + region_bytes::<u32>(capacity.matches)
     }
 
-    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self {
-            start: carver.cut("scene_flow.match_cell", table(capacity))?,
-            order: carver.cut("scene_flow.match_order", capacity.matches)?,
-        })
+    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self {
+            start: carver.cut("scene_flow.match_cell", table(capacity)),
+            order: carver.cut("scene_flow.match_order", capacity.matches),
+        }
     }
 
     /// Sorts. Returns the cells' starts (one more than cells) and the matches' positions, cell by cell.

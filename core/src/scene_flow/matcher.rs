@@ -16,7 +16,7 @@ use crate::{
     digest::Digest,
     executor::{Executor, join4},
     image::View,
-    memory::{Capacity, Carver, SlabError, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
     snapshot::Archive,
 };
 
@@ -98,27 +98,27 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Cuts its regions.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let matches = capacity.matches;
-        Ok(Self {
-            left: Camera::carve(capacity, carver, &LEFT)?,
-            right: Camera::carve(capacity, carver, &RIGHT)?,
+        Self {
+            left: Camera::carve(capacity, carver, &LEFT),
+            right: Camera::carve(capacity, carver, &RIGHT),
             last: None,
             matched: false,
             capacity: [capacity.image_width, capacity.image_height],
-            traced: carver.cut("scene_flow.circle", capacity.features)?,
-            prior: Prior::carve(capacity, carver)?,
-            cells: Cells::carve(capacity, carver)?,
-            motion: carver.cut("scene_flow.motion", matches)?,
-            keep: carver.cut("scene_flow.keep", matches)?,
-            sparse: carver.cut("scene_flow.sparse", sparse_matches(capacity))?,
+            traced: carver.cut("scene_flow.circle", capacity.features),
+            prior: Prior::carve(capacity, carver),
+            cells: Cells::carve(capacity, carver),
+            motion: carver.cut("scene_flow.motion", matches),
+            keep: carver.cut("scene_flow.keep", matches),
+            sparse: carver.cut("scene_flow.sparse", sparse_matches(capacity)),
             sparse_len: 0,
-            refined: carver.cut("scene_flow.refined", matches)?,
+            refined: carver.cut("scene_flow.refined", matches),
             refined_len: 0,
-            score: carver.cut("scene_flow.score", matches)?,
-            selection: carver.cut("scene_flow.selection", matches)?,
+            score: carver.cut("scene_flow.score", matches),
+            selection: carver.cut("scene_flow.selection", matches),
             selection_len: 0,
-        })
+        }
     }
 
     /// The sparse pass' matches of the last frame: whole pixels, outliers included.

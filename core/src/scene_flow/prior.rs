@@ -7,7 +7,7 @@
 //! Memory: 64 bytes per bin.
 
 use super::{SceneFlowConfig, circle::Reach, matches::Match};
-use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::memory::{Capacity, Carver, region_bytes};
 
 /// Side of a bin, px.
 const BIN_PX: usize = 50;
@@ -42,13 +42,13 @@ impl<'s> Prior<'s> {
         2 * region_bytes::<Reach>(bins(capacity))
     }
 
-    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self {
-            learned: carver.cut("scene_flow.learned", bins(capacity))?,
-            reach: carver.cut("scene_flow.reach", bins(capacity))?,
+    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self {
+            learned: carver.cut("scene_flow.learned", bins(capacity)),
+            reach: carver.cut("scene_flow.reach", bins(capacity)),
             columns: 0,
             rows: 0,
-        })
+        }
     }
 
     /// Where to look for the partners of a previous-left feature at (u, v).

@@ -11,7 +11,7 @@
 //! Memory: 66 bytes a point. Time: about linear on street scenes (a few flips a point). Four points on one circle keep the diagonal
 //! that the order of insertion gives. Points on one line make no triangle.
 
-use crate::memory::{Carver, SlabError, region_bytes};
+use crate::memory::{Carver, region_bytes};
 use bytemuck::{Pod, Zeroable};
 
 /// A support point of one image.
@@ -82,18 +82,18 @@ impl<'s> Triangulation<'s> {
     }
 
     /// Cuts room for `points` points.
-    pub fn carve(points: usize, names: [&'static str; 3], carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+    pub fn carve(points: usize, names: [&'static str; 3], carver: &mut Carver<'s>) -> Self {
         let [points_name, triangles_name, hull_name] = names;
-        Ok(Self {
-            points: carver.cut(points_name, points)?,
-            corner: Table(carver.cut(triangles_name, 6 * points)?),
-            twin: Table(carver.cut(triangles_name, 6 * points)?),
-            hull_next: Table(carver.cut(hull_name, points)?),
-            hull_previous: Table(carver.cut(hull_name, points)?),
-            hull_edge: Table(carver.cut(hull_name, points)?),
+        Self {
+            points: carver.cut(points_name, points),
+            corner: Table(carver.cut(triangles_name, 6 * points)),
+            twin: Table(carver.cut(triangles_name, 6 * points)),
+            hull_next: Table(carver.cut(hull_name, points)),
+            hull_previous: Table(carver.cut(hull_name, points)),
+            hull_edge: Table(carver.cut(hull_name, points)),
             len: 0,
             triangles: 0,
-        })
+        }
     }
 
     /// Forgets all points and triangles.
@@ -283,7 +283,7 @@ mod tests {
         let mut memory = vec![0u8; Triangulation::bytes(points.len()) + SLAB_ALIGN];
         let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
         let mut carver = Carver::new(&mut memory[skip..], 0).unwrap();
-        let mut mesh = Triangulation::carve(points.len(), ["p", "t", "h"], &mut carver).unwrap();
+        let mut mesh = Triangulation::carve(points.len(), ["p", "t", "h"], &mut carver);
         let mut in_rows = points.to_vec();
         in_rows.sort_by_key(|point| point.v);
         for &point in &in_rows {
@@ -355,7 +355,7 @@ mod tests {
         let mut memory = vec![0u8; Triangulation::bytes(3) + SLAB_ALIGN];
         let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
         let mut carver = Carver::new(&mut memory[skip..], 0).unwrap();
-        let mut mesh = Triangulation::carve(3, ["p", "t", "h"], &mut carver).unwrap();
+        let mut mesh = Triangulation::carve(3, ["p", "t", "h"], &mut carver);
         let at = |u, disparity| SupportPoint { u, v: 2, disparity };
         let dropped = [at(9, 4), at(5, 7), at(9, 6), at(5, 3), at(7, 1), at(8, 1)].map(|point| mesh.add(point));
         assert_eq!(dropped, [false, false, true, true, false, true]);

@@ -11,7 +11,7 @@ use super::{BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Viewpoint, Volum
 use crate::{
     geometry::scalar::{floor_i32, max_f32},
     image::View,
-    memory::{Carver, SlabError, region_bytes},
+    memory::{Carver, region_bytes},
 };
 use nalgebra::Vector3;
 
@@ -50,8 +50,8 @@ impl<'s> Seen<'s> {
         region_bytes::<u64>(SEEN_ENTRIES)
     }
 
-    pub(super) fn carve(carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self { entries: carver.cut("volume.seen", SEEN_ENTRIES)? })
+    pub(super) fn carve(carver: &mut Carver<'s>) -> Self {
+        Self { entries: carver.cut("volume.seen", SEEN_ENTRIES) }
     }
 
     fn clear(&mut self) {

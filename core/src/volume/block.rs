@@ -3,7 +3,7 @@
 //! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and 17 bytes beside them (coordinates, content digest, faintest
 //! weight).
 
-use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::memory::{Capacity, Carver, region_bytes};
 use crate::snapshot::Archive;
 
 /// Lattice points along a block's side.
@@ -81,16 +81,16 @@ impl<'s> Blocks<'s> {
     }
 
     /// Cuts the payload of `capacity.blocks` blocks.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let coloured = if capacity.colour { capacity.blocks } else { 0 };
-        Ok(Self {
-            coord: carver.cut("volume.coord", capacity.blocks)?,
-            sdf: carver.cut_as_found("volume.sdf", capacity.blocks)?,
-            weight: carver.cut_as_found("volume.weight", capacity.blocks)?,
-            colour: if capacity.colour { carver.cut_as_found("volume.colour", coloured)? } else { &mut [] },
-            digest: carver.cut("volume.digest", capacity.blocks)?,
-            faintest: carver.cut("volume.faintest", capacity.blocks)?,
-        })
+        Self {
+            coord: carver.cut("volume.coord", capacity.blocks),
+            sdf: carver.cut_as_found("volume.sdf", capacity.blocks),
+            weight: carver.cut_as_found("volume.weight", capacity.blocks),
+            colour: if capacity.colour { carver.cut_as_found("volume.colour", coloured) } else { &mut [] },
+            digest: carver.cut("volume.digest", capacity.blocks),
+            faintest: carver.cut("volume.faintest", capacity.blocks),
+        }
     }
 
     /// Writes or reads the block in a slot: its place, its voxels and what they were last summed up to. The digest of a block that was made and

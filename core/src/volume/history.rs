@@ -7,7 +7,7 @@
 //! frames of 70,000 blocks, where lists of coordinates would take 13.7 MiB (docs/decisions/0005-history-of-bit-sets.md). Time: one bit
 //! per visible block to enter a frame; a pass over one set to take one out.
 
-use crate::memory::{Capacity, Carver, SlabError, region_bytes};
+use crate::memory::{Capacity, Carver, region_bytes};
 use crate::snapshot::Archive;
 
 /// Frames, as bit sets over slots, oldest first out.
@@ -39,17 +39,17 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// Cuts an empty history.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let words = Self::words(capacity);
-        Ok(Self {
-            sets: carver.cut("volume.history", capacity.history_frames * words)?,
+        Self {
+            sets: carver.cut("volume.history", capacity.history_frames * words),
             words,
-            due: carver.cut("volume.history_due", words)?,
-            born: carver.cut("volume.born", capacity.blocks)?,
+            due: carver.cut("volume.history_due", words),
+            born: carver.cut("volume.born", capacity.blocks),
             oldest: 0,
             len: 0,
             peak: 0,
-        })
+        }
     }
 
     /// Frames the ring can hold.

@@ -40,7 +40,7 @@ pub use store::{BlockStore, EvictionReport, LeavingBlock, NoStore, ReturningBloc
 pub use viewpoint::Viewpoint;
 pub use visible::VisibleList;
 
-use crate::memory::{Capacity, Carver, Footprint, SlabError, SlotPool};
+use crate::memory::{Capacity, Carver, Footprint, SlotPool};
 
 /// A map of blocks.
 #[derive(Debug)]
@@ -69,18 +69,18 @@ impl<'s> Volume<'s> {
     }
 
     /// Cuts an empty map.
-    pub fn carve(capacity: &Capacity, config: &VolumeConfig, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self {
+    pub fn carve(capacity: &Capacity, config: &VolumeConfig, carver: &mut Carver<'s>) -> Self {
+        Self {
             config: *config,
-            index: BlockIndex::carve(capacity.blocks, carver)?,
-            pool: SlotPool::carve(carver, capacity.blocks, ["volume.generation", "volume.free"])?,
-            blocks: Blocks::carve(capacity, carver)?,
-            visible: VisibleList::carve(capacity, carver)?,
-            seen: allocate::Seen::carve(carver)?,
-            history: VisibleHistory::carve(capacity, carver)?,
-            recency: Recency::carve(capacity.blocks, carver)?,
+            index: BlockIndex::carve(capacity.blocks, carver),
+            pool: SlotPool::carve(carver, capacity.blocks, ["volume.generation", "volume.free"]),
+            blocks: Blocks::carve(capacity, carver),
+            visible: VisibleList::carve(capacity, carver),
+            seen: allocate::Seen::carve(carver),
+            history: VisibleHistory::carve(capacity, carver),
+            recency: Recency::carve(capacity.blocks, carver),
             digest: 0,
-        })
+        }
     }
 
     /// The parameters the map was made with.

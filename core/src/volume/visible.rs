@@ -5,7 +5,7 @@
 //!
 //! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
 
-use crate::memory::{Capacity, Carver, Full, SlabError, region_bytes};
+use crate::memory::{Capacity, Carver, Full, region_bytes};
 use crate::snapshot::Archive;
 
 /// This frame's visible slots, each once.
@@ -27,16 +27,16 @@ impl<'s> VisibleList<'s> {
     }
 
     /// Cuts the lists.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self {
-            slots: carver.cut("volume.visible", capacity.visible_blocks)?,
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self {
+            slots: carver.cut("volume.visible", capacity.visible_blocks),
             len: 0,
-            before: carver.cut("volume.visible_before", capacity.visible_blocks)?,
+            before: carver.cut("volume.visible_before", capacity.visible_blocks),
             before_len: 0,
-            last_visible: carver.cut("volume.last_visible", capacity.blocks)?,
+            last_visible: carver.cut("volume.last_visible", capacity.blocks),
             frame: 0,
             peak: 0,
-        })
+        }
     }
 
     /// Begins a frame: the list of the last one is set aside.

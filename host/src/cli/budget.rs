@@ -1,10 +1,8 @@
 //! `dynvox budget`.
 
 use crate::export::report::grouped;
-use crate::harness::HostSlab;
-use dynvox_core::geometry::StereoRig;
+use dynvox_core::Capacity;
 use dynvox_core::volume::{BLOCK_SIDE, VolumeConfig};
-use dynvox_core::{Capacity, Config, Mapper};
 use std::fmt::Write;
 
 /// Speed of the drive in the table, m/s.
@@ -22,7 +20,7 @@ pub struct BudgetArgs {
 pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
     match &args.profile {
         None => overview(),
-        Some(name) => regions(name, &super::profile(name)?)?,
+        Some(name) => regions(name, &super::profile(name)?),
     }
     Ok(())
 }
@@ -75,19 +73,11 @@ fn drive_s(blocks: usize, volume: &VolumeConfig) -> Option<f64> {
     same.then(|| blocks as f64 / f64::from(BLOCKS_PER_M) / SPEED_M_S)
 }
 
-fn regions(name: &str, capacity: &Capacity) -> anyhow::Result<()> {
-    let bytes = capacity.bytes();
-    let mut slab = HostSlab::map(bytes)
-        .ok_or_else(|| anyhow::anyhow!("this machine has no {bytes} bytes for profile {name}. Look at a smaller one"))?;
-    // The regions depend on the capacity alone: any rig will do.
-    let rig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
-    let mapper = Mapper::new(capacity, &Config::for_rig(rig), slab.bytes_mut())
-        .map_err(|error| anyhow::anyhow!("the core refuses profile {name}: {error:?}. This is a bug of dynvox: please report it"))?;
-    let footprint = mapper.footprint();
+fn regions(name: &str, capacity: &Capacity) {
+    let (bytes, footprint) = (capacity.bytes(), capacity.footprint());
     println!("{:<34}{:>16}{:>10}", format!("region of {name}"), "bytes", "share");
     for region in footprint.regions() {
         println!("{:<34}{:>16}{:>8.1} %", region.name, grouped(region.bytes as u64), 100.0 * region.bytes as f64 / bytes as f64);
     }
     println!("{:<34}{:>16}{:>8.1} %", "slab", grouped(footprint.bytes() as u64), 100.0 * footprint.bytes() as f64 / bytes as f64);
-    Ok(())
 }

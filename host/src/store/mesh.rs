@@ -39,7 +39,9 @@ pub fn triangles<F: Read + Write + Seek>(
     sink: &mut impl FnMut(Triangle),
 ) -> Result<u64, SlabError> {
     let capacity = piece(colour);
-    let mut volume = Volume::carve(&capacity, volume, &mut Carver::new(slab, Volume::bytes(&capacity))?)?;
+    let mut carver = Carver::new(slab, Volume::bytes(&capacity))?;
+    let mut volume = Volume::carve(&capacity, volume, &mut carver);
+    carver.check()?;
     let mut count = 0;
     for tile in store.tiles() {
         let mut blocks = store.blocks_of(tile);

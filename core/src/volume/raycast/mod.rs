@@ -36,7 +36,7 @@ use crate::{
     executor::{Executor, join4},
     geometry::scalar::min_f32,
     image::View,
-    memory::{Capacity, Carver, Footprint, SlabError, region_bytes},
+    memory::{Capacity, Carver, Footprint, region_bytes},
 };
 use eye::Eye;
 use march::Marcher;
@@ -137,21 +137,21 @@ impl<'s> Raycaster<'s> {
     }
 
     /// Cuts the images and the working space.
-    pub fn carve(capacity: &Capacity, config: &RaycastConfig, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+    pub fn carve(capacity: &Capacity, config: &RaycastConfig, carver: &mut Carver<'s>) -> Self {
         let pixels = capacity.pixels();
-        Ok(Self {
+        Self {
             config: *config,
-            surface: Surface::carve(capacity, carver)?,
-            ranges: Ranges::carve(capacity, carver)?,
-            depth_m: carver.cut("raycast.depth", pixels)?,
-            normal: carver.cut("raycast.normal", pixels)?,
-            colour: carver.cut("raycast.colour", pixels)?,
-            weight: carver.cut("raycast.weight", pixels)?,
-            layer: carver.cut("raycast.layer", pixels)?,
+            surface: Surface::carve(capacity, carver),
+            ranges: Ranges::carve(capacity, carver),
+            depth_m: carver.cut("raycast.depth", pixels),
+            normal: carver.cut("raycast.normal", pixels),
+            colour: carver.cut("raycast.colour", pixels),
+            weight: carver.cut("raycast.weight", pixels),
+            layer: carver.cut("raycast.layer", pixels),
             width: 0,
             height: 0,
             peak_blocks: 0,
-        })
+        }
     }
 
     /// Looks at a map from a viewpoint. The picture is read with [`Self::depth_m`] and its like until the next one.

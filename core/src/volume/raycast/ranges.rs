@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     geometry::scalar::{max_f32, min_f32},
-    memory::{Capacity, Carver, SlabError, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
     volume::BLOCK_SIDE,
 };
 
@@ -34,11 +34,11 @@ impl<'s> Ranges<'s> {
         region_bytes::<[f32; 2]>(Self::tiles(capacity.image_width, capacity.image_height))
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
-        Ok(Self {
-            depth_m: carver.cut("raycast.ranges", Self::tiles(capacity.image_width, capacity.image_height))?,
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self {
+            depth_m: carver.cut("raycast.ranges", Self::tiles(capacity.image_width, capacity.image_height)),
             columns: 0,
-        })
+        }
     }
 
     /// Whether a picture of this size has room.

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     executor::{Executor, join4},
-    memory::{Capacity, Carver, SlabError, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
     volume::{BLOCK_SIDE, Volume},
 };
 
@@ -67,17 +67,17 @@ impl<'s> Surface<'s> {
             + region_bytes::<u64>(Self::table_len(entries))
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Result<Self, SlabError> {
+    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let entries = capacity.visible_blocks;
-        Ok(Self {
-            local: carver.cut("raycast.local", entries)?,
-            slots: carver.cut("raycast.slots", entries)?,
-            signs: carver.cut("raycast.signs", entries)?,
-            cells: carver.cut("raycast.cells", entries)?,
-            table: carver.cut("raycast.table", Self::table_len(entries))?,
+        Self {
+            local: carver.cut("raycast.local", entries),
+            slots: carver.cut("raycast.slots", entries),
+            signs: carver.cut("raycast.signs", entries),
+            cells: carver.cut("raycast.cells", entries),
+            table: carver.cut("raycast.table", Self::table_len(entries)),
             len: 0,
             shift: 0,
-        })
+        }
     }
 
     /// Finds the blocks in view and the cells the surface runs through.
