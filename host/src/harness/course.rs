@@ -184,7 +184,9 @@ impl<'p, 's> Course<'p, 's> {
         let stepped = threads.run(|| mapper.step_with(&frame, threads, shelf, &mut sink));
         let report = stepped.map_err(|error| refused(step_reason(error)))?;
         let step_ms = begin.elapsed().as_secs_f64() * 1e3;
+        let aside = Instant::now();
         sink.end()?;
+        self.gathered.spent.aside += aside.elapsed();
         let tracks = self.gathered.objects.note(&self.plan.config, index, &self.mapper, images, &report);
         Ok(FrameRow {
             frame: index,

@@ -1,9 +1,11 @@
-//! Objects that leave the mapper: their meshes and where they were, written as they go.
+//! Objects that leave the mapper: their meshes and where they were. An object leaves within a step, which must not wait for its mesh: what its
+//! volume holds is copied, and the rest is done after the step.
 
+use super::copy::VolumeCopy;
 use crate::evaluation::surfaces::{SeenSide, SurfaceFigures};
 use crate::export::{FolderError, PlyWriter, RunFolder, portrait, write_numbered};
 use dynvox_core::geometry::Transform;
-use dynvox_core::instances::{Class, ObjectSink, RetiredObject, State};
+use dynvox_core::instances::{Class, ObjectSink, ObjectSummary, RetiredObject, State};
 use dynvox_core::volume::{MeshConfig, Triangle};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -49,28 +51,25 @@ pub struct Kept {
     kept: Vec<KeptObject>,
 }
 
-/// Takes objects as they leave, and writes their meshes.
+/// Takes objects as they leave, and writes their meshes in the end.
 pub struct KeptSink<'r> {
     into: &'r mut Kept,
     /// Made with the first object.
     folder: PathBuf,
     mesh: &'r MeshConfig,
-    failed: Option<FolderError>,
+    left: Vec<(ObjectSummary, VolumeCopy)>,
 }
 
 impl ObjectSink for KeptSink<'_> {
     fn retire(&mut self, object: RetiredObject<'_, '_>) {
-        // The run ends with the first failure; there is nothing to be done about more.
-        if self.failed.is_none() {
-            self.failed = self.take(&object).err();
-        }
+        self.left.push((object.summary, VolumeCopy::of(object.volume)));
     }
 }
 
 impl Kept {
     /// A sink for the objects that leave during a step, whose meshes go into the run folder.
     pub(super) fn sink<'r>(&'r mut self, run: &RunFolder, mesh: &'r MeshConfig) -> KeptSink<'r> {
-        KeptSink { into: self, folder: run.file(FOLDER), mesh, failed: None }
+        KeptSink { into: self, folder: run.file(FOLDER), mesh, left: Vec::new() }
     }
 
     /// Removes files of objects that left after the run had been stopped: they will leave again.
@@ -119,17 +118,18 @@ impl Kept {
 }
 
 impl KeptSink<'_> {
-    /// Whether all that left was written.
-    pub(super) fn end(self) -> Result<(), FolderError> {
-        self.failed.map_or(Ok(()), Err)
+    /// Writes all that left.
+    pub(super) fn end(mut self) -> Result<(), FolderError> {
+        let left = std::mem::take(&mut self.left);
+        left.iter().try_for_each(|(summary, volume)| self.take(summary, volume))
     }
 
-    fn take(&mut self, object: &RetiredObject<'_, '_>) -> Result<(), FolderError> {
-        let summary = &object.summary;
+    fn take(&mut self, summary: &ObjectSummary, volume: &VolumeCopy) -> Result<(), FolderError> {
         let poses = self.into.paths.remove(&(summary.id, summary.chain)).unwrap_or_default();
         let side = self.into.sides.remove(&(summary.id, summary.chain));
         let mut triangles: Vec<Triangle> = Vec::new();
-        object.volume.triangles(self.mesh, &mut |triangle| triangles.push(triangle));
+        let meshed = volume.triangles(self.mesh, &mut |triangle| triangles.push(triangle));
+        meshed.map_err(|source| FolderError::Write { path: self.folder.clone(), source })?;
         if triangles.is_empty() {
             return Ok(());
         }
@@ -154,9 +154,9 @@ impl KeptSink<'_> {
             class: summary.class,
             state: summary.state,
             frames: summary.frames,
-            blocks: object.volume.pool().len(),
+            blocks: volume.blocks(),
             triangles: triangles.len() as u64,
-            surface: side.and_then(|side| side.compare(&triangles, f64::from(object.volume.config().voxel_size_m))),
+            surface: side.and_then(|side| side.compare(&triangles, f64::from(volume.config().voxel_size_m))),
             portrait_png: portrait(&triangles),
         });
         self.into.thin_portraits();

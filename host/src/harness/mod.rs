@@ -1,5 +1,6 @@
 //! Runs the core on a data set: owns the slab, feeds the frames, takes the times, watches memory, collects what the report shows.
 
+mod copy;
 mod course;
 mod error;
 mod gathered;
