@@ -33,10 +33,12 @@ impl<'s> Instances<'s> {
             (track.matches, track.inliers, track.measured) = (0, 0, 0);
             if let (Some(t_current_previous), true) = (&camera.t_current_previous, track.detection > 0 && track.sightings > 1) {
                 let place = track.place;
-                let mine = |&(m, &owner): &(&Match, &u8)| {
+                let was_mine = |m: &Match| {
                     let (u, v) = pixel(m.previous_left);
-                    u32::from(owner) == track.detection && before.contains(&place, u, v)
+                    before.contains(&place, u, v)
                 };
+                // Few of all matches are one track's: whose they are is asked first.
+                let mine = |&(m, &owner): &(&Match, &u8)| u32::from(owner) == track.detection && was_mine(m);
                 let own = refined.iter().zip(&*self.owner).filter(mine).map(|(m, _)| m);
                 let enough = own.clone().count() >= usize::from(self.config.motion.matches_enough);
                 // Sparse matches of the same features say nothing new.

@@ -310,11 +310,16 @@ impl<'m, 's> ScaledMask<'m, 's> {
         if v < scaled.top || v - scaled.top >= scaled.height {
             return;
         }
-        let [above, below] = sources(v - scaled.top, from.height, scaled.height).map(|row| from.top + row);
+        let (whole, lead) = (self.place.stride == 0, from.left - self.place.origin());
+        let [above, below] = sources(v - scaled.top, from.height, scaled.height).map(|row| self.store.row(&self.place, from.top + row));
+        // Columns between which a pixel lies are within the box.
+        let set = |column: i32| {
+            let at = (lead + column) as usize;
+            let both = |(above, below): (&u64, &u64)| (above & below) >> (at % 64) & 1 == 1;
+            whole || above.get(at / 64).zip(below.get(at / 64)).is_some_and(both)
+        };
         let (first, last) = (scaled.left.max(0), (scaled.left + scaled.width).min(width));
-        for u in first..last {
-            let [before, after] = sources(u - scaled.left, from.width, scaled.width).map(|column| from.left + column);
-            let set = |column: i32| self.store.contains(&self.place, column, above) && self.store.contains(&self.place, column, below);
+        for (u, [before, after]) in (first..last).zip(Sources::begin(first - scaled.left, from.width, scaled.width)) {
             if set(before) && (before == after || set(after)) {
                 visit(u as usize);
             }
@@ -322,11 +327,49 @@ impl<'m, 's> ScaledMask<'m, 's> {
     }
 }
 
+/// [`sources`] of one pixel after the other, without a division for each.
+struct Sources {
+    low: i64,
+    rest: i64,
+    /// What a pixel adds to low and rest.
+    by: [i64; 2],
+    step: i64,
+    last: i64,
+}
+
+impl Sources {
+    fn begin(at: i32, from: i32, to: i32) -> Self {
+        let position = i64::from(2 * at + 1) * i64::from(from) - i64::from(to);
+        let (step, add) = (2 * i64::from(to.max(1)), 2 * i64::from(from));
+        Self {
+            low: position.div_euclid(step),
+            rest: position.rem_euclid(step),
+            by: [add.div_euclid(step), add.rem_euclid(step)],
+            step,
+            last: i64::from((from - 1).max(0)),
+        }
+    }
+
+    fn pixels(&self) -> [i32; 2] {
+        [self.low, self.low + i64::from(self.rest != 0)].map(|pixel| pixel.clamp(0, self.last) as i32)
+    }
+}
+
+impl Iterator for Sources {
+    type Item = [i32; 2];
+
+    fn next(&mut self) -> Option<[i32; 2]> {
+        let pixels = self.pixels();
+        let [low, rest] = self.by;
+        (self.low, self.rest) = (self.low + low, self.rest + rest);
+        if self.rest >= self.step {
+            (self.low, self.rest) = (self.low + 1, self.rest - self.step);
+        }
+        Some(pixels)
+    }
+}
+
 /// The two pixels of a line of `from` between which pixel `at` of the same line resized to `to` lies; the same one twice where it hits one.
 fn sources(at: i32, from: i32, to: i32) -> [i32; 2] {
-    let position = i64::from(2 * at + 1) * i64::from(from) - i64::from(to);
-    let step = 2 * i64::from(to.max(1));
-    let low = position.div_euclid(step);
-    let high = low + i64::from(position.rem_euclid(step) != 0);
-    [low, high].map(|pixel| pixel.clamp(0, i64::from((from - 1).max(0))) as i32)
+    Sources::begin(at, from, to).pixels()
 }
