@@ -18,6 +18,7 @@ pub use plan::{Data, Kind, Plan, Point, Wanted};
 pub use result::{FrameSample, RunResult};
 pub use store::{Results, SweepFolder, merge};
 
+use crate::export::FolderError;
 use std::path::PathBuf;
 
 /// Why a sweep cannot go on.
@@ -32,13 +33,8 @@ pub enum SweepError {
         source: std::io::Error,
     },
     /// A file cannot be written.
-    #[error("{path} cannot be written: {source}. Check the disk and the rights, or give another --out")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the machine says.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] FolderError),
     /// A file holds something else.
     #[error("{path} is no file of a sweep: {reason}. Remove it, or give another --out")]
     Foreign {

@@ -2,10 +2,11 @@
 
 use super::SweepError;
 use crate::evaluation::lidar::{EvaluatedFrame, Layer};
-use crate::export::Summary;
+use crate::export::{Summary, write_whole};
 use crate::harness::RunRecord;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::io::Write;
 use std::path::Path;
 
 /// A finished run of a sweep.
@@ -75,11 +76,9 @@ impl RunResult {
     /// # Errors
     /// The disk refuses.
     pub fn write(&self, path: &Path) -> Result<(), SweepError> {
-        write_whole(
-            path,
-            &serde_json::to_vec_pretty(self)
-                .map_err(|error| SweepError::Foreign { path: path.to_path_buf(), reason: error.to_string() })?,
-        )
+        let text =
+            serde_json::to_vec_pretty(self).map_err(|error| SweepError::Foreign { path: path.to_path_buf(), reason: error.to_string() })?;
+        Ok(write_whole(path, |file| file.write_all(&text))?)
     }
 
     /// A share by layer (`static`, `dynamic`), source (`input`, `fused`) and name.
@@ -96,11 +95,4 @@ impl RunResult {
     pub fn blocks_in_the_end(&self) -> Option<f64> {
         self.summary["map"]["blocks"].as_f64()
     }
-}
-
-/// Writes a file at once or not at all.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), SweepError> {
-    let partial = path.with_extension("partial");
-    let written = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path));
-    written.map_err(|source| SweepError::Write { path: path.to_path_buf(), source })
 }

@@ -1,7 +1,9 @@
 //! A sweep's folder: the plan, a file for each finished run, tables and page drawn of what is there.
 
-use super::{Plan, RunResult, SweepError, page, result::write_whole, table};
+use super::{Plan, RunResult, SweepError, page, table};
+use crate::export::{FolderError, write_whole};
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Results by key.
@@ -21,7 +23,7 @@ impl SweepFolder {
     pub fn open(root: &Path, plan: &Plan) -> Result<Self, SweepError> {
         let folder = Self { root: root.to_path_buf() };
         let runs = folder.root.join("runs");
-        std::fs::create_dir_all(&runs).map_err(|source| SweepError::Write { path: runs, source })?;
+        std::fs::create_dir_all(&runs).map_err(|source| FolderError::Write { path: runs, source })?;
         let path = folder.root.join("plan.json");
         if path.is_file() {
             if folder.plan()? != *plan {
@@ -30,7 +32,7 @@ impl SweepFolder {
         } else {
             let text =
                 serde_json::to_vec_pretty(plan).map_err(|error| SweepError::Foreign { path: path.clone(), reason: error.to_string() })?;
-            write_whole(&path, &text)?;
+            write_whole(&path, |file| file.write_all(&text))?;
         }
         Ok(folder)
     }
@@ -79,10 +81,12 @@ impl SweepFolder {
     /// The disk refuses.
     pub fn draw(&self, plan: &Plan, results: &Results) -> Result<PathBuf, SweepError> {
         for kind in plan.kinds() {
-            write_whole(&self.root.join(format!("{}.csv", kind.name())), table::csv(plan, kind, results).as_bytes())?;
+            write_whole(&self.root.join(format!("{}.csv", kind.name())), |file| {
+                file.write_all(table::csv(plan, kind, results).as_bytes())
+            })?;
         }
         let page = self.root.join("report.html");
-        write_whole(&page, page::html(plan, results).as_bytes())?;
+        write_whole(&page, |file| file.write_all(page::html(plan, results).as_bytes()))?;
         Ok(page)
     }
 }
