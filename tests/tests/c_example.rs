@@ -21,8 +21,8 @@ fn library() -> PathBuf {
 
 #[test]
 fn the_c_example_maps_the_fixture_to_the_digests_on_file() {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let fixture = here.join("../../fixtures/street-320x96");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let (fixture, capi) = (root.join("fixtures/street-320x96"), root.join("core/capi"));
     let folder = tempfile::TempDir::new().expect("a folder");
     let [clip, program] = ["clip.bin", "map_fixture"].map(|name| folder.path().join(name));
     let bytes = dynvox::fixtures::pack(&fixture).expect("the fixture can be packed");
@@ -30,8 +30,8 @@ fn the_c_example_maps_the_fixture_to_the_digests_on_file() {
     fs::write(&clip, &bytes).expect("the clip can be written");
     let built = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()))
         .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
-        .arg(here.join("include"))
-        .arg(here.join("examples/map_fixture.c"))
+        .arg(capi.join("include"))
+        .arg(capi.join("examples/map_fixture.c"))
         .arg(library())
         .args(["-lm", "-lpthread", "-ldl", "-o"])
         .arg(&program)
