@@ -159,16 +159,6 @@ fn render(frame: usize) -> Frame {
 struct Timed(Mutex<Duration>);
 
 impl Executor for Timed {
-    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
-    where
-        A: FnOnce() -> RA + Send,
-        B: FnOnce() -> RB + Send,
-        RA: Send,
-        RB: Send,
-    {
-        (a(), b())
-    }
-
     fn stage<R>(&self, stage: Stage, work: impl FnOnce() -> R) -> R {
         let begin = ThreadTime::now();
         let result = work();
@@ -187,13 +177,9 @@ fn drive(frames: &[Frame], slab: &mut [u8], count: usize) -> [Duration; 2] {
         let detections: Vec<Detection<'_>> = frame.cars.iter().take(count).map(Car::detection).collect();
         let [left, right] = frame.pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
         let seen = StereoFrame {
-            left,
-            right,
-            colour: None,
-            class: None,
-            disparity_q8: None,
             t_world_camera: Some(frame.t_world_camera),
             detections: &detections,
+            ..StereoFrame::pair(left, right)
         };
         let (timed, begin) = (Timed::default(), ThreadTime::now());
         let report = mapper.step(&seen, &timed).unwrap();

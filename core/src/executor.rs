@@ -44,13 +44,16 @@ impl Stage {
 
 /// Runs work for the core.
 pub trait Executor: Sync {
-    /// Does both and returns both results, in any order or at once.
+    /// Does both and returns both results, in any order or at once; one after the other unless an executor knows better.
     fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
     where
         A: FnOnce() -> RA + Send,
         B: FnOnce() -> RB + Send,
         RA: Send,
-        RB: Send;
+        RB: Send,
+    {
+        (a(), b())
+    }
 
     /// Runs one stage. A host overrides this to take its time; no clock enters the core.
     fn stage<R>(&self, _stage: Stage, work: impl FnOnce() -> R) -> R {
@@ -62,17 +65,7 @@ pub trait Executor: Sync {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Serial;
 
-impl Executor for Serial {
-    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
-    where
-        A: FnOnce() -> RA + Send,
-        B: FnOnce() -> RB + Send,
-        RA: Send,
-        RB: Send,
-    {
-        (a(), b())
-    }
-}
+impl Executor for Serial {}
 
 /// Does four things; executors with more than two threads spread them.
 pub fn join4<E: Executor>(
