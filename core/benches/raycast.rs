@@ -15,7 +15,8 @@ use dynvox_core::{
     geometry::{StereoRig, exp},
     image::View,
     memory::Carver,
-    volume::{MeshConfig, NoStore, Observation, RaycastConfig, Raycaster, Viewpoint, Volume, VolumeConfig},
+    view::{MeshConfig, RaycastConfig, Raycaster},
+    volume::{NoStore, Observation, Viewpoint, Volume, VolumeConfig},
 };
 use nalgebra::Vector3;
 

@@ -7,7 +7,8 @@ use crate::{
     mapper::MapperConfig,
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
-    volume::{MeshConfig, RaycastConfig, VolumeConfig},
+    view::{MeshConfig, RaycastConfig},
+    volume::VolumeConfig,
 };
 use heapless::Vec;
 

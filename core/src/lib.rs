@@ -28,6 +28,7 @@ pub mod scene_flow;
 pub mod snapshot;
 pub mod stage_digests;
 pub mod stereo;
+pub mod view;
 pub mod volume;
 
 pub use config::Config;

@@ -20,7 +20,8 @@ use crate::{
     scene_flow::{FlowMatcher, FlowStatus},
     stage_digests::StageDigests,
     stereo::StereoMatcher,
-    volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Raycaster, Triangle, Viewpoint, Volume},
+    view::{Raycaster, Triangle},
+    volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Viewpoint, Volume},
 };
 
 #[cfg(test)]

@@ -8,7 +8,8 @@ use dynvox_core::{
     geometry::Transform,
     image::View,
     instances::{Class, Detection, NoSink, State, TrackReport},
-    volume::{MeshConfig, NoStore, Raycaster},
+    view::{MeshConfig, Raycaster},
+    volume::NoStore,
 };
 use dynvox_tests::HeapSlab;
 use std::collections::BTreeMap;

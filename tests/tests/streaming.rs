@@ -2,7 +2,8 @@
 
 use dynvox::store::{BlockFile, mesh};
 use dynvox_core::instances::NoSink;
-use dynvox_core::volume::{BlockStore, NoStore, Triangle};
+use dynvox_core::view::Triangle;
+use dynvox_core::volume::{BlockStore, NoStore};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, Severity};
 use dynvox_tests::{Clip, HeapSlab};
 use std::collections::BTreeSet;

@@ -1,7 +1,8 @@
 //! What a mapper hands to its caller piece by piece.
 
 use core::ffi::c_void;
-use dynvox_core::volume::{BlockStore, LeavingBlock, ReturningBlock, Triangle};
+use dynvox_core::view::Triangle;
+use dynvox_core::volume::{BlockStore, LeavingBlock, ReturningBlock};
 
 /// A block of 8 x 8 x 8 voxels that leaves the map; x runs fastest, then y, then z. For the length of the call alone.
 #[derive(Clone, Copy, Debug)]

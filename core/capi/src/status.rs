@@ -1,7 +1,7 @@
 //! What a call comes back with.
 
 use core::ffi::{CStr, c_char};
-use dynvox_core::{NewError, StepError, memory::SlabError, volume::RaycastError};
+use dynvox_core::{NewError, StepError, memory::SlabError, view::RaycastError};
 
 /// What a call comes back with. Whatever is not DYNVOX_STATUS_OK has changed nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,8 @@ use crate::{
     executor::Executor,
     geometry::{Transform, renormalised},
     instances::PlacedObject,
-    volume::{RaycastError, Raycaster, Viewpoint},
+    view::{RaycastError, Raycaster},
+    volume::Viewpoint,
 };
 
 impl<'s> Mapper<'s> {

@@ -7,16 +7,14 @@
 
 mod allocate;
 #[cfg(test)]
-mod analytic;
+pub(crate) mod analytic;
 mod archive;
 mod block;
 mod config;
 mod fuse;
 mod history;
 mod index;
-mod mesh;
 mod prune;
-mod raycast;
 mod recency;
 mod sampler;
 mod store;
@@ -31,9 +29,7 @@ pub use config::{CLASS_COUNT, ObservationWeight, VolumeConfig, WhenFull};
 pub use fuse::Observation;
 pub use history::VisibleHistory;
 pub use index::BlockIndex;
-pub use mesh::{MeshConfig, Triangle, Vertex};
 pub use prune::PruneReport;
-pub use raycast::{NORMAL_ONE, RaycastConfig, RaycastError, RaycastReport, Raycaster};
 pub use recency::Recency;
 pub use sampler::{Sampler, VoxelSample};
 pub use store::{BlockStore, EvictionReport, LeavingBlock, NoStore, ReturningBlock};

@@ -9,7 +9,7 @@
 use crate::dataset::TrueObject;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::View;
-use dynvox_core::volume::Triangle;
+use dynvox_core::view::Triangle;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -165,7 +165,7 @@ impl<'p> Near<'p> {
 mod tests {
     use super::*;
     use dynvox_core::instances::PixelBox;
-    use dynvox_core::volume::Vertex;
+    use dynvox_core::view::Vertex;
 
     const RIG: StereoRig = StereoRig { focal_px: 200.0, center_u_px: 50.0, center_v_px: 40.0, baseline_m: 0.5 };
     const SIZE: (usize, usize) = (100, 80);

@@ -1,6 +1,6 @@
 //! An object's mesh on three pictures, without perspective: as the camera looked at it first, from its left side, from above.
 
-use dynvox_core::volume::Triangle;
+use dynvox_core::view::Triangle;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use nalgebra::Vector3;
 

@@ -3,7 +3,8 @@
 use super::HostSlab;
 use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, LeavingBlock, MeshConfig, ReturningBlock, Triangle, Volume, VolumeConfig};
+use dynvox_core::view::{MeshConfig, Triangle};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, LeavingBlock, ReturningBlock, Volume, VolumeConfig};
 use std::io::{Error, ErrorKind};
 
 /// The blocks of a volume, in its order.

@@ -6,7 +6,7 @@ use crate::evaluation::surfaces::{SeenSide, SurfaceFigures};
 use crate::export::{FolderError, PlyWriter, RunFolder, portrait, write_numbered};
 use dynvox_core::geometry::Transform;
 use dynvox_core::instances::{Class, ObjectSink, ObjectSummary, RetiredObject, State};
-use dynvox_core::volume::{MeshConfig, Triangle};
+use dynvox_core::view::{MeshConfig, Triangle};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;

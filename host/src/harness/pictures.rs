@@ -6,7 +6,7 @@ use dynvox_core::Mapper;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::instances::State;
-use dynvox_core::volume::{NORMAL_ONE, Raycaster};
+use dynvox_core::view::{NORMAL_ONE, Raycaster};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 /// Widest picture of a frame, px: wider ones are thinned out, so that the report stays small.

@@ -2,7 +2,8 @@
 
 use crate::export::{FolderError, Mesh, PlyWriter, RunFolder};
 use crate::store::{self, BlockFile, Position, StoreError};
-use dynvox_core::volume::{BlockCoord, BlockStore, EvictionReport, LeavingBlock, ReturningBlock, Triangle};
+use dynvox_core::view::Triangle;
+use dynvox_core::volume::{BlockCoord, BlockStore, EvictionReport, LeavingBlock, ReturningBlock};
 use dynvox_core::{Capacity, Config, Mapper};
 use hashbrown::HashSet;
 use std::fs::File;

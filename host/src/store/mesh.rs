@@ -3,7 +3,8 @@
 use super::BlockFile;
 use dynvox_core::Capacity;
 use dynvox_core::memory::{Carver, SlabError};
-use dynvox_core::volume::{BlockCoord, MeshConfig, NoStore, Triangle, Volume, VolumeConfig};
+use dynvox_core::view::{MeshConfig, Triangle};
+use dynvox_core::volume::{BlockCoord, NoStore, Volume, VolumeConfig};
 use hashbrown::HashSet;
 use std::io::{Read, Seek, Write};
 

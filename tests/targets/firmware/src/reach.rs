@@ -8,7 +8,8 @@ use dynvox_core::{
     digest::Digest,
     image::View,
     instances::{ObjectSink, RetiredObject},
-    volume::{BlockStore, LeavingBlock, ObservationWeight, Raycaster, ReturningBlock},
+    view::Raycaster,
+    volume::{BlockStore, LeavingBlock, ObservationWeight, ReturningBlock},
 };
 
 /// Frames taken.

@@ -94,9 +94,9 @@ impl<'s> Surface<'s> {
     fn cull(&mut self, volume: &Volume<'_>, eye: &Eye, [near_m, far_m]: [f32; 2]) -> InView {
         // Cells of the block before this one end at this block's first points: the box is one longer on that side.
         let half = (BLOCK_SIDE as f32 + 1.0) * 0.5;
-        let blocks = (0..volume.pool.high_water() as u32).filter_map(|slot| {
-            volume.pool.handle(slot)?;
-            let local = eye.local(volume.blocks.coord(slot)?)?;
+        let blocks = (0..volume.pool().high_water() as u32).filter_map(|slot| {
+            volume.pool().handle(slot)?;
+            let local = eye.local(volume.blocks().coord(slot)?)?;
             let center = local.map(|c| (c * BLOCK_SIDE as i32) as f32 + half - 1.0);
             Some((slot, local, eye.extent(center, [half; 3], near_m, far_m)?.depth_m[0]))
         });
@@ -160,7 +160,7 @@ impl<'s> Surface<'s> {
     fn read_signs<E: Executor>(&mut self, volume: &Volume<'_>, min_weight: u8, executor: &E) {
         let read = |signs: &mut [[signs::Layers; 2]], slots: &[[u32; 8]]| {
             for (signs, [slot, ..]) in signs.iter_mut().zip(slots) {
-                if let (Some(sdf), Some(weight)) = (volume.blocks.sdf(*slot), volume.blocks.weight(*slot)) {
+                if let (Some(sdf), Some(weight)) = (volume.blocks().sdf(*slot), volume.blocks().weight(*slot)) {
                     *signs = signs::of_block(sdf, weight, min_weight);
                 }
             }

@@ -31,12 +31,12 @@ mod tests;
 
 pub use config::RaycastConfig;
 
-use super::{Viewpoint, Volume};
 use crate::{
     executor::{Executor, join4},
     geometry::scalar::min_f32,
     image::View,
     memory::{Capacity, Carver, Footprint, region_bytes},
+    volume::{Viewpoint, Volume},
 };
 use eye::Eye;
 use march::Marcher;
@@ -188,7 +188,7 @@ impl<'s> Raycaster<'s> {
         layer: Layer,
         executor: &E,
     ) -> Result<RaycastReport, RaycastError> {
-        let eye = Eye::new(view, volume.config.voxel_size_m).ok_or(RaycastError::Viewpoint)?;
+        let eye = Eye::new(view, volume.config().voxel_size_m).ok_or(RaycastError::Viewpoint)?;
         let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
         let near_m = self.config.near_m;
         let in_view = self.surface.find(volume, &eye, [near_m, self.config.far_m], min_weight, executor);
@@ -198,7 +198,7 @@ impl<'s> Raycaster<'s> {
         if self.surface.len() > self.peak_blocks {
             self.peak_blocks = self.surface.len();
         }
-        let marcher = Marcher { surface: &self.surface, blocks: &volume.blocks, eye: &eye, min_weight };
+        let marcher = Marcher { surface: &self.surface, blocks: volume.blocks(), eye: &eye, min_weight };
         let ranges = &self.ranges;
         let whole = Band {
             first_row: 0,

@@ -16,7 +16,7 @@ mod tests;
 
 pub use config::MeshConfig;
 
-use super::{BLOCK_SIDE, BlockCoord, Blocks, Volume};
+use crate::volume::{BLOCK_SIDE, BlockCoord, Blocks, Volume};
 use cases::{CASES, EDGE_START, edge_axis};
 
 /// Lattice points along a block's side, with those of the next block that its last cells need.
@@ -50,8 +50,8 @@ impl Volume<'_> {
     /// piece: a block's triangles need the blocks after it on each axis, and no more.
     pub fn triangles_of(&self, config: &MeshConfig, wanted: impl Fn(BlockCoord) -> bool, sink: &mut impl FnMut(Triangle)) -> u64 {
         let mut count = 0;
-        for slot in 0..self.pool.high_water() as u32 {
-            if let (Some(_), Some(coord)) = (self.pool.handle(slot), self.blocks.coord(slot))
+        for slot in 0..self.pool().high_water() as u32 {
+            if let (Some(_), Some(coord)) = (self.pool().handle(slot), self.blocks().coord(slot))
                 && wanted(coord)
             {
                 let patch = Patch::load(self, slot, coord, config.min_weight);
@@ -81,10 +81,10 @@ impl<'v, 's> Patch<'v, 's> {
             *entry = if n == 0 { Some(slot) } else { beside() };
         }
         let mut patch = Self {
-            blocks: &volume.blocks,
+            blocks: volume.blocks(),
             slots,
             origin: coord.origin(),
-            voxel_size_m: volume.config.voxel_size_m,
+            voxel_size_m: volume.config().voxel_size_m,
             sdf: [UNSEEN; SIDE * SIDE * SIDE],
         };
         (0..8).for_each(|n| patch.copy(n, if min_weight == 0 { 1 } else { min_weight }));

@@ -1,0 +1,9 @@
+//! What leaves a map on demand: the picture a camera would take of it, and its surface as triangles.
+//!
+//! A view reads a [`Volume`](crate::volume::Volume) and keeps no part of it.
+
+mod mesh;
+mod raycast;
+
+pub use mesh::{MeshConfig, Triangle, Vertex};
+pub use raycast::{NORMAL_ONE, RaycastConfig, RaycastError, RaycastReport, Raycaster};
