@@ -1,14 +1,14 @@
 //! The host of dynvox: feeds the core, watches its ceilings, shows what it made.
 
 pub mod cli;
-pub mod compare;
 pub mod dataset;
 pub mod depth;
-pub mod evaluation;
+pub mod evaluate;
 pub mod export;
 pub mod fixtures;
-pub mod harness;
+pub mod observe;
+pub mod report;
+pub mod run;
 pub mod segmentation;
-pub mod store;
 pub mod sweep;
 pub mod synth;

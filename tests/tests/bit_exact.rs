@@ -1,7 +1,7 @@
 //! P2: the same frames give the same digests, however the work is spread.
 
 use dynvox::fixtures::{self, Blessing, FixtureError, Verdict};
-use dynvox::harness::Threads;
+use dynvox::run::Threads;
 use dynvox_core::{Capacity, Executor, Serial};
 use dynvox_tests::Clip;
 use std::path::Path;

@@ -2,7 +2,7 @@
 #![allow(missing_docs)]
 
 use dynvox::dataset::{Image, LidarScan};
-use dynvox::evaluation::lidar::{Aim, Awaited, EvaluatedFrame, Field, Layer, LidarFigures, Rule, aim, aim_at_exact};
+use dynvox::evaluate::lidar::{Aim, Awaited, EvaluatedFrame, Field, Layer, LidarFigures, Rule, aim, aim_at_exact};
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame};

@@ -1,6 +1,6 @@
 //! A drive that outgrows its pool, with a file beside it.
 
-use dynvox::store::{BlockFile, mesh};
+use dynvox::run::store::{BlockFile, mesh};
 use dynvox_core::instances::NoSink;
 use dynvox_core::view::Triangle;
 use dynvox_core::volume::{BlockStore, NoStore};

@@ -1,6 +1,6 @@
 //! `dynvox budget`.
 
-use crate::export::report::grouped;
+use crate::report::html::grouped;
 use dynvox_core::Capacity;
 use dynvox_core::volume::{BLOCK_SIDE, VolumeConfig};
 use std::fmt::Write;

@@ -1,6 +1,6 @@
 //! `dynvox diff`.
 
-use crate::compare::{Comparison, Run, compare};
+use crate::report::compare::{Comparison, Run, compare};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

@@ -1,7 +1,7 @@
 //! `dynvox fixtures`.
 
-use crate::export::write_whole;
 use crate::fixtures::{self, Blessing, Verdict};
+use crate::run::write_whole;
 use anyhow::bail;
 use dynvox_core::Serial;
 use std::io::Write;

@@ -1,7 +1,7 @@
 //! `dynvox inspect`.
 
 use crate::dataset::{self, Dataset, DatasetError, Found, Kind, Masks};
-use crate::evaluation::stereo::{StereoSetError, find_stereo_set};
+use crate::evaluate::stereo::{StereoSetError, find_stereo_set};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]

@@ -6,9 +6,11 @@ use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
 use crate::dataset::{self, Dataset, Images, Kind, Scaled};
 use crate::depth::{self, DepthChoice};
-use crate::evaluation::objects::Medians;
-use crate::export::{self, FolderError, RunFolder, Summary};
-use crate::harness::{self, HOST_OVERHEAD_BYTES, Plan, Reference, RunError, RunRecord, Stopped, Streaming};
+use crate::evaluate::objects::Medians;
+use crate::export;
+use crate::observe::Reference;
+use crate::report::{self, Summary};
+use crate::run::{self, FolderError, HOST_OVERHEAD_BYTES, Plan, RunError, RunFolder, RunRecord, Stopped, Streaming};
 use crate::segmentation::{self, Choice};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
@@ -169,8 +171,8 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         bail!("--threads, --stride and --frames begin at 1. Give a larger number");
     }
     let dataset = args.open(&settings)?;
-    let indices = harness::frame_indices(dataset.len(), args.start, args.stride, args.frames)?;
-    if let Some(interval_s) = harness::frame_interval_s(dataset.as_ref(), &indices) {
+    let indices = run::frame_indices(dataset.len(), args.start, args.stride, args.frames)?;
+    if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &indices) {
         settings.set_frame_interval_s(interval_s);
     }
     if let Some(dynamic) = args.dynamic {
@@ -207,7 +209,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
 
 /// Maps into a folder, and tells what does not fit with what would.
 fn map(plan: &Plan, folder: &RunFolder, stopped: Option<Stopped>) -> anyhow::Result<RunRecord> {
-    harness::run(plan, folder, stopped).map_err(|error| match error {
+    run::run(plan, folder, stopped).map_err(|error| match error {
         RunError::ImageSize { .. } | RunError::Window { .. } => anyhow::anyhow!("{error}\n\n{}", super::budget::table(&plan.config.volume)),
         error @ (RunError::Resume(_) | RunError::Reopen(_)) => error.into(),
         error if folder.snapshot().is_file() => {
@@ -262,15 +264,15 @@ fn write(folder: &RunFolder, run: &RunRecord, summary: &Summary) -> Result<(), F
     folder.write("config.toml", |out| std::io::Write::write_all(out, run.config_toml.as_bytes()))?;
     folder.write("trajectory_kitti.txt", |out| export::write_kitti(out, &poses))?;
     folder.write("trajectory_tum.txt", |out| export::write_tum(out, &times, &poses))?;
-    folder.write("frames.csv", |out| export::write_frames(out, &run.rows))?;
-    folder.write("tracks.csv", |out| export::write_tracks(out, &run.rows))?;
+    folder.write("frames.csv", |out| report::write_frames(out, &run.rows))?;
+    folder.write("tracks.csv", |out| report::write_tracks(out, &run.rows))?;
     if !run.objects.judged.is_empty() {
-        folder.write("tracks_truth.csv", |out| export::write_tracks_truth(out, &run.rows, &run.objects.judged))?;
+        folder.write("tracks_truth.csv", |out| report::write_tracks_truth(out, &run.rows, &run.objects.judged))?;
     }
     if let Some(lidar) = &run.lidar {
-        folder.write("lidar.csv", |out| export::write_lidar(out, &lidar.frames))?;
+        folder.write("lidar.csv", |out| report::write_lidar(out, &lidar.frames))?;
     }
-    folder.write("report.html", |out| export::report::write(out, run))?;
+    folder.write("report.html", |out| report::html::write(out, run))?;
     folder.write("summary.json", |out| Ok(serde_json::to_writer_pretty(out, summary)?))
 }
 

@@ -1,6 +1,6 @@
 //! Curves and box plots over a few values, as inline SVG.
 
-use crate::export::report::chart::nice_step;
+use crate::report::chart::nice_step;
 use std::fmt::Write;
 
 const WIDTH: f64 = 560.0;

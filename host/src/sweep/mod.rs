@@ -18,7 +18,7 @@ pub use plan::{Data, Kind, Plan, Point, Wanted};
 pub use result::{FrameSample, RunResult};
 pub use store::{Results, SweepFolder, merge};
 
-use crate::export::FolderError;
+use crate::run::FolderError;
 use std::path::PathBuf;
 
 /// Why a sweep cannot go on.

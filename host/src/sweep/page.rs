@@ -5,7 +5,8 @@ use super::{
     draw::{Boxes, Curve, drawing, five},
     published as theirs,
 };
-use crate::export::report::{STYLE, chart::COLOURS, escaped};
+use crate::report::chart::COLOURS;
+use crate::report::html::{STYLE, escaped};
 use std::fmt::Write;
 
 /// Draws the page.

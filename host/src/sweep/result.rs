@@ -1,9 +1,9 @@
 //! What is kept of a run: its summary, and per frame what boxes and curves are drawn of. One file a run, written at once or not at all.
 
 use super::SweepError;
-use crate::evaluation::lidar::{EvaluatedFrame, Layer};
-use crate::export::{Summary, write_whole};
-use crate::harness::RunRecord;
+use crate::evaluate::lidar::{EvaluatedFrame, Layer};
+use crate::report::Summary;
+use crate::run::{RunRecord, write_whole};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::io::Write;

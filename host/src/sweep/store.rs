@@ -1,7 +1,7 @@
 //! A sweep's folder: the plan, a file for each finished run, tables and page drawn of what is there.
 
 use super::{Plan, RunResult, SweepError, page, table};
-use crate::export::{FolderError, write_whole};
+use crate::run::{FolderError, write_whole};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -2,8 +2,8 @@
 
 use crate::cli::settings::Settings;
 use crate::dataset::{Image, read_png, read_png_deep, read_png_u16};
-use crate::evaluation::stereo::{BAD_PX, StereoFigures, StereoPair, StereoTally, filled, find_stereo_set};
-use crate::harness::{HostSlab, Threads};
+use crate::evaluate::stereo::{BAD_PX, StereoFigures, StereoPair, StereoTally, filled, find_stereo_set};
+use crate::run::{HostSlab, Threads};
 use anyhow::bail;
 use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;

@@ -1,6 +1,6 @@
 //! `dynvox evaluate trajectory`.
 
-use crate::evaluation::trajectory::{self, TrajectoryErrors, read_trajectory, together};
+use crate::evaluate::trajectory::{self, TrajectoryErrors, read_trajectory, together};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]

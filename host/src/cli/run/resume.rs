@@ -1,8 +1,8 @@
 //! `dynvox run --resume`: a run that was stopped goes on as it was begun.
 
 use super::{RunArgs, finish, introduce, plan};
-use crate::export::RunFolder;
-use crate::harness::{Begun, Plan, Snapshots, Stopped};
+
+use crate::run::{Begun, Plan, RunFolder, Snapshots, Stopped};
 use anyhow::{Context, bail};
 use std::path::Path;
 

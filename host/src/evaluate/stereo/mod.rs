@@ -1,0 +1,97 @@
+//! Disparity against KITTI's stereo benchmarks of 2012 (Geiger, Lenz, Urtasun, CVPR 2012) and 2015 (Menze, Geiger, CVPR 2015).
+//!
+//! A pixel with truth is *bad by n* when it is off by more than n px, and wrong by *D1* when it is off by more than 3 px and by more than 5 % of the truth.
+//! Shares are given of the pixels that have an estimate, and, as the benchmarks rank, of all pixels with truth after the estimate's holes are
+//! filled ([`filled`]). Pixels are counted over all pairs together. Regions: what is seen in both images (`noc`), all (`occ`), each once
+//! more for foreground and background where the benchmark has an `obj_map`.
+
+mod fill;
+mod layout;
+#[cfg(test)]
+mod tests;
+
+pub use fill::filled;
+pub use layout::{StereoPair, StereoSet, StereoSetError, find_stereo_set};
+
+use crate::dataset::Image;
+use crate::evaluate::lidar::Rule;
+use serde::Serialize;
+
+/// Plain thresholds, px.
+pub const BAD_PX: [f32; 4] = [2.0, 3.0, 4.0, 5.0];
+/// 16-bit disparities are in this part of a pixel.
+const ONE_PX: f32 = 256.0;
+
+/// Counts of one region.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StereoTally {
+    /// Pixels with truth.
+    pixels: u64,
+    /// Of these, with an estimate of their own.
+    given: u64,
+    /// Wrong by D1: given ones, all after filling.
+    d1: [u64; 2],
+    /// Bad by each of [`BAD_PX`]: given ones, all after filling.
+    bad: [[u64; BAD_PX.len()]; 2],
+    /// Sum of |error| of the given ones, px, and of the error with its sign.
+    error_sums_px: [f64; 2],
+}
+
+impl StereoTally {
+    /// Takes in an image: truth and estimate in 1/256 px, 0 none; `counts` tells which pixels belong to the region.
+    pub fn add(&mut self, truth: &Image<u16>, given: &Image<u16>, filled: &Image<u16>, counts: impl Fn(usize) -> bool) {
+        let px = |q8: u16| f32::from(q8) / ONE_PX;
+        let pixels = truth.pixels().iter().zip(given.pixels()).zip(filled.pixels()).enumerate();
+        for (_, ((&truth, &given), &filled)) in pixels.filter(|(at, ((truth, _), _))| **truth > 0 && counts(*at)) {
+            self.pixels += 1;
+            self.given += u64::from(given > 0);
+            for (way, estimate) in [given, filled].into_iter().enumerate().filter(|(way, estimate)| *way == 1 || *estimate > 0) {
+                self.d1[way] += u64::from(Rule::KITTI.is_error(px(estimate), px(truth)));
+                let off_px = (px(estimate) - px(truth)).abs();
+                self.bad[way].iter_mut().zip(BAD_PX).for_each(|(bad, limit)| *bad += u64::from(off_px > limit));
+            }
+            if given > 0 {
+                let error = f64::from(px(given) - px(truth));
+                self.error_sums_px[0] += error.abs();
+                self.error_sums_px[1] += error;
+            }
+        }
+    }
+
+    /// The figures; `None` where there is no truth.
+    pub fn figures(&self) -> Option<StereoFigures> {
+        let share = |count: u64, all: u64| if all > 0 { count as f64 / all as f64 } else { 0.0 };
+        let mean = |sum: f64| if self.given > 0 { sum / self.given as f64 } else { 0.0 };
+        (self.pixels > 0).then(|| StereoFigures {
+            pixels: self.pixels,
+            coverage: share(self.given, self.pixels),
+            d1: share(self.d1[0], self.given),
+            d1_filled: share(self.d1[1], self.pixels),
+            bad: self.bad[0].map(|bad| share(bad, self.given)),
+            bad_filled: self.bad[1].map(|bad| share(bad, self.pixels)),
+            mean_error_px: mean(self.error_sums_px[0]),
+            mean_signed_error_px: mean(self.error_sums_px[1]),
+        })
+    }
+}
+
+/// Figures of one region.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StereoFigures {
+    /// Pixels with truth.
+    pub pixels: u64,
+    /// Share of them with an estimate.
+    pub coverage: f64,
+    /// Share of the estimates that is wrong by 3 px and 5 %.
+    pub d1: f64,
+    /// The same of all pixels, holes filled.
+    pub d1_filled: f64,
+    /// Share of the estimates that is off by more than 2, 3, 4, 5 px.
+    pub bad: [f64; BAD_PX.len()],
+    /// The same of all pixels, holes filled.
+    pub bad_filled: [f64; BAD_PX.len()],
+    /// Mean |error| of the estimates, px.
+    pub mean_error_px: f64,
+    /// Mean error of the estimates, px: below 0 where they are too far away.
+    pub mean_signed_error_px: f64,
+}

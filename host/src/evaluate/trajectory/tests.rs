@@ -1,0 +1,138 @@
+use super::*;
+use crate::export::{write_kitti, write_tum};
+use dynvox_core::geometry::exp;
+use nalgebra::Vector3;
+use std::path::Path;
+
+/// A drive along an arc of `count` frames, and the same with a known error in every step.
+fn arc(count: usize, step: Transform) -> Vec<Transform> {
+    std::iter::successors(Some(Transform::identity()), |pose| Some(pose * step)).take(count).collect()
+}
+
+#[test]
+fn a_trajectory_one_percent_too_long_has_one_percent_error() {
+    let step = |length: f64| exp(Vector3::zeros(), Vector3::new(0.0, 0.0, length));
+    let found = errors(&arc(80, step(1.0)), &arc(80, step(1.01))).unwrap();
+    assert!((found.t_err_percent.unwrap() - 1.0).abs() < 1e-9, "{found:?}");
+    assert!(found.r_err_deg_per_m.unwrap() < 1e-9 && found.rpe_r_deg < 1e-9);
+    assert!((found.rpe_t_m - 0.01).abs() < 1e-12);
+    assert_eq!(
+        found.per_length.iter().map(|row| (row.0 as usize, row.3)).collect::<Vec<_>>(),
+        [(5, 75), (10, 70), (20, 60), (30, 50), (40, 40), (50, 30)]
+    );
+    let long = errors(&arc(260, step(1.0)), &arc(260, step(1.01))).unwrap();
+    let rows: Vec<(usize, usize)> = long.per_length.iter().map(|row| (row.0 as usize, row.3)).collect();
+    assert_eq!(rows, [(100, 16), (200, 6)], "a path over 200 m is measured as the benchmark does, from every tenth frame on");
+}
+
+#[test]
+fn a_trajectory_turned_and_moved_as_a_whole_has_no_error() {
+    let truth = arc(60, exp(Vector3::new(0.0, 0.02, 0.001), Vector3::new(0.0, 0.0, 0.8)));
+    let away = exp(Vector3::new(0.3, -2.0, 0.1), Vector3::new(5.0, -3.0, 9.0));
+    let moved: Vec<Transform> = truth.iter().map(|pose| away * pose).collect();
+    let found = errors(&truth, &moved).unwrap();
+    assert!(found.ate_m < 1e-9 && found.rpe_t_m < 1e-9 && found.t_err_percent.unwrap() < 1e-9, "{found:?}");
+}
+
+/// The same drive in Python gave the figures of the test below: numpy with a singular value decomposition for the alignment.
+fn swerving(count: usize, noise: f64) -> Vec<Transform> {
+    let step = |i: f64| {
+        let turn = [1e-3 * (0.3 * i).sin() + noise * 2e-4 * (1.7 * i).cos(), 0.015 * (0.11 * i).sin() + noise * 3e-4 * (2.3 * i).sin()];
+        let ahead = 0.9 + 0.2 * (0.2 * i).sin() + noise * (0.01 * (1.1 * i).cos() + 0.005);
+        let sideways = [0.01 * i.cos() + noise * 4e-3 * (1.3 * i).sin(), noise * 3e-3 * (0.7 * i).cos()];
+        exp(Vector3::new(turn[0], turn[1], noise * 1e-4 * (0.9 * i).cos()), Vector3::new(sideways[0], sideways[1], ahead))
+    };
+    let poses = (1..count).scan(Transform::identity(), |pose, i| {
+        *pose *= step(i as f64);
+        Some(*pose)
+    });
+    std::iter::once(Transform::identity()).chain(poses).collect()
+}
+
+#[test]
+fn agrees_with_an_evaluation_in_numpy() {
+    let found = errors(&swerving(70, 0.0), &swerving(70, 1.0)).unwrap();
+    let close = |name: &str, value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 1e-5, "{name}: {value} for {expected}");
+    close("t_err", found.t_err_percent.unwrap(), 0.583_875_637_2);
+    close("r_err", found.r_err_deg_per_m.unwrap(), 0.001_243_667_17);
+    close("rpe_t", found.rpe_t_m, 0.009_383_868_18);
+    close("rpe_r", found.rpe_r_deg, 0.015_194_045_0);
+    close("ate", found.ate_m, 0.100_734_890_1);
+    let expected = [(5.0, 0.613_154_659_0, 65), (10.0, 0.593_158_881_8, 59), (20.0, 0.567_203_337_7, 46), (50.0, 0.560_707_572_6, 13)];
+    for (length_m, percent, pieces) in expected {
+        let row = found.per_length.iter().find(|row| row.0 == length_m).unwrap();
+        close("piece", row.1, percent);
+        assert_eq!(row.3, pieces);
+    }
+}
+
+#[test]
+fn too_little_to_compare_is_none() {
+    let truth = arc(3, exp(Vector3::zeros(), Vector3::new(0.0, 0.0, 1.0)));
+    assert!(errors(&truth[..1], &truth[..1]).is_none() && errors(&truth, &truth[..2]).is_none());
+    assert_eq!(errors(&truth, &truth).unwrap().t_err_percent, None, "two metres are shorter than every length");
+}
+
+#[test]
+fn agrees_with_evo() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/evaluate/trajectory/evo");
+    let [estimate, truth] = ["estimate.txt", "truth.txt"].map(|name| read_trajectory(&here.join(name)).unwrap());
+    let (estimate, truth) = together(&estimate, &truth).unwrap();
+    let found = errors(&truth, &estimate).unwrap();
+    let evo: serde_json::Value = serde_json::from_str(include_str!("evo/figures.json")).unwrap();
+    let close = |name: &str, value: f64, expected: &serde_json::Value| {
+        let expected = expected.as_f64().unwrap();
+        assert!((value / expected - 1.0).abs() < 1e-7, "{name}: {value} for {expected}");
+    };
+    close("ate", found.ate_m, &evo["ate_m"]);
+    close("rpe_t", found.rpe_t_m, &evo["rpe_t_m"]);
+    close("rpe_r", found.rpe_r_deg, &evo["rpe_r_deg"]);
+    close("t_err", found.t_err_percent.unwrap(), &evo["t_err_percent"]);
+    close("r_err", found.r_err_deg_per_m.unwrap(), &evo["r_err_deg_per_m"]);
+    let rows = evo["pieces"].as_array().unwrap();
+    assert_eq!(found.per_length.len(), rows.len());
+    for ((length_m, percent, deg_per_m, pieces), row) in found.per_length.iter().zip(rows) {
+        close("length", *length_m, &row[0]);
+        close("translation", *percent, &row[1]);
+        close("rotation", *deg_per_m, &row[2]);
+        assert_eq!(*pieces as u64, row[3].as_u64().unwrap());
+    }
+}
+
+#[test]
+fn both_formats_are_read_and_poses_are_joined_by_time() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let poses = arc(12, exp(Vector3::new(0.01, 0.03, 0.0), Vector3::new(0.1, 0.0, 1.0)));
+    let times: Vec<f64> = (0..12).map(|at| 100.0 + 0.1 * f64::from(at)).collect();
+    let write = |name: &str, write: &dyn Fn(&mut Vec<u8>)| {
+        let mut text = b"# a comment\n".to_vec();
+        write(&mut text);
+        std::fs::write(folder.path().join(name), text).unwrap();
+        folder.path().join(name)
+    };
+    let kitti = read_trajectory(&write("kitti.txt", &|out| write_kitti(out, &poses).unwrap())).unwrap();
+    let tum = read_trajectory(&write("trajectory_tum.txt", &|out| write_tum(out, &times, &poses).unwrap())).unwrap();
+    assert_eq!((&kitti.times_s, tum.times_s.as_deref()), (&None, Some(&times[..])));
+    let (a, b) = together(&kitti, &tum).unwrap();
+    assert!(errors(&a, &b).unwrap().ate_m < 1e-9, "one trajectory in two formats");
+    assert_eq!(read_trajectory(folder.path()).unwrap(), tum, "a run folder's own");
+    // Every second pose, by another clock that is 4 ms late.
+    let half = Trajectory {
+        times_s: Some(times.iter().step_by(2).map(|time| time + 0.004).collect()),
+        poses: poses.iter().step_by(2).copied().collect(),
+    };
+    let (a, b) = together(&half, &tum).unwrap();
+    assert!(a.len() == 6 && errors(&a, &b).unwrap().ate_m < 1e-9);
+    assert!(together(&half, &kitti).unwrap_err().to_string().contains("has 6 poses, the second 12"));
+    let late = Trajectory {
+        times_s: half.times_s.iter().map(|times| times.iter().map(|time| time + 5e3).collect()).next(),
+        ..half
+    };
+    assert!(together(&late, &tum).unwrap_err().to_string().contains("same clock"));
+    let mixed = write("mixed.txt", &|out| {
+        write_kitti(out, &poses[..1]).unwrap();
+        write_tum(out, &times, &poses[..1]).unwrap();
+    });
+    assert!(read_trajectory(&mixed).unwrap_err().to_string().contains("line 3 is no pose"));
+    assert!(read_trajectory(&folder.path().join("none")).unwrap_err().to_string().contains("cannot be read"));
+}

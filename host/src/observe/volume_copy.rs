@@ -1,0 +1,146 @@
+//! What a volume holds, copied: whoever wants to look at it at leisure need not keep the mapper waiting.
+
+use crate::run::HostSlab;
+use dynvox_core::Capacity;
+use dynvox_core::memory::Carver;
+use dynvox_core::view::{MeshConfig, Triangle};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, LeavingBlock, ReturningBlock, Volume, VolumeConfig};
+use std::io::{Error, ErrorKind};
+
+/// The blocks of a volume, in its order.
+pub struct VolumeCopy {
+    config: VolumeConfig,
+    colour: bool,
+    blocks: Vec<Block>,
+}
+
+struct Block {
+    coord: BlockCoord,
+    sdf: [i16; BLOCK_VOXELS],
+    weight: [u8; BLOCK_VOXELS],
+    /// All 0 without colour.
+    colour: [[u8; BLOCK_VOXELS]; 3],
+}
+
+impl VolumeCopy {
+    /// Copies a volume.
+    pub fn of(volume: &Volume<'_>) -> Self {
+        let (pool, blocks) = (volume.pool(), volume.blocks());
+        let mut copy = Self { config: *volume.config(), colour: false, blocks: Vec::with_capacity(pool.len()) };
+        for slot in (0..pool.high_water() as u32).filter(|&slot| pool.handle(slot).is_some()) {
+            let colour = blocks.colour(slot);
+            copy.colour |= colour.is_some();
+            if let (Some(coord), Some(&sdf), Some(&weight)) = (blocks.coord(slot), blocks.sdf(slot), blocks.weight(slot)) {
+                copy.blocks.push(Block { coord, sdf, weight, colour: colour.copied().unwrap_or([[0; BLOCK_VOXELS]; 3]) });
+            }
+        }
+        copy
+    }
+
+    /// How the volume was made.
+    pub fn config(&self) -> &VolumeConfig {
+        &self.config
+    }
+
+    /// How many blocks it has.
+    pub fn blocks(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// Hands out the triangles that the volume would have, in the same order.
+    ///
+    /// # Errors
+    ///
+    /// No memory for a volume of as many blocks.
+    pub fn triangles(&self, mesh: &MeshConfig, sink: &mut impl FnMut(Triangle)) -> std::io::Result<u64> {
+        let capacity = Capacity {
+            blocks: self.blocks.len(),
+            visible_blocks: 1,
+            history_frames: 1,
+            colour: self.colour,
+            ..Capacity::TINY
+        };
+        let bytes = Volume::bytes(&capacity);
+        let mut slab = HostSlab::map(bytes).ok_or(ErrorKind::OutOfMemory)?;
+        let misfit = |error| Error::other(format!("no room for an object's blocks: {error:?}"));
+        let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(misfit)?;
+        let mut volume = Volume::carve(&capacity, &self.config, &mut carver);
+        carver.check().map_err(misfit)?;
+        for block in &self.blocks {
+            volume.load(block.coord, &mut One(block));
+        }
+        Ok(volume.triangles(mesh, sink))
+    }
+}
+
+/// Brings one block back.
+struct One<'b>(&'b Block);
+
+impl BlockStore for One<'_> {
+    fn keep(&mut self, _: LeavingBlock<'_>) -> bool {
+        false
+    }
+
+    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
+        (*block.sdf, *block.weight) = (self.0.sdf, self.0.weight);
+        if let Some(colour) = block.colour {
+            *colour = self.0.colour;
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynvox_core::Serial;
+    use dynvox_core::geometry::{StereoRig, Transform};
+    use dynvox_core::image::View;
+    use dynvox_core::volume::{NoStore, Observation, Viewpoint};
+
+    const WIDTH: usize = 96;
+    const HEIGHT: usize = 64;
+
+    /// A volume of two walls, of which the first is pruned away, so that slots are free between those in use.
+    fn with_volume(colour: bool, test: impl FnOnce(&Volume<'_>)) {
+        let capacity = Capacity { blocks: 500, colour, ..Capacity::TINY };
+        let config = VolumeConfig { truncation_m: 0.2, ..VolumeConfig::default() };
+        let bytes = Volume::bytes(&capacity);
+        let mut slab = HostSlab::map(bytes).unwrap();
+        let mut volume = Volume::carve(&capacity, &config, &mut Carver::new(slab.bytes_mut(), bytes).unwrap());
+        let rig = StereoRig { focal_px: 80.0, center_u_px: 48.0, center_v_px: 32.0, baseline_m: 0.5 };
+        let view = Viewpoint { rig, width: WIDTH, height: HEIGHT, t_world_camera: Transform::identity() };
+        let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| 40 + (i % 200) as u8).collect();
+        for walls_m in [[1.0, 2.0], [0.0, 2.0]] {
+            let depth_m: Vec<f32> = (0..WIDTH * HEIGHT).map(|i| walls_m[usize::from(i % WIDTH > 40)]).collect();
+            let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
+            let seen = Observation {
+                depth_m,
+                grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
+                colour: None,
+                class: None,
+            };
+            volume.allocate(&view, depth_m, &mut NoStore);
+            volume.fuse(&view, seen, &Serial);
+        }
+        volume.prune_whole(1);
+        assert!(volume.pool().len() < volume.pool().high_water(), "slots are free");
+        test(&volume);
+    }
+
+    #[test]
+    fn gives_the_volumes_own_triangles_in_its_order() {
+        for colour in [false, true] {
+            with_volume(colour, |volume| {
+                let (mut own, mut copied) = (Vec::new(), Vec::new());
+                let mesh = MeshConfig::default();
+                volume.triangles(&mesh, &mut |triangle| own.push(triangle));
+                let copy = VolumeCopy::of(volume);
+                let count = copy.triangles(&mesh, &mut |triangle| copied.push(triangle)).unwrap();
+                assert!(own == copied && count == own.len() as u64, "{} and {}", own.len(), copied.len());
+                assert!(own.len() > 100 && copy.blocks() == volume.pool().len());
+                assert_eq!(own.iter().any(|one| one.vertices[0].colour != [0; 3]), colour);
+            });
+        }
+    }
+}
