@@ -163,7 +163,7 @@ fn bench(criterion: &mut Criterion) {
     assert!(SLOTS * size_of::<u32>() <= bytes, "the plain table has no more bytes");
     let mut slab = vec![0u8; bytes + 64];
     let start = slab.as_ptr().align_offset(64);
-    let index = BlockIndex::carve(BLOCKS, &mut Carver::new(&mut slab[start..], bytes).unwrap());
+    let index = BlockIndex::new_in(BLOCKS, &mut Carver::new(&mut slab[start..], bytes).unwrap());
     Drive::new(index).bench(criterion, "hashbrown");
     Drive::new(Plain(vec![0; SLOTS])).bench(criterion, "plain");
 }

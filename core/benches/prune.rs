@@ -45,7 +45,7 @@ fn bench(criterion: &mut Criterion) {
     let start = slab.as_ptr().align_offset(64);
     // Voxels small enough that one view holds more than 10,000 blocks.
     let config = VolumeConfig { voxel_size_m: 0.03, ..VolumeConfig::default() };
-    let mut volume = Volume::carve(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
+    let mut volume = Volume::new_in(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
     let grey = vec![128; WIDTH * HEIGHT];
     let fuse = |volume: &mut Volume<'_>, shift_m: f32| {
         let depth_m = canyon(shift_m);

@@ -101,8 +101,8 @@ fn bench(criterion: &mut Criterion) {
     let mut slab = vec![0u8; bytes + 64];
     let start = slab.as_ptr().align_offset(64);
     let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
-    let mut volume = Volume::carve(&capacity, &VolumeConfig::default(), &mut carver);
-    let mut caster = Raycaster::carve(&capacity, &RaycastConfig::default(), &mut carver);
+    let mut volume = Volume::new_in(&capacity, &VolumeConfig::default(), &mut carver);
+    let mut caster = Raycaster::new_in(&capacity, &RaycastConfig::default(), &mut carver);
     drive(&mut volume);
 
     let mut at = 0;

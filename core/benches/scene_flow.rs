@@ -66,8 +66,8 @@ fn bench(criterion: &mut Criterion) {
     let slab: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
     let lead = slab.as_ptr().align_offset(64);
     let mut carver = Carver::new(&mut slab[lead..], bytes).unwrap();
-    let mut matcher = FlowMatcher::carve(&capacity, &mut carver);
-    let mut estimator = Estimator::carve(&capacity, &mut carver);
+    let mut matcher = FlowMatcher::new_in(&capacity, &mut carver);
+    let mut estimator = Estimator::new_in(&capacity, &mut carver);
     let [before, after] = pairs();
     let config = SceneFlowConfig::default();
 

@@ -71,7 +71,7 @@ fn stereo(criterion: &mut Criterion) {
     let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut memory);
     let skip = bytes.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut bytes[skip..], StereoMatcher::bytes(&capacity)).unwrap();
-    let mut matcher = StereoMatcher::carve(&capacity, &mut carver);
+    let mut matcher = StereoMatcher::new_in(&capacity, &mut carver);
     let config = StereoConfig::dynslam();
     for pair in [Some(synthetic()), kitti()].into_iter().flatten() {
         let left = View::new(&pair.left, pair.width, pair.height).unwrap();

@@ -87,7 +87,7 @@ fn bench(criterion: &mut Criterion) {
     let bytes = Volume::bytes(&capacity);
     let mut slab = vec![0u8; bytes + 64];
     let start = slab.as_ptr().align_offset(64);
-    let mut volume = Volume::carve(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
+    let mut volume = Volume::new_in(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
 
     let mut drive = |criterion: &mut Criterion, name: &str, only_fuse: bool| {
         let mut at = 0;

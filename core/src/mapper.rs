@@ -107,7 +107,7 @@ impl Capacity {
         let mut carver = Carver::without_slab();
         // Regions depend on the capacity alone: any rig will do.
         let rig = StereoRig { focal_px: 1.0, center_u_px: 0.0, center_v_px: 0.0, baseline_m: 1.0 };
-        Mapper::cut(self, &Config::for_rig(rig), &mut carver);
+        Mapper::new_in(self, &Config::for_rig(rig), &mut carver);
         carver.into_footprint()
     }
 }
@@ -130,23 +130,23 @@ impl<'s> Mapper<'s> {
             return Err(NewError::Config(*problem));
         }
         let mut carver = Carver::new(slab, capacity.bytes())?;
-        let mapper = Self::cut(capacity, config, &mut carver);
+        let mapper = Self::new_in(capacity, config, &mut carver);
         carver.check()?;
         Ok(mapper)
     }
 
-    fn cut(capacity: &Capacity, config: &Config, carver: &mut Carver<'s>) -> Self {
+    fn new_in(capacity: &Capacity, config: &Config, carver: &mut Carver<'s>) -> Self {
         Self {
             config: *config,
             capacity: *capacity,
-            stereo: StereoMatcher::carve(capacity, carver),
-            scene_flow: FlowMatcher::carve(capacity, carver),
-            estimator: Estimator::carve(capacity, carver),
+            stereo: StereoMatcher::new_in(capacity, carver),
+            scene_flow: FlowMatcher::new_in(capacity, carver),
+            estimator: Estimator::new_in(capacity, carver),
             camera: Egomotion::default(),
-            instances: Instances::carve(capacity, &config.instances, carver),
-            depth_m: carver.cut("depth_m", capacity.pixels()),
-            background: Volume::carve(capacity, &config.volume, carver),
-            raycaster: Raycaster::carve(capacity, &config.raycast, carver),
+            instances: Instances::new_in(capacity, &config.instances, carver),
+            depth_m: carver.alloc("depth_m", capacity.pixels()),
+            background: Volume::new_in(capacity, &config.volume, carver),
+            raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
             size: None,
             frame: 0,
         }

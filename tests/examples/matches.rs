@@ -18,7 +18,7 @@ fn main() {
         Street::new(StreetConfig { width, height, frames: FRAMES, ..StreetConfig::default() }).expect("the default street is sound");
     let mut slab = HeapSlab::of(&Capacity::SMALL);
     let mut carver = Carver::new(slab.bytes(), FlowMatcher::bytes(&Capacity::SMALL)).expect("an aligned slab");
-    let mut matcher = FlowMatcher::carve(&Capacity::SMALL, &mut carver);
+    let mut matcher = FlowMatcher::new_in(&Capacity::SMALL, &mut carver);
     carver.check().expect("a slab that fits");
     println!(
         "frame,previous_left_u,previous_left_v,previous_right_u,previous_right_v,current_left_u,current_left_v,current_right_u,current_right_v"

@@ -118,8 +118,8 @@ fn run(name: &str) -> Option<Vec<Matrix4<f64>>> {
     let slab: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
     let lead = slab.as_ptr().align_offset(64);
     let mut carver = Carver::new(&mut slab[lead..], bytes).unwrap();
-    let mut matcher = FlowMatcher::carve(&capacity, &mut carver);
-    let mut estimator = Estimator::carve(&capacity, &mut carver);
+    let mut matcher = FlowMatcher::new_in(&capacity, &mut carver);
+    let mut estimator = Estimator::new_in(&capacity, &mut carver);
     let mut camera = Egomotion::default();
     let mut trajectory = Vec::new();
     let (mut matching_ms, mut moving_ms) = (0.0, 0.0);

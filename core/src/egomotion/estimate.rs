@@ -85,10 +85,10 @@ impl<'s> Estimator<'s> {
     }
 
     /// Cuts its regions.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
-            points: Points::carve(capacity.matches, carver),
-            inliers: carver.cut("egomotion.inlier", capacity.matches),
+            points: Points::new_in(capacity.matches, carver),
+            inliers: carver.alloc("egomotion.inlier", capacity.matches),
             inlier_len: 0,
         }
     }

@@ -22,7 +22,7 @@
 //! let mut slab = vec![0; Estimator::bytes(&capacity) + 64];
 //! let lead = slab.as_ptr().align_offset(64);
 //! let mut carver = Carver::new(&mut slab[lead..], Estimator::bytes(&capacity)).unwrap();
-//! let mut estimator = Estimator::carve(&capacity, &mut carver);
+//! let mut estimator = Estimator::new_in(&capacity, &mut carver);
 //! let rig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.54 };
 //! let estimate = estimator.estimate(&EgomotionConfig::default(), &rig, [], &mut Random::new(1), None);
 //! assert_eq!(estimate.status, MotionStatus::TooFewMatches);

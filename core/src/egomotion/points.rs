@@ -45,8 +45,8 @@ impl<'s> Points<'s> {
         region_bytes::<f32>(COLUMNS * matches) + region_bytes::<u32>(matches)
     }
 
-    pub(super) fn carve(matches: usize, carver: &mut Carver<'s>) -> Self {
-        let mut columns = carver.cut("egomotion.point", COLUMNS * matches);
+    pub(super) fn new_in(matches: usize, carver: &mut Carver<'s>) -> Self {
+        let mut columns = carver.alloc("egomotion.point", COLUMNS * matches);
         let mut column = || columns.split_off_mut(..matches).unwrap_or_default();
         Self {
             x: column(),
@@ -56,7 +56,7 @@ impl<'s> Points<'s> {
             left_v: column(),
             right_u: column(),
             right_v: column(),
-            source: carver.cut("egomotion.source", matches),
+            source: carver.alloc("egomotion.source", matches),
             len: 0,
         }
     }

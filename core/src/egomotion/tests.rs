@@ -17,7 +17,7 @@ use std::{boxed::Box, vec, vec::Vec};
 const BYTES: usize = Estimator::bytes(&CAPACITY);
 
 fn estimator(slab: &mut Slab<BYTES>) -> Estimator<'_> {
-    Estimator::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap())
+    Estimator::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap())
 }
 
 /// Distance, m, and angle, degrees, between two motions.
@@ -29,7 +29,7 @@ fn between(a: &Transform, b: &Transform) -> (f64, f64) {
 /// Moves a camera through the room and returns the estimate of every frame after the first beside the truth.
 fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
-    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
+    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
     let mut estimator = estimator(&mut slab);
     let mut camera = Egomotion::default();
     let mut t_world_camera = Transform::identity();
@@ -183,7 +183,7 @@ fn more_matches_than_room_are_not_looked_at() {
 #[test]
 fn a_dark_right_camera_holds_the_last_motion() {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
-    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
+    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
     let mut estimator = estimator(&mut slab);
     let mut camera = Egomotion::default();
     let step = exp(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.4));
@@ -210,7 +210,7 @@ fn a_dark_right_camera_holds_the_last_motion() {
 fn cuts_exactly_the_bytes_it_names() {
     let mut slab = Box::new(Slab([0; BYTES]));
     let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
-    Estimator::carve(&CAPACITY, &mut carver);
+    Estimator::new_in(&CAPACITY, &mut carver);
     assert_eq!(carver.footprint().bytes(), BYTES);
 }
 

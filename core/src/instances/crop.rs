@@ -140,13 +140,13 @@ impl<'s> Crops<'s> {
             + region_bytes::<Crop>(CROPS_MAX)
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let pixels = capacity.crop_pixels;
         Self {
-            disparity_q8: carver.cut("instances.crop_disparity", pixels),
-            grey: carver.cut("instances.crop_grey", pixels),
-            colour: if capacity.colour { carver.cut("instances.crop_colour", pixels) } else { &mut [] },
-            entries: carver.cut("instances.crop", CROPS_MAX),
+            disparity_q8: carver.alloc("instances.crop_disparity", pixels),
+            grey: carver.alloc("instances.crop_grey", pixels),
+            colour: if capacity.colour { carver.alloc("instances.crop_colour", pixels) } else { &mut [] },
+            entries: carver.alloc("instances.crop", CROPS_MAX),
             len: 0,
             next: 0,
         }

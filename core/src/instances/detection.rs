@@ -157,8 +157,8 @@ impl<'s> Detections<'s> {
         region_bytes::<Taken>(capacity.detections)
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
-        Self { taken: carver.cut("instances.detection", capacity.detections), len: 0 }
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self { taken: carver.alloc("instances.detection", capacity.detections), len: 0 }
     }
 
     pub fn all(&self) -> &[Taken] {

@@ -121,21 +121,21 @@ impl<'s> Instances<'s> {
     }
 
     /// Cuts its regions.
-    pub fn carve(capacity: &Capacity, config: &InstancesConfig, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, config: &InstancesConfig, carver: &mut Carver<'s>) -> Self {
         Self {
             config: *config,
             masks: [
-                MaskStore::new(carver.cut("instances.mask0", capacity.mask_words)),
-                MaskStore::new(carver.cut("instances.mask1", capacity.mask_words)),
+                MaskStore::new(carver.alloc("instances.mask0", capacity.mask_words)),
+                MaskStore::new(carver.alloc("instances.mask1", capacity.mask_words)),
             ],
             now: 0,
-            detections: Detections::carve(capacity, carver),
-            tracks: Tracks::carve(capacity, carver),
-            owner: carver.cut("instances.owner", capacity.matches),
-            sparse_owner: carver.cut("instances.sparse_owner", capacity.matches),
-            looked: carver.cut("instances.looked", look::LOOKS),
-            crops: Crops::carve(capacity, carver),
-            objects: Objects::carve(capacity, &config.volume, carver),
+            detections: Detections::new_in(capacity, carver),
+            tracks: Tracks::new_in(capacity, carver),
+            owner: carver.alloc("instances.owner", capacity.matches),
+            sparse_owner: carver.alloc("instances.sparse_owner", capacity.matches),
+            looked: carver.alloc("instances.looked", look::LOOKS),
+            crops: Crops::new_in(capacity, carver),
+            objects: Objects::new_in(capacity, &config.volume, carver),
             frame: 0,
             report: InstancesReport::default(),
         }

@@ -165,17 +165,17 @@ impl<'s> Objects<'s> {
             + region_bytes::<u16>(capacity.pixels())
     }
 
-    pub fn carve(capacity: &Capacity, config: &ObjectVolumeConfig, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, config: &ObjectVolumeConfig, carver: &mut Carver<'s>) -> Self {
         let (bounds, config, pixels) = (bounds(capacity), config.volume(), capacity.pixels());
         let mut made = Self {
-            depth_m: carver.cut("instances.depth_m", pixels),
-            disparity_q8: carver.cut("instances.disparity", pixels),
+            depth_m: carver.alloc("instances.depth_m", pixels),
+            disparity_q8: carver.alloc("instances.disparity", pixels),
             objects: Vec::new(),
         };
         for _ in 0..Self::volumes(capacity) {
-            let object = carver.as_one("instances.volumes", |carver| {
-                let volume = Volume::carve(&bounds, &config, carver);
-                carver.put("object", OBJECT_BYTES, Object { volume, summary: None })
+            let object = carver.group("instances.volumes", |carver| {
+                let volume = Volume::new_in(&bounds, &config, carver);
+                carver.alloc_value("object", OBJECT_BYTES, Object { volume, summary: None })
             });
             object.and_then(|object| made.objects.push(object).err());
         }

@@ -171,12 +171,12 @@ impl<'s> Tracks<'s> {
         region_bytes::<Track>(capacity.tracks) + region_bytes::<f32>(capacity.tracks * capacity.detections)
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
-            tracks: carver.cut("instances.track", capacity.tracks),
+            tracks: carver.alloc("instances.track", capacity.tracks),
             len: 0,
             next_id: 1,
-            scores: carver.cut("instances.affinity", capacity.tracks * capacity.detections),
+            scores: carver.alloc("instances.affinity", capacity.tracks * capacity.detections),
         }
     }
 

@@ -25,8 +25,8 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Books so many bytes under a name: to the last region if that is its name, else to a new one. Whether there was room for it.
-    pub(super) fn book(&mut self, name: &'static str, bytes: usize) -> bool {
+    /// Records so many bytes under a name: to the last region if that is its name, else to a new one. Whether there was room for it.
+    pub(super) fn record(&mut self, name: &'static str, bytes: usize) -> bool {
         if let Some(last) = self.regions.last_mut().filter(|last| last.name == name) {
             (last.bytes, last.used, last.peak) = (last.bytes + bytes, last.used + bytes, last.peak + bytes);
             return true;

@@ -39,11 +39,11 @@ impl<'s> SlotPool<'s> {
     }
 
     /// Cuts a pool of `slots` slots. `names` are those of its two regions: generations, free list.
-    pub fn carve(carver: &mut Carver<'s>, slots: usize, names: [&'static str; 2]) -> Self {
+    pub fn new_in(carver: &mut Carver<'s>, slots: usize, names: [&'static str; 2]) -> Self {
         let [generations, free_list] = names;
         Self {
-            generation: carver.cut(generations, slots),
-            freed: carver.cut(free_list, slots),
+            generation: carver.alloc(generations, slots),
+            freed: carver.alloc(free_list, slots),
             freed_len: 0,
             fresh: 0,
             peak: 0,
@@ -146,7 +146,7 @@ mod tests {
     fn gives_each_slot_once_then_says_full() {
         let mut slab = std::boxed::Box::new(Slab([0u8; SlotPool::bytes(17)]));
         let mut carver = Carver::new(&mut slab.0, SlotPool::bytes(17)).unwrap();
-        let mut pool = SlotPool::carve(&mut carver, 17, ["generation", "freed"]);
+        let mut pool = SlotPool::new_in(&mut carver, 17, ["generation", "freed"]);
         let handles: std::vec::Vec<_> = (0..17).map(|_| pool.take().unwrap()).collect();
         assert!(handles.iter().enumerate().all(|(i, h)| h.slot == i as u32));
         assert_eq!(pool.take(), Err(Full));

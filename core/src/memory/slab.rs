@@ -37,22 +37,22 @@ pub const fn region_bytes<T>(count: usize) -> usize {
     (count * size_of::<T>()).next_multiple_of(SLAB_ALIGN)
 }
 
-/// Cuts a slab into typed, zeroed regions, front to back, and remembers each by name.
+/// Allocates typed, zeroed regions from a slab, front to back, and records each by name.
 ///
-/// Cutting does not fail one by one: from the first failure on what is cut is empty, and [`Carver::check`] tells of it. So
-/// making rooms of regions takes no `Result` on the way, each of which would be a copy of the room on the stack.
+/// A single allocation returns no error: from the first failure on every region is empty, and [`Carver::check`] returns the
+/// failure. So a stage is built of its regions without a `Result` at each, which would be a copy of the stage on the stack.
 #[derive(Debug)]
 pub struct Carver<'s> {
-    /// What is not cut yet; `None` without a slab.
+    /// What is not allocated yet; `None` without a slab.
     rest: Option<&'s mut [u8]>,
     footprint: Footprint,
-    /// What regions are booked under, whatever they are called.
+    /// Replaces the names of regions while a group is allocated.
     name: Option<&'static str>,
     failure: Option<SlabError>,
 }
 
 impl<'s> Carver<'s> {
-    /// Begins to cut `slab`, of which `wanted` bytes will be used.
+    /// Starts at the front of `slab`, of which `wanted` bytes will be used.
     pub fn new(slab: &'s mut [u8], wanted: usize) -> Result<Self, SlabError> {
         if !(slab.as_ptr() as usize).is_multiple_of(SLAB_ALIGN) {
             return Err(SlabError::Misaligned);
@@ -63,37 +63,37 @@ impl<'s> Carver<'s> {
         Ok(Self { rest: Some(slab), ..Self::without_slab() })
     }
 
-    /// Only books: whatever is cut is empty.
+    /// Records regions without memory: every region is empty.
     pub fn without_slab() -> Self {
         Self { rest: None, footprint: Footprint::default(), name: None, failure: None }
     }
 
-    /// Cuts `count` zeroed items of `T` off the front and books them under `name`.
-    pub fn cut<T: Pod>(&mut self, name: &'static str, count: usize) -> &'s mut [T] {
-        let items = self.cut_as_found(name, count);
+    /// Allocates `count` zeroed items of `T` and records them under `name`.
+    pub fn alloc<T: Pod>(&mut self, name: &'static str, count: usize) -> &'s mut [T] {
+        let items = self.alloc_as_found(name, count);
         items.fill(T::zeroed());
         items
     }
 
-    /// As [`Carver::cut`], with whatever the slab holds: for big regions that are cleared piece by piece as they come into use, so that
-    /// a slab much larger than the map costs neither time nor resident memory.
-    pub fn cut_as_found<T: Pod>(&mut self, name: &'static str, count: usize) -> &'s mut [T] {
+    /// As [`Carver::alloc`], without clearing: for big regions whose items are cleared as they come into use, so that a slab
+    /// much larger than the map costs neither time nor resident memory.
+    pub fn alloc_as_found<T: Pod>(&mut self, name: &'static str, count: usize) -> &'s mut [T] {
         let region = self.take(name, region_bytes::<T>(count));
         let items = region.get_mut(..count * size_of::<T>()).unwrap_or_default();
         let cast = bytemuck::try_cast_slice_mut(items);
-        self.ask(cast.is_ok());
+        self.require_fit(cast.is_ok());
         cast.unwrap_or_default()
     }
 
-    /// Moves `thing`, which is no plain data, into `bytes` of the slab: a stated number, not to depend on how wide a machine's pointers are. It is
-    /// never dropped.
-    pub fn put<T: 's>(&mut self, name: &'static str, bytes: usize, thing: T) -> Option<&'s mut T> {
-        let put = Box::try_new_in(thing, OneShot::new(self.cut_as_found(name, bytes)));
-        self.ask(put.is_ok());
-        put.ok().map(Box::leak)
+    /// Moves `value`, which is not plain data, into `bytes` of the slab: a stated number, which must not depend on the width of
+    /// pointers. The value is never dropped.
+    pub fn alloc_value<T: 's>(&mut self, name: &'static str, bytes: usize, value: T) -> Option<&'s mut T> {
+        let made = Box::try_new_in(value, OneShot::new(self.alloc_as_found(name, bytes)));
+        self.require_fit(made.is_ok());
+        made.ok().map(Box::leak)
     }
 
-    /// Takes `bytes` off the front and books them.
+    /// Takes `bytes` off the front and records them.
     fn take(&mut self, name: &'static str, bytes: usize) -> &'s mut [u8] {
         if self.failure.is_some() {
             return &mut [];
@@ -106,28 +106,28 @@ impl<'s> Carver<'s> {
             Some(rest) => rest.split_off_mut(..bytes).unwrap_or_default(),
             None => &mut [],
         };
-        if !self.footprint.book(self.name.unwrap_or(name), bytes) {
+        if !self.footprint.record(self.name.unwrap_or(name), bytes) {
             self.failure = Some(SlabError::TooManyRegions);
         }
         region
     }
 
-    /// Books all that `cut` cuts as one region: for many things alike, whose regions would have too many names.
-    pub fn as_one<R>(&mut self, name: &'static str, cut: impl FnOnce(&mut Self) -> R) -> R {
+    /// Records all that `alloc` allocates as one region: for arrays of stages, whose regions would have too many names.
+    pub fn group<R>(&mut self, name: &'static str, alloc: impl FnOnce(&mut Self) -> R) -> R {
         self.name = Some(name);
-        let made = cut(self);
+        let made = alloc(self);
         self.name = None;
         made
     }
 
-    /// Notes whether something fits the region cut for it. Without a slab there is none.
-    pub(crate) fn ask(&mut self, fits: bool) {
+    /// Records a failure unless a value fits its region. Without a slab there is no region.
+    pub(crate) fn require_fit(&mut self, fits: bool) {
         if self.rest.is_some() && !fits {
             self.failure.get_or_insert(SlabError::Misfit);
         }
     }
 
-    /// Whether all was cut. Where it was not, what was made of it is not to be used.
+    /// Whether every region was allocated. After a failure nothing built from the regions may be used.
     ///
     /// # Errors
     /// The first failure.
@@ -135,12 +135,12 @@ impl<'s> Carver<'s> {
         self.failure.map_or(Ok(()), Err)
     }
 
-    /// Ends the cutting; what was booked.
+    /// The recorded regions.
     pub fn into_footprint(self) -> Footprint {
         self.footprint
     }
 
-    /// What has been booked so far.
+    /// The regions recorded so far.
     pub fn footprint(&self) -> &Footprint {
         &self.footprint
     }
@@ -151,15 +151,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cuts_aligned_zeroed_regions_and_books_them() {
+    fn allocates_aligned_zeroed_regions_and_records_them() {
         let mut slab = std::boxed::Box::new(Slab([7u8; 256]));
         let mut carver = Carver::new(&mut slab.0, 256).unwrap();
-        let a = carver.cut::<u16>("a", 5);
-        let b = carver.cut::<u64>("b", 16);
+        let a = carver.alloc::<u16>("a", 5);
+        let b = carver.alloc::<u64>("b", 16);
         assert_eq!(a, [0; 5]);
         assert_eq!(b, [0; 16]);
         assert_eq!(b.as_ptr() as usize % SLAB_ALIGN, 0);
-        assert_eq!(carver.cut_as_found::<u8>("c", 2), [7; 2]);
+        assert_eq!(carver.alloc_as_found::<u8>("c", 2), [7; 2]);
         let footprint = carver.footprint();
         assert_eq!(footprint.bytes(), 256);
         assert_eq!(footprint.region("b").unwrap().bytes, 128);
@@ -167,27 +167,27 @@ mod tests {
     }
 
     #[test]
-    fn after_the_first_failure_cuts_nothing_and_tells_of_that_one() {
+    fn after_the_first_failure_allocates_nothing_and_returns_that_failure() {
         let mut slab = std::boxed::Box::new(Slab([0u8; 192]));
         let mut carver = Carver::new(&mut slab.0, 192).unwrap();
-        assert_eq!(carver.cut::<u8>("a", 64).len(), 64);
-        assert_eq!(carver.cut::<u8>("b", 200).len(), 0);
-        assert_eq!(carver.cut::<u8>("c", 1_000).len(), 0);
-        assert_eq!(carver.cut::<u8>("d", 1).len(), 0, "although there is room");
+        assert_eq!(carver.alloc::<u8>("a", 64).len(), 64);
+        assert_eq!(carver.alloc::<u8>("b", 200).len(), 0);
+        assert_eq!(carver.alloc::<u8>("c", 1_000).len(), 0);
+        assert_eq!(carver.alloc::<u8>("d", 1).len(), 0, "although there is room");
         assert_eq!(carver.check(), Err(SlabError::TooSmall { missing: 256 - 128 }));
         assert_eq!(carver.footprint().bytes(), 64);
     }
 
     #[test]
-    fn books_what_is_cut_as_one_or_by_one_name_in_a_row_as_one_region() {
+    fn records_a_group_or_one_name_in_a_row_as_one_region() {
         let mut slab = std::boxed::Box::new(Slab([0u8; 512]));
         let mut carver = Carver::new(&mut slab.0, 512).unwrap();
-        carver.cut::<u8>("a", 1);
-        carver.cut::<u8>("a", 65);
+        carver.alloc::<u8>("a", 1);
+        carver.alloc::<u8>("a", 65);
         for _ in 0..2 {
-            carver.as_one("both", |carver| (carver.cut::<u8>("b", 1).len(), carver.cut::<u8>("c", 1).len()));
+            carver.group("both", |carver| (carver.alloc::<u8>("b", 1).len(), carver.alloc::<u8>("c", 1).len()));
         }
-        carver.cut::<u8>("a", 1);
+        carver.alloc::<u8>("a", 1);
         let regions: std::vec::Vec<_> = carver.footprint().regions().iter().map(|region| (region.name, region.bytes)).collect();
         assert_eq!(regions, [("a", 192), ("both", 256), ("a", 64)]);
     }
@@ -197,7 +197,7 @@ mod tests {
         let mut slab = std::boxed::Box::new(Slab([0u8; 64 * 128]));
         let mut carver = Carver::new(&mut slab.0, 0).unwrap();
         for name in ["a", "b"].into_iter().cycle().take(120) {
-            carver.cut::<u8>(name, 1);
+            carver.alloc::<u8>(name, 1);
         }
         assert_eq!(carver.check(), Err(SlabError::TooManyRegions));
     }

@@ -81,14 +81,14 @@ impl<'s> Camera<'s> {
             + region_bytes::<Candidate>(capacity.features)
     }
 
-    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Self {
+    pub(super) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Self {
         let pixels = capacity.pixels();
         let sets = [capacity.features, sparse(capacity)];
         let features = 2 * (sets[0] + sets[1]);
-        let mut image = carver.cut(names.pixels, 2 * pixels);
-        let mut position = carver.cut(names.position, features);
-        let mut descriptor = carver.cut(names.descriptor, features);
-        let mut cell = carver.cut(names.cell, 4 * table(capacity));
+        let mut image = carver.alloc(names.pixels, 2 * pixels);
+        let mut position = carver.alloc(names.position, features);
+        let mut descriptor = carver.alloc(names.descriptor, features);
+        let mut cell = carver.alloc(names.cell, 4 * table(capacity));
         let mut frame = || {
             let [dense, sparse] =
                 sets.map(|count| Features::new(part(&mut position, count), part(&mut descriptor, count), part(&mut cell, table(capacity))));
@@ -97,11 +97,11 @@ impl<'s> Camera<'s> {
         Self {
             frames: [frame(), frame()],
             current: false,
-            gradient: carver.cut(names.gradient, pixels),
-            blob: carver.cut(names.blob, pixels),
-            corner: carver.cut(names.corner, pixels),
-            sums: carver.cut(names.sums, COLUMN_SUMS * capacity.image_width),
-            candidates: carver.cut(names.candidate, capacity.features),
+            gradient: carver.alloc(names.gradient, pixels),
+            blob: carver.alloc(names.blob, pixels),
+            corner: carver.alloc(names.corner, pixels),
+            sums: carver.alloc(names.sums, COLUMN_SUMS * capacity.image_width),
+            candidates: carver.alloc(names.candidate, capacity.features),
         }
     }
 

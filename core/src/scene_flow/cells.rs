@@ -46,10 +46,10 @@ impl<'s> Cells<'s> {
         region_bytes::<u32>(table(capacity)) + region_bytes::<u32>(capacity.matches)
     }
 
-    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub(super) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
-            start: carver.cut("scene_flow.match_cell", table(capacity)),
-            order: carver.cut("scene_flow.match_order", capacity.matches),
+            start: carver.alloc("scene_flow.match_cell", table(capacity)),
+            order: carver.alloc("scene_flow.match_order", capacity.matches),
         }
     }
 

@@ -98,25 +98,25 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Cuts its regions.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let matches = capacity.matches;
         Self {
-            left: Camera::carve(capacity, carver, &LEFT),
-            right: Camera::carve(capacity, carver, &RIGHT),
+            left: Camera::new_in(capacity, carver, &LEFT),
+            right: Camera::new_in(capacity, carver, &RIGHT),
             last: None,
             matched: false,
             capacity: [capacity.image_width, capacity.image_height],
-            traced: carver.cut("scene_flow.circle", capacity.features),
-            prior: Prior::carve(capacity, carver),
-            cells: Cells::carve(capacity, carver),
-            motion: carver.cut("scene_flow.motion", matches),
-            keep: carver.cut("scene_flow.keep", matches),
-            sparse: carver.cut("scene_flow.sparse", sparse_matches(capacity)),
+            traced: carver.alloc("scene_flow.circle", capacity.features),
+            prior: Prior::new_in(capacity, carver),
+            cells: Cells::new_in(capacity, carver),
+            motion: carver.alloc("scene_flow.motion", matches),
+            keep: carver.alloc("scene_flow.keep", matches),
+            sparse: carver.alloc("scene_flow.sparse", sparse_matches(capacity)),
             sparse_len: 0,
-            refined: carver.cut("scene_flow.refined", matches),
+            refined: carver.alloc("scene_flow.refined", matches),
             refined_len: 0,
-            score: carver.cut("scene_flow.score", matches),
-            selection: carver.cut("scene_flow.selection", matches),
+            score: carver.alloc("scene_flow.score", matches),
+            selection: carver.alloc("scene_flow.selection", matches),
             selection_len: 0,
         }
     }

@@ -22,7 +22,7 @@
 //! let mut slab = vec![0; FlowMatcher::bytes(&capacity) + 64];
 //! let lead = slab.as_ptr().align_offset(64);
 //! let mut carver = Carver::new(&mut slab[lead..], FlowMatcher::bytes(&capacity)).unwrap();
-//! let mut matcher = FlowMatcher::carve(&capacity, &mut carver);
+//! let mut matcher = FlowMatcher::new_in(&capacity, &mut carver);
 //! let grey = [128; 64 * 48];
 //! let image = View::new(&grey, 64, 48).unwrap();
 //! let report = matcher.push(&SceneFlowConfig::default(), image, image, &Serial);

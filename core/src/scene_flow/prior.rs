@@ -42,10 +42,10 @@ impl<'s> Prior<'s> {
         2 * region_bytes::<Reach>(bins(capacity))
     }
 
-    pub(super) fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub(super) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
-            learned: carver.cut("scene_flow.learned", bins(capacity)),
-            reach: carver.cut("scene_flow.reach", bins(capacity)),
+            learned: carver.alloc("scene_flow.learned", bins(capacity)),
+            reach: carver.alloc("scene_flow.reach", bins(capacity)),
             columns: 0,
             rows: 0,
         }

@@ -45,7 +45,7 @@ fn forward(metres: f64, turn_rad: f64) -> Transform {
 fn cuts_exactly_the_bytes_it_names() {
     let mut slab = slab();
     let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
-    FlowMatcher::carve(&CAPACITY, &mut carver);
+    FlowMatcher::new_in(&CAPACITY, &mut carver);
     assert_eq!(carver.footprint().bytes(), BYTES);
     // The module's formula, and a little for bins, rows of sums and rounding.
     let formula = 33 * CAPACITY.pixels() / 2 + 204 * CAPACITY.features + 69 * CAPACITY.matches;
@@ -57,8 +57,8 @@ fn matches_lie_where_the_room_says_and_two_threads_change_nothing() {
     let (first, second) = (see(&Transform::identity()), see(&forward(0.4, 0.01)));
     let mut slabs = [slab(), slab()];
     let [a, b] = &mut slabs;
-    let mut serial = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut a.0, BYTES).unwrap());
-    let mut joined = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut b.0, BYTES).unwrap());
+    let mut serial = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut a.0, BYTES).unwrap());
+    let mut joined = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut b.0, BYTES).unwrap());
     let config = SceneFlowConfig::default();
     let report = serial.push(&config, view(&first[0]), view(&first[1]), &Serial);
     assert_eq!(report.status, FlowStatus::First);
@@ -81,7 +81,7 @@ fn matches_lie_where_the_room_says_and_two_threads_change_nothing() {
 #[test]
 fn another_size_or_too_large_a_frame_begins_anew() {
     let mut slab = slab();
-    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
+    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig::default();
     let pixels = vec![7; (WIDTH + 1) * HEIGHT];
     let mut push = |left: [usize; 2], right: [usize; 2]| {
@@ -99,7 +99,7 @@ fn another_size_or_too_large_a_frame_begins_anew() {
 #[test]
 fn noise_and_the_smallest_images_do_no_harm() {
     let mut slab = slab();
-    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
+    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig { response_min: 1, support_min: 0, ..SceneFlowConfig::default() };
     let mut random = Random::new(5);
     for [width, height] in [[1, 1], [5, 5], [16, 16], [17, 17], [18, 40], [1, HEIGHT], [WIDTH, 1], [WIDTH, HEIGHT], [199, 77]] {
@@ -117,7 +117,7 @@ fn full_lists_drop_and_count() {
     const SMALL: Capacity = Capacity { features: 300, matches: 40, ..CAPACITY };
     let bytes = FlowMatcher::bytes(&SMALL);
     let mut slab = slab();
-    let mut matcher = FlowMatcher::carve(&SMALL, &mut Carver::new(&mut slab.0, bytes).unwrap());
+    let mut matcher = FlowMatcher::new_in(&SMALL, &mut Carver::new(&mut slab.0, bytes).unwrap());
     let config = SceneFlowConfig::default();
     let picture = see(&Transform::identity());
     matcher.push(&config, view(&picture[0]), view(&picture[1]), &Serial);
@@ -128,8 +128,8 @@ fn full_lists_drop_and_count() {
 }
 
 fn room_for<'s>(carver: &mut Carver<'s>, count: usize) -> Features<'s> {
-    let start = carver.cut("cell", table(&CAPACITY));
-    Features::new(carver.cut("position", count), carver.cut("descriptor", count), start)
+    let start = carver.alloc("cell", table(&CAPACITY));
+    Features::new(carver.alloc("position", count), carver.alloc("descriptor", count), start)
 }
 
 /// Features with random descriptors.
@@ -228,7 +228,7 @@ fn crowd() -> Vec<Match> {
 #[test]
 fn a_match_that_moves_unlike_its_neighbours_loses_their_support() {
     let mut slab = slab();
-    let mut cells = Cells::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
+    let mut cells = Cells::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig::default();
     let mut matches = crowd();
     matches[17].current_left[0] += 6.0;
@@ -246,7 +246,7 @@ fn a_match_that_moves_unlike_its_neighbours_loses_their_support() {
 #[test]
 fn each_cell_gives_its_best_few() {
     let mut slab = slab();
-    let mut cells = Cells::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
+    let mut cells = Cells::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let matches = crowd();
     let score: Vec<f32> = (0..matches.len()).map(|i| (i * 37 % 60) as f32).collect();
     let shape = Shape::new(WIDTH, HEIGHT, 50);
@@ -292,7 +292,7 @@ fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
 #[test]
 fn bins_look_where_their_matches_went_and_empty_ones_where_their_neighbours_did() {
     let mut slab = slab();
-    let mut prior = Prior::carve(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
+    let mut prior = Prior::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig::default();
     let at = |u: f32, disparity: f32, flow: f32| Match {
         previous_left: [u, 75.0],
@@ -324,7 +324,7 @@ impl FlowMatcher<'_> {
 #[test]
 fn a_point_is_found_where_it_is_and_not_where_it_was_expected() {
     let mut slab = slab();
-    let mut matcher = FlowMatcher::carve(&CAPACITY, &mut Carver::new(&mut slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
+    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
     let expected = |at: [f32; 2], off: f32| {
         // The far wall, 14 m away before and 13.7 m now.
         let [f, b] = [RIG.focal_px, RIG.baseline_m];

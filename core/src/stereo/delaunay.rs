@@ -82,15 +82,15 @@ impl<'s> Triangulation<'s> {
     }
 
     /// Cuts room for `points` points.
-    pub fn carve(points: usize, names: [&'static str; 3], carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(points: usize, names: [&'static str; 3], carver: &mut Carver<'s>) -> Self {
         let [points_name, triangles_name, hull_name] = names;
         Self {
-            points: carver.cut(points_name, points),
-            corner: Table(carver.cut(triangles_name, 6 * points)),
-            twin: Table(carver.cut(triangles_name, 6 * points)),
-            hull_next: Table(carver.cut(hull_name, points)),
-            hull_previous: Table(carver.cut(hull_name, points)),
-            hull_edge: Table(carver.cut(hull_name, points)),
+            points: carver.alloc(points_name, points),
+            corner: Table(carver.alloc(triangles_name, 6 * points)),
+            twin: Table(carver.alloc(triangles_name, 6 * points)),
+            hull_next: Table(carver.alloc(hull_name, points)),
+            hull_previous: Table(carver.alloc(hull_name, points)),
+            hull_edge: Table(carver.alloc(hull_name, points)),
             len: 0,
             triangles: 0,
         }
@@ -283,7 +283,7 @@ mod tests {
         let mut memory = vec![0u8; Triangulation::bytes(points.len()) + SLAB_ALIGN];
         let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
         let mut carver = Carver::new(&mut memory[skip..], 0).unwrap();
-        let mut mesh = Triangulation::carve(points.len(), ["p", "t", "h"], &mut carver);
+        let mut mesh = Triangulation::new_in(points.len(), ["p", "t", "h"], &mut carver);
         let mut in_rows = points.to_vec();
         in_rows.sort_by_key(|point| point.v);
         for &point in &in_rows {
@@ -355,7 +355,7 @@ mod tests {
         let mut memory = vec![0u8; Triangulation::bytes(3) + SLAB_ALIGN];
         let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
         let mut carver = Carver::new(&mut memory[skip..], 0).unwrap();
-        let mut mesh = Triangulation::carve(3, ["p", "t", "h"], &mut carver);
+        let mut mesh = Triangulation::new_in(3, ["p", "t", "h"], &mut carver);
         let at = |u, disparity| SupportPoint { u, v: 2, disparity };
         let dropped = [at(9, 4), at(5, 7), at(9, 6), at(5, 3), at(7, 1), at(8, 1)].map(|point| mesh.add(point));
         assert_eq!(dropped, [false, false, true, true, false, true]);

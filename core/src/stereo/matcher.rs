@@ -91,20 +91,20 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Cuts the matcher's rooms.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let (pixels, points, cells) = (most_pixels(capacity), most_points(capacity), most_cells(capacity));
         Self {
-            gradients: carver.cut("stereo.gradients", pixels),
-            disparity: carver.cut("stereo.disparity", pixels),
-            other: carver.cut("stereo.other", pixels),
-            rows: carver.cut("stereo.rows", BANDS * ROWS * capacity.image_width),
-            support: carver.cut("stereo.support", points),
-            support_before: carver.cut("stereo.support_before", points),
-            left_mesh: Triangulation::carve(points, ["stereo.points_left", "stereo.triangles_left", "stereo.hull_left"], carver),
-            right_mesh: Triangulation::carve(points, ["stereo.points_right", "stereo.triangles_right", "stereo.hull_right"], carver),
-            left_cells: carver.cut("stereo.cells_left", cells),
-            right_cells: carver.cut("stereo.cells_right", cells),
-            columns: carver.cut("stereo.columns", capacity.image_width),
+            gradients: carver.alloc("stereo.gradients", pixels),
+            disparity: carver.alloc("stereo.disparity", pixels),
+            other: carver.alloc("stereo.other", pixels),
+            rows: carver.alloc("stereo.rows", BANDS * ROWS * capacity.image_width),
+            support: carver.alloc("stereo.support", points),
+            support_before: carver.alloc("stereo.support_before", points),
+            left_mesh: Triangulation::new_in(points, ["stereo.points_left", "stereo.triangles_left", "stereo.hull_left"], carver),
+            right_mesh: Triangulation::new_in(points, ["stereo.points_right", "stereo.triangles_right", "stereo.hull_right"], carver),
+            left_cells: carver.alloc("stereo.cells_left", cells),
+            right_cells: carver.alloc("stereo.cells_right", cells),
+            columns: carver.alloc("stereo.columns", capacity.image_width),
             image_width: capacity.image_width,
             image_height: capacity.image_height,
             width: 1,

@@ -36,7 +36,7 @@
 //!
 //! let mut slab = SLAB.lock().unwrap();
 //! let mut carver = Carver::new(&mut slab.0, StereoMatcher::bytes(&CAPACITY)).unwrap();
-//! let mut matcher = StereoMatcher::carve(&CAPACITY, &mut carver);
+//! let mut matcher = StereoMatcher::new_in(&CAPACITY, &mut carver);
 //!
 //! // A noisy wall, 6 px apart in the two images.
 //! let grey = |u: usize, v: usize| ((u * 7919 + v * 104_729) * (u + 31 * v) % 251) as u8;

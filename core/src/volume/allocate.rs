@@ -50,8 +50,8 @@ impl<'s> Seen<'s> {
         region_bytes::<u64>(SEEN_ENTRIES)
     }
 
-    pub(super) fn carve(carver: &mut Carver<'s>) -> Self {
-        Self { entries: carver.cut("volume.seen", SEEN_ENTRIES) }
+    pub(super) fn new_in(carver: &mut Carver<'s>) -> Self {
+        Self { entries: carver.alloc("volume.seen", SEEN_ENTRIES) }
     }
 
     fn clear(&mut self) {

@@ -17,7 +17,7 @@ pub fn empty(config: &VolumeConfig, blocks: usize) -> Volume<'static> {
     let memory = Box::leak(vec![0u8; bytes + SLAB_ALIGN].into_boxed_slice());
     let start = memory.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut memory[start..], bytes).unwrap();
-    Volume::carve(&capacity, config, &mut carver)
+    Volume::new_in(&capacity, config, &mut carver)
 }
 
 /// Adds the blocks of `coords` in order, filled by `tell`, which is given lattice points.

@@ -81,15 +81,15 @@ impl<'s> Blocks<'s> {
     }
 
     /// Cuts the payload of `capacity.blocks` blocks.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let coloured = if capacity.colour { capacity.blocks } else { 0 };
         Self {
-            coord: carver.cut("volume.coord", capacity.blocks),
-            sdf: carver.cut_as_found("volume.sdf", capacity.blocks),
-            weight: carver.cut_as_found("volume.weight", capacity.blocks),
-            colour: if capacity.colour { carver.cut_as_found("volume.colour", coloured) } else { &mut [] },
-            digest: carver.cut("volume.digest", capacity.blocks),
-            faintest: carver.cut("volume.faintest", capacity.blocks),
+            coord: carver.alloc("volume.coord", capacity.blocks),
+            sdf: carver.alloc_as_found("volume.sdf", capacity.blocks),
+            weight: carver.alloc_as_found("volume.weight", capacity.blocks),
+            colour: if capacity.colour { carver.alloc_as_found("volume.colour", coloured) } else { &mut [] },
+            digest: carver.alloc("volume.digest", capacity.blocks),
+            faintest: carver.alloc("volume.faintest", capacity.blocks),
         }
     }
 

@@ -39,13 +39,13 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// Cuts an empty history.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let words = Self::words(capacity);
         Self {
-            sets: carver.cut("volume.history", capacity.history_frames * words),
+            sets: carver.alloc("volume.history", capacity.history_frames * words),
             words,
-            due: carver.cut("volume.history_due", words),
-            born: carver.cut("volume.born", capacity.blocks),
+            due: carver.alloc("volume.history_due", words),
+            born: carver.alloc("volume.born", capacity.blocks),
             oldest: 0,
             len: 0,
             peak: 0,

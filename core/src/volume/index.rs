@@ -50,11 +50,11 @@ impl<'s> BlockIndex<'s> {
     }
 
     /// Cuts an index for `blocks` blocks.
-    pub fn carve(blocks: usize, carver: &mut Carver<'s>) -> Self {
-        let region = carver.cut::<u8>("volume.index", Self::buckets(blocks) * 5 + GROUP_BYTES);
+    pub fn new_in(blocks: usize, carver: &mut Carver<'s>) -> Self {
+        let region = carver.alloc::<u8>("volume.index", Self::buckets(blocks) * 5 + GROUP_BYTES);
         let mut table = HashTable::new_in(OneShot::new(region));
         // The one allocation: an empty table hashes nothing.
-        carver.ask(table.try_reserve(2 * blocks, |_| 0).is_ok());
+        carver.require_fit(table.try_reserve(2 * blocks, |_| 0).is_ok());
         Self { table }
     }
 
@@ -123,7 +123,7 @@ mod tests {
         let start = (64 - slab.as_ptr() as usize % 64) % 64;
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
         let mut carver = Carver::new(&mut bytes[start..], BlockIndex::bytes(BLOCKS)).unwrap();
-        let mut index = BlockIndex::carve(BLOCKS, &mut carver);
+        let mut index = BlockIndex::new_in(BLOCKS, &mut carver);
         let mut coords = [[0i16; 4]; BLOCKS];
         let mut free: Vec<u32> = (0..BLOCKS as u32).collect();
         let mut model = BTreeMap::new();

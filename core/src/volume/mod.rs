@@ -65,16 +65,16 @@ impl<'s> Volume<'s> {
     }
 
     /// Cuts an empty map.
-    pub fn carve(capacity: &Capacity, config: &VolumeConfig, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, config: &VolumeConfig, carver: &mut Carver<'s>) -> Self {
         Self {
             config: *config,
-            index: BlockIndex::carve(capacity.blocks, carver),
-            pool: SlotPool::carve(carver, capacity.blocks, ["volume.generation", "volume.free"]),
-            blocks: Blocks::carve(capacity, carver),
-            visible: VisibleList::carve(capacity, carver),
-            seen: allocate::Seen::carve(carver),
-            history: VisibleHistory::carve(capacity, carver),
-            recency: Recency::carve(capacity.blocks, carver),
+            index: BlockIndex::new_in(capacity.blocks, carver),
+            pool: SlotPool::new_in(carver, capacity.blocks, ["volume.generation", "volume.free"]),
+            blocks: Blocks::new_in(capacity, carver),
+            visible: VisibleList::new_in(capacity, carver),
+            seen: allocate::Seen::new_in(carver),
+            history: VisibleHistory::new_in(capacity, carver),
+            recency: Recency::new_in(capacity.blocks, carver),
             digest: 0,
         }
     }

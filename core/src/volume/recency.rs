@@ -24,8 +24,8 @@ impl<'s> Recency<'s> {
     }
 
     /// Cuts an empty list for `blocks` slots.
-    pub fn carve(blocks: usize, carver: &mut Carver<'s>) -> Self {
-        Self { links: carver.cut("volume.recency", blocks), ends: [0; 2] }
+    pub fn new_in(blocks: usize, carver: &mut Carver<'s>) -> Self {
+        Self { links: carver.alloc("volume.recency", blocks), ends: [0; 2] }
     }
 
     /// The slot unseen for longest.
@@ -93,7 +93,7 @@ mod tests {
         const SLOTS: u32 = 40;
         let mut slab = Box::new(Slab([0u8; Recency::bytes(SLOTS as usize)]));
         let len = slab.0.len();
-        let mut recency = Recency::carve(SLOTS as usize, &mut Carver::new(&mut slab.0, len).unwrap());
+        let mut recency = Recency::new_in(SLOTS as usize, &mut Carver::new(&mut slab.0, len).unwrap());
         let (mut model, mut random) = (Vec::<u32>::new(), Random::new(1));
         for _ in 0..100_000 {
             let slot = random.below(SLOTS);

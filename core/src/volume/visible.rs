@@ -27,13 +27,13 @@ impl<'s> VisibleList<'s> {
     }
 
     /// Cuts the lists.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
-            slots: carver.cut("volume.visible", capacity.visible_blocks),
+            slots: carver.alloc("volume.visible", capacity.visible_blocks),
             len: 0,
-            before: carver.cut("volume.visible_before", capacity.visible_blocks),
+            before: carver.alloc("volume.visible_before", capacity.visible_blocks),
             before_len: 0,
-            last_visible: carver.cut("volume.last_visible", capacity.blocks),
+            last_visible: carver.alloc("volume.last_visible", capacity.blocks),
             frame: 0,
             peak: 0,
         }

@@ -64,7 +64,7 @@ impl VolumeCopy {
         let mut slab = HostSlab::map(bytes).ok_or(ErrorKind::OutOfMemory)?;
         let misfit = |error| Error::other(format!("no room for an object's blocks: {error:?}"));
         let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(misfit)?;
-        let mut volume = Volume::carve(&capacity, &self.config, &mut carver);
+        let mut volume = Volume::new_in(&capacity, &self.config, &mut carver);
         carver.check().map_err(misfit)?;
         for block in &self.blocks {
             volume.load(block.coord, &mut One(block));
@@ -107,7 +107,7 @@ mod tests {
         let config = VolumeConfig { truncation_m: 0.2, ..VolumeConfig::default() };
         let bytes = Volume::bytes(&capacity);
         let mut slab = HostSlab::map(bytes).unwrap();
-        let mut volume = Volume::carve(&capacity, &config, &mut Carver::new(slab.bytes_mut(), bytes).unwrap());
+        let mut volume = Volume::new_in(&capacity, &config, &mut Carver::new(slab.bytes_mut(), bytes).unwrap());
         let rig = StereoRig { focal_px: 80.0, center_u_px: 48.0, center_v_px: 32.0, baseline_m: 0.5 };
         let view = Viewpoint { rig, width: WIDTH, height: HEIGHT, t_world_camera: Transform::identity() };
         let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| 40 + (i % 200) as u8).collect();

@@ -20,7 +20,7 @@ fn drive(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
     let mut slab = vec![0u8; FlowMatcher::bytes(&capacity) + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut slab[start..], FlowMatcher::bytes(&capacity)).unwrap();
-    let mut matcher = FlowMatcher::carve(&capacity, &mut carver);
+    let mut matcher = FlowMatcher::new_in(&capacity, &mut carver);
     let mask = vec![1; PIECE.area() as usize];
     let detection = Detection {
         class: Class::Car,

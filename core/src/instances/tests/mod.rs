@@ -57,9 +57,9 @@ pub(super) fn with<R>(capacity: &Capacity, config: &InstancesConfig, drive: impl
     let mut room = vec![0u8; bytes + SLAB_ALIGN];
     let start = room.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut room[start..start + bytes], bytes).unwrap();
-    let mut instances = Instances::carve(capacity, config, &mut carver);
+    let mut instances = Instances::new_in(capacity, config, &mut carver);
     assert_eq!(carver.footprint().bytes(), Instances::bytes(capacity), "the formula is what is cut");
-    let mut estimator = Estimator::carve(capacity, &mut carver);
+    let mut estimator = Estimator::new_in(capacity, &mut carver);
     drive(&mut instances, &mut estimator)
 }
 

@@ -36,7 +36,7 @@ pub(super) fn with_matcher<R>(capacity: &Capacity, work: impl FnOnce(&mut Stereo
     let mut memory: Box<[u8]> = vec![0xA5; bytes + SLAB_ALIGN].into_boxed_slice();
     let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut memory[skip..skip + bytes], bytes).unwrap();
-    let mut matcher = StereoMatcher::carve(capacity, &mut carver);
+    let mut matcher = StereoMatcher::new_in(capacity, &mut carver);
     assert_eq!(carver.footprint().bytes(), bytes, "what was cut is what was promised");
     work(&mut matcher)
 }

@@ -137,17 +137,17 @@ impl<'s> Raycaster<'s> {
     }
 
     /// Cuts the images and the working space.
-    pub fn carve(capacity: &Capacity, config: &RaycastConfig, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, config: &RaycastConfig, carver: &mut Carver<'s>) -> Self {
         let pixels = capacity.pixels();
         Self {
             config: *config,
-            surface: Surface::carve(capacity, carver),
-            ranges: Ranges::carve(capacity, carver),
-            depth_m: carver.cut("raycast.depth", pixels),
-            normal: carver.cut("raycast.normal", pixels),
-            colour: carver.cut("raycast.colour", pixels),
-            weight: carver.cut("raycast.weight", pixels),
-            layer: carver.cut("raycast.layer", pixels),
+            surface: Surface::new_in(capacity, carver),
+            ranges: Ranges::new_in(capacity, carver),
+            depth_m: carver.alloc("raycast.depth", pixels),
+            normal: carver.alloc("raycast.normal", pixels),
+            colour: carver.alloc("raycast.colour", pixels),
+            weight: carver.alloc("raycast.weight", pixels),
+            layer: carver.alloc("raycast.layer", pixels),
             width: 0,
             height: 0,
             peak_blocks: 0,

@@ -34,9 +34,9 @@ impl<'s> Ranges<'s> {
         region_bytes::<[f32; 2]>(Self::tiles(capacity.image_width, capacity.image_height))
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
-            depth_m: carver.cut("raycast.ranges", Self::tiles(capacity.image_width, capacity.image_height)),
+            depth_m: carver.alloc("raycast.ranges", Self::tiles(capacity.image_width, capacity.image_height)),
             columns: 0,
         }
     }

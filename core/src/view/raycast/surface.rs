@@ -67,14 +67,14 @@ impl<'s> Surface<'s> {
             + region_bytes::<u64>(Self::table_len(entries))
     }
 
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let entries = capacity.visible_blocks;
         Self {
-            local: carver.cut("raycast.local", entries),
-            slots: carver.cut("raycast.slots", entries),
-            signs: carver.cut("raycast.signs", entries),
-            cells: carver.cut("raycast.cells", entries),
-            table: carver.cut("raycast.table", Self::table_len(entries)),
+            local: carver.alloc("raycast.local", entries),
+            slots: carver.alloc("raycast.slots", entries),
+            signs: carver.alloc("raycast.signs", entries),
+            cells: carver.alloc("raycast.cells", entries),
+            table: carver.alloc("raycast.table", Self::table_len(entries)),
             len: 0,
             shift: 0,
         }

@@ -26,7 +26,7 @@ fn raycaster(visible_blocks: usize, config: &RaycastConfig) -> Raycaster<'static
     let bytes = Raycaster::bytes(&capacity);
     let memory = Box::leak(vec![0u8; bytes + SLAB_ALIGN].into_boxed_slice());
     let start = memory.as_ptr().align_offset(SLAB_ALIGN);
-    Raycaster::carve(&capacity, config, &mut Carver::new(&mut memory[start..], bytes).unwrap())
+    Raycaster::new_in(&capacity, config, &mut Carver::new(&mut memory[start..], bytes).unwrap())
 }
 
 fn view(t_world_camera: Transform) -> Viewpoint {
@@ -523,7 +523,7 @@ fn cuts_as_many_bytes_as_it_says() {
         let mut slab = vec![0u8; bytes + SLAB_ALIGN];
         let start = slab.as_ptr().align_offset(SLAB_ALIGN);
         let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
-        Raycaster::carve(&capacity, &RaycastConfig::default(), &mut carver);
+        Raycaster::new_in(&capacity, &RaycastConfig::default(), &mut carver);
         assert_eq!(carver.footprint().bytes(), bytes);
     }
 }

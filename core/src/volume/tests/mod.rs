@@ -24,7 +24,7 @@ fn with_volume(capacity: &Capacity, config: &VolumeConfig, test: impl FnOnce(&mu
     let mut slab = vec![0u8; bytes + 64];
     let start = slab.as_ptr().align_offset(64);
     let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
-    let mut volume = Volume::carve(capacity, config, &mut carver);
+    let mut volume = Volume::new_in(capacity, config, &mut carver);
     assert_eq!(carver.footprint().bytes(), bytes, "the formula and the cutting agree to the byte");
     test(&mut volume);
 }

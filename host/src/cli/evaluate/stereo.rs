@@ -80,7 +80,7 @@ fn matched(pair: &StereoPair, config: &StereoConfig, threads: &Threads) -> anyho
     let Some(mut slab) = HostSlab::map(bytes) else { bail!("this machine has no {bytes} bytes for an image of {width} x {height} px") };
     let refused = |reason: String| anyhow::anyhow!("{} cannot be matched: {reason}", pair.images[0].display());
     let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(|error| refused(format!("{error:?}")))?;
-    let mut matcher = StereoMatcher::carve(&capacity, &mut carver);
+    let mut matcher = StereoMatcher::new_in(&capacity, &mut carver);
     carver.check().map_err(|error| refused(format!("{error:?}")))?;
     let (Some(left), Some(right)) = (left.view(), right.view()) else { return Err(refused("it has no pixels".into())) };
     // A pair that cannot be matched covers nothing: that shows in the figures.

@@ -41,7 +41,7 @@ pub fn triangles<F: Read + Write + Seek>(
 ) -> Result<u64, SlabError> {
     let capacity = piece(colour);
     let mut carver = Carver::new(slab, Volume::bytes(&capacity))?;
-    let mut volume = Volume::carve(&capacity, volume, &mut carver);
+    let mut volume = Volume::new_in(&capacity, volume, &mut carver);
     carver.check()?;
     let mut count = 0;
     for tile in store.tiles() {
