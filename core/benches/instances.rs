@@ -18,8 +18,8 @@ use dynvox_core::{
     Capacity, Config, Executor, Mapper, Stage, StereoFrame,
     geometry::{StereoRig, Transform, exp},
     image::View,
-    instances::{Class, Detection},
     memory::SLAB_ALIGN,
+    tracking::{Class, Detection},
 };
 use nalgebra::Vector3;
 use std::{sync::Mutex, time::Duration};

@@ -3,10 +3,10 @@
 use crate::{
     egomotion::{EgomotionConfig, icp::IcpConfig},
     geometry::{RigProblem, StereoRig},
-    instances::InstancesConfig,
     mapper::MapperConfig,
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
+    tracking::InstancesConfig,
     view::{MeshConfig, RaycastConfig},
     volume::VolumeConfig,
 };

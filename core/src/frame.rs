@@ -4,7 +4,7 @@ use crate::{
     digest::Digest,
     geometry::Transform,
     image::{DISPARITY_ONE_PX, View},
-    instances::Detection,
+    tracking::Detection,
 };
 
 /// One stereo frame as the core takes it: rectified, equal sizes, 8 bit.

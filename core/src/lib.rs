@@ -5,7 +5,8 @@
 //! Environments* (ICRA 2018).
 //!
 //! Data flows one way: [`memory`], [`image`] and [`geometry`] are the ground; [`stereo`] and [`scene_flow`] stand on them;
-//! [`egomotion`] on `scene_flow`; [`volume`] on the ground alone; [`instances`] on both; [`mapper`] is the roof and the only one that knows them all.
+//! [`egomotion`] on `scene_flow`; [`volume`] on the ground alone; [`tracking`] on `egomotion` and [`masks`], [`objects`] on
+//! `tracking` and `volume`; [`mapper`] is the roof and the only one that knows them all.
 #![no_std]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
 
@@ -19,15 +20,17 @@ pub mod executor;
 pub mod frame;
 pub mod geometry;
 pub mod image;
-pub mod instances;
 pub mod mapper;
+pub mod masks;
 pub mod memory;
+pub mod objects;
 pub mod random;
 pub mod report;
 pub mod scene_flow;
 pub mod snapshot;
 pub mod stage_digests;
 pub mod stereo;
+pub mod tracking;
 pub mod view;
 pub mod volume;
 

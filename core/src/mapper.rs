@@ -10,16 +10,18 @@ pub use config::{MapperConfig, MotionSource};
 use crate::{
     Capacity, Executor, Footprint, Stage,
     config::{Config, Problem},
+    digest::Digest,
     egomotion::{Egomotion, Estimator, MotionEstimate},
     frame::StereoFrame,
     geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
-    instances::{CameraMotion, Instances, NoSink, Object, ObjectSink, ObjectSummary, Picture, Seen, ThingAt, TrackReport},
     memory::{Carver, SlabError, region_bytes},
+    objects::{NoSink, Object, ObjectFrame, ObjectSink, ObjectSummary, Objects, Picture},
     report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
     stage_digests::StageDigests,
     stereo::StereoMatcher,
+    tracking::{CameraMotion, Seen, ThingAt, TrackReport, Tracker},
     view::{Raycaster, Triangle},
     volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Viewpoint, Volume},
 };
@@ -81,7 +83,8 @@ pub struct Mapper<'s> {
     scene_flow: FlowMatcher<'s>,
     estimator: Estimator<'s>,
     camera: Egomotion,
-    instances: Instances<'s>,
+    tracker: Tracker<'s>,
+    objects: Objects<'s>,
     depth_m: &'s mut [f32],
     background: Volume<'s>,
     raycaster: Raycaster<'s>,
@@ -96,7 +99,8 @@ impl Capacity {
         StereoMatcher::bytes(self)
             + FlowMatcher::bytes(self)
             + Estimator::bytes(self)
-            + Instances::bytes(self)
+            + Tracker::bytes(self)
+            + Objects::bytes(self)
             + region_bytes::<f32>(self.pixels())
             + Volume::bytes(self)
             + Raycaster::bytes(self)
@@ -143,7 +147,8 @@ impl<'s> Mapper<'s> {
             scene_flow: FlowMatcher::new_in(capacity, carver),
             estimator: Estimator::new_in(capacity, carver),
             camera: Egomotion::default(),
-            instances: Instances::new_in(capacity, &config.instances, carver),
+            tracker: Tracker::new_in(capacity, &config.instances, carver),
+            objects: Objects::new_in(capacity, &config.instances.volume, carver),
             depth_m: carver.alloc("depth_m", capacity.pixels()),
             background: Volume::new_in(capacity, &config.volume, carver),
             raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
@@ -184,8 +189,8 @@ impl<'s> Mapper<'s> {
         );
         // (B) What a detector saw, joined to what is tracked, with the matches on it.
         executor.stage(Stage::Instances, || {
-            self.instances.admit(self.frame, frame.detections, [width, height]);
-            self.instances.claim(self.scene_flow.refined(), self.scene_flow.sparse());
+            self.tracker.admit(self.frame, frame.detections, [width, height]);
+            self.tracker.claim(self.scene_flow.refined(), self.scene_flow.sparse());
         });
         // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
         let matched = scene_flow.status == FlowStatus::Matched;
@@ -193,7 +198,7 @@ impl<'s> Mapper<'s> {
         let known = pose != PoseOrigin::Held;
         let fused = known && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
         let moved = matches!(pose, PoseOrigin::Estimated | PoseOrigin::Given).then(|| *self.camera.t_current_previous());
-        let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous: moved, known };
+        let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous: moved };
         // (D) The objects' motions.
         executor.stage(Stage::Instances, || {
             let seen = Seen {
@@ -201,16 +206,21 @@ impl<'s> Mapper<'s> {
                 sparse: self.scene_flow.sparse(),
                 images: Some((&self.scene_flow, self.stereo.disparity_q8())),
             };
-            self.instances.follow(&config.rig, &seen, &camera, &mut self.estimator);
+            self.tracker.follow(&config.rig, &seen, &camera, &mut self.estimator);
         });
         // (E) What the camera sees goes into the map, but for what might move, which has maps of its own; unless the pose is a guess
         // or the frame's turn has not come.
         let view = Viewpoint { rig: config.rig, width, height, t_world_camera: camera.t_world_camera };
         let allocation = if fused { self.fuse(frame, &view, executor, store) } else { AllocationReport::default() };
         executor.stage(Stage::Instances, || {
-            let (picture, disparity) = (Picture { grey: left, colour: frame.colour }, self.stereo.disparity_q8());
-            let camera = CameraMotion { known: fused, ..camera };
-            self.instances.reconstruct(&self.config.rig, &picture, disparity, &camera, executor, objects);
+            let shown = ObjectFrame {
+                rig: &config.rig,
+                t_world_camera: &camera.t_world_camera,
+                picture: Picture { grey: left, colour: frame.colour },
+                disparity_q8: self.stereo.disparity_q8(),
+            };
+            self.objects.reconstruct(&self.tracker, fused.then_some(&shown), executor, objects);
+            self.tracker.settle();
         });
         // (F) Noise last seen a fixed lag ago goes.
         let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
@@ -224,7 +234,7 @@ impl<'s> Mapper<'s> {
             pose,
             egomotion,
             icp,
-            instances: *self.instances.report(),
+            instances: self.objects.report(self.tracker.report()),
             fused,
             allocation,
             prune,
@@ -278,7 +288,7 @@ impl<'s> Mapper<'s> {
         let Some(mut depth_m) = ViewMut::new(self.depth_m, view.width, view.height) else { return AllocationReport::default() };
         let volume = &self.config.volume;
         depth_from_disparity(&view.rig, volume.near_m, volume.far_m, self.stereo.disparity_q8(), &mut depth_m);
-        self.instances.clear(&mut depth_m);
+        self.tracker.clear(&mut depth_m);
         let seen = Observation {
             depth_m: depth_m.as_view(),
             grey: frame.left,
@@ -297,7 +307,7 @@ impl<'s> Mapper<'s> {
 
     /// As [`Mapper::finish`], with a sink for the objects there still are.
     pub fn finish_with<O: ObjectSink>(&mut self, objects: &mut O) -> PruneReport {
-        self.instances.finish(objects);
+        self.objects.finish(objects);
         self.background.finish()
     }
 
@@ -308,17 +318,17 @@ impl<'s> Mapper<'s> {
 
     /// What is tracked, as it stands after the last frame, by age.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
-        self.instances.tracks()
+        self.objects.tracks(&self.tracker)
     }
 
     /// What a pixel of the last frame shows; `None` for the street.
     pub fn thing_at(&self, u: i32, v: i32) -> Option<ThingAt> {
-        self.instances.at(u, v)
+        self.tracker.at(u, v)
     }
 
     /// The objects reconstructed now, each with its own map.
     pub fn objects(&self) -> impl Iterator<Item = (&ObjectSummary, &Object<'s>)> {
-        self.instances.objects()
+        self.objects.objects()
     }
 
     /// Lets every block of the static map leave into `store`, so that the store holds the whole map.
@@ -343,10 +353,18 @@ impl<'s> Mapper<'s> {
             disparity: self.stereo.digest(),
             matches: self.scene_flow.digest(),
             egomotion: self.camera.digest(egomotion),
-            tracks: self.instances.tracks_digest(),
+            tracks: self.tracks_digest(),
             background: self.background.digest(),
-            objects: self.instances.object_digests(),
+            objects: self.objects.digests(),
         }
+    }
+
+    /// Digest of the tracks by age, their masks, and what of them waits to be fused.
+    fn tracks_digest(&self) -> u64 {
+        let mut digest = Digest::default();
+        self.tracker.enter(&mut digest);
+        self.objects.enter(&mut digest);
+        digest.finish()
     }
 
     /// The static map's triangles, one after the other, in world coordinates. How many there were.
@@ -368,7 +386,8 @@ impl<'s> Mapper<'s> {
     pub fn footprint(&self) -> Footprint {
         let mut footprint = self.capacity.footprint();
         self.background.note_use(&mut footprint);
-        self.instances.note_use(&mut footprint);
+        self.tracker.note_use(&mut footprint);
+        self.objects.note_use(&mut footprint);
         self.raycaster.note_use(&mut footprint);
         footprint
     }

@@ -3,7 +3,7 @@
 use crate::{
     egomotion::{MotionEstimate, icp::IcpReport},
     geometry::Transform,
-    instances::InstancesReport,
+    objects::InstancesReport,
     scene_flow::FlowReport,
     stage_digests::StageDigests,
     stereo::StereoReport,

@@ -7,7 +7,7 @@
 //! Memory: 8 bytes a stage and 16 an object. Time: a multiplication for each 8 bytes of images, disparity, matches and masks; of volumes only
 //! blocks that changed are looked at.
 
-use crate::{digest::Digest, instances::MAX_OBJECTS};
+use crate::{digest::Digest, objects::MAX_OBJECTS};
 use core::fmt;
 
 /// What is digested, in the order data flows.

@@ -2,12 +2,7 @@
 
 use dynvox::segmentation::Sighting;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
-use dynvox_core::{
-    Capacity, Config, Mapper, StereoFrame,
-    image::View,
-    instances::{Class, PixelBox},
-    memory::SLAB_ALIGN,
-};
+use dynvox_core::{Capacity, Config, Mapper, StereoFrame, image::View, masks::PixelBox, memory::SLAB_ALIGN, tracking::Class};
 
 /// A slab on the heap, aligned as a mapper wants it.
 pub struct HeapSlab {

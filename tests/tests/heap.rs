@@ -2,7 +2,7 @@
 #![expect(unsafe_code, reason = "a global allocator cannot be written without")]
 
 use dynvox::segmentation::Sighting;
-use dynvox_core::{Capacity, Serial, StereoFrame, instances::NoSink, volume::NoStore};
+use dynvox_core::{Capacity, Serial, StereoFrame, objects::NoSink, volume::NoStore};
 use dynvox_tests::Clip;
 use std::{
     alloc::{GlobalAlloc, Layout, System},

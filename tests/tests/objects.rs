@@ -7,7 +7,8 @@ use dynvox_core::{
     Capacity, Config, Mapper, Report, Serial, StereoFrame,
     geometry::Transform,
     image::View,
-    instances::{Class, Detection, NoSink, State, TrackReport},
+    objects::NoSink,
+    tracking::{Class, Detection, State, TrackReport},
     view::{MeshConfig, Raycaster},
     volume::NoStore,
 };

@@ -1,7 +1,7 @@
 //! A drive that outgrows its pool, with a file beside it.
 
 use dynvox::run::store::{BlockFile, mesh};
-use dynvox_core::instances::NoSink;
+use dynvox_core::objects::NoSink;
 use dynvox_core::view::Triangle;
 use dynvox_core::volume::{BlockStore, NoStore};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, Severity};

@@ -9,7 +9,8 @@ use core::ops::Range;
 use dynvox_core::{
     Serial, StereoFrame,
     image::View,
-    instances::{Class, Detection, MAX_DETECTIONS, NoSink},
+    objects::NoSink,
+    tracking::{Class, Detection, MAX_DETECTIONS},
 };
 
 /// Takes one frame, on the calling thread: depth, motion, map. Blocks that must leave go to `store`, or are lost and counted where it is

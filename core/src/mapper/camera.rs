@@ -42,13 +42,13 @@ impl Mapper<'_> {
     fn follow_matches(&mut self, size: [usize; 2]) -> MotionEstimate {
         let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
         let (estimate, withheld) = {
-            let guides = self.instances.guides_camera(size);
+            let guides = self.tracker.guides_camera(size);
             let guiding = selection.iter().filter(|&&index| guides(index));
             let withheld = selection.len() - guiding.clone().count();
             let matches = guiding.filter_map(|&index| refined.get(index as usize));
             (self.camera.step(&self.config.egomotion, &self.config.rig, matches, &mut self.estimator), withheld)
         };
-        self.instances.note_withheld(withheld as u32);
+        self.tracker.note_withheld(withheld as u32);
         estimate
     }
 

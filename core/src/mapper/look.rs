@@ -5,7 +5,7 @@ use crate::{
     Stage,
     executor::Executor,
     geometry::{Transform, renormalised},
-    instances::PlacedObject,
+    objects::PlacedObject,
     view::{RaycastError, Raycaster},
     volume::Viewpoint,
 };
@@ -20,12 +20,12 @@ impl<'s> Mapper<'s> {
 
     /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is nearest (the compositing of Section
     /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of [`Mapper::placed_objects`]. Time: that of one raycast and
-    /// of one more for each object, of which there are at most [`crate::instances::MAX_OBJECTS`].
+    /// of one more for each object, of which there are at most [`crate::objects::MAX_OBJECTS`].
     pub fn raycast_composed<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(t_world_camera)?;
         executor.stage(Stage::Raycast, || {
             self.raycaster.cast(&self.background, &view, executor)?;
-            for (layer, placed) in (1..=u8::MAX).zip(self.instances.placed()) {
+            for (layer, placed) in (1..=u8::MAX).zip(self.objects.placed(&self.tracker)) {
                 // An object too far away for its coordinates is too far away to be seen.
                 let _ = self.raycaster.cast_over(placed.object.volume(), &from_object(&view, &placed), layer, executor);
             }
@@ -42,7 +42,7 @@ impl<'s> Mapper<'s> {
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(t_world_camera)?;
-        let placed = self.instances.placed().find(|placed| placed.summary.id == track).ok_or(RaycastError::Object)?;
+        let placed = self.objects.placed(&self.tracker).find(|placed| placed.summary.id == track).ok_or(RaycastError::Object)?;
         let view = from_object(&view, &placed);
         executor.stage(Stage::Raycast, || self.raycaster.cast(placed.object.volume(), &view, executor))?;
         Ok(&self.raycaster)
@@ -50,7 +50,7 @@ impl<'s> Mapper<'s> {
 
     /// The objects that are in the world after the last frame.
     pub fn placed_objects(&self) -> impl Iterator<Item = PlacedObject<'_, 's>> {
-        self.instances.placed()
+        self.objects.placed(&self.tracker)
     }
 
     fn viewpoint(&self, t_world_camera: &Transform) -> Result<Viewpoint, RaycastError> {

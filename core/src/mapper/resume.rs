@@ -10,7 +10,7 @@ impl<'s> Mapper<'s> {
     /// Writes all that later frames depend on to `sink`, piece by piece. A mapper restored from it goes on bit for bit as this one does. Nothing
     /// changes; `&mut` only because one walk over the state both writes and reads it.
     ///
-    /// What a [`crate::volume::BlockStore`] or an [`crate::instances::ObjectSink`] holds is the caller's, and not in it.
+    /// What a [`crate::volume::BlockStore`] or an [`crate::objects::ObjectSink`] holds is the caller's, and not in it.
     ///
     /// # Errors
     /// The sink's first one; what it took until then is no snapshot.
@@ -59,13 +59,14 @@ impl<'s> Mapper<'s> {
         self.size = (width * height > 0).then_some([width, height]);
         self.scene_flow.archive(archive);
         self.camera.archive(archive);
-        self.instances.archive(archive);
+        self.tracker.archive(archive);
+        self.objects.archive(archive);
         self.background.archive(archive);
     }
 
     /// Makes anew what is not in a snapshot. Whether what was read can be.
     fn remake(&mut self) -> bool {
         self.scene_flow.remake(&self.config.scene_flow);
-        self.instances.remake() && self.background.remake()
+        self.objects.remake() && self.background.remake()
     }
 }

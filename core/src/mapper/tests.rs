@@ -7,9 +7,9 @@ use super::*;
 use crate::{
     Serial,
     geometry::exp,
-    instances::{Class, Detection},
     memory::SLAB_ALIGN,
     scene_flow::room::{HEIGHT, RIG, WIDTH, see},
+    tracking::{Class, Detection},
 };
 use nalgebra::Vector3;
 use std::{vec, vec::Vec};

@@ -17,13 +17,13 @@ pub struct Capacity {
     pub visible_blocks: usize,
     /// Frames the visible history spans. A longer `prune_lag` is cut to this, and each frame pruned early is counted.
     pub history_frames: usize,
-    /// Detections taken in one frame, at most [`crate::instances::MAX_DETECTIONS`]. Of more the lowest scores are refused and counted.
+    /// Detections taken in one frame, at most [`crate::tracking::MAX_DETECTIONS`]. Of more the lowest scores are refused and counted.
     pub detections: usize,
     /// Words of 64 pixels for the masks of one frame. Further masks are refused and counted.
     pub mask_words: usize,
     /// Things tracked. When all are taken the one unseen for longest goes; one seen lately stays and the new one is refused and counted.
     pub tracks: usize,
-    /// Objects reconstructed at once, at most [`crate::instances::MAX_OBJECTS`]. The one fused longest ago is handed over for another.
+    /// Objects reconstructed at once, at most [`crate::objects::MAX_OBJECTS`]. The one fused longest ago is handed over for another.
     pub objects: usize,
     /// Voxel blocks of one object. Further ones are refused and counted.
     pub object_blocks: usize,

@@ -6,7 +6,7 @@
 use super::truth::{ObjectsTruth, TrueObject};
 use super::{DatasetError, error::read_failed};
 use dynvox_core::geometry::Transform;
-use dynvox_core::instances::PixelBox;
+use dynvox_core::masks::PixelBox;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::Path;

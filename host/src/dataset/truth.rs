@@ -2,7 +2,7 @@
 
 use crate::synth::SynthFrame;
 use dynvox_core::geometry::Transform;
-use dynvox_core::instances::PixelBox;
+use dynvox_core::masks::PixelBox;
 
 /// A thing's truth.
 #[derive(Clone, Debug, PartialEq)]

@@ -164,7 +164,7 @@ impl<'p> Near<'p> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynvox_core::instances::PixelBox;
+    use dynvox_core::masks::PixelBox;
     use dynvox_core::view::Vertex;
 
     const RIG: StereoRig = StereoRig { focal_px: 200.0, center_u_px: 50.0, center_v_px: 40.0, baseline_m: 0.5 };

@@ -109,7 +109,7 @@ impl Swept {
 mod tests {
     use super::*;
     use crate::export::PlyWriter;
-    use dynvox_core::instances::PixelBox;
+    use dynvox_core::masks::PixelBox;
 
     #[test]
     fn counts_what_stands_where_a_car_drove_and_not_the_road_below_it() {

@@ -5,7 +5,7 @@ use crate::run::Threads;
 use dynvox_core::Mapper;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
-use dynvox_core::instances::State;
+use dynvox_core::tracking::State;
 use dynvox_core::view::{NORMAL_ONE, Raycaster};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 

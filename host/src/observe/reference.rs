@@ -6,7 +6,8 @@ use crate::evaluate::lidar::{Aim, Awaited, Delay, EvaluatedFrame, Field, Layer, 
 use crate::segmentation::Sighting;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
-use dynvox_core::instances::{InstancesConfig, PixelBox, State, ThingAt, Treatment};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::{InstancesConfig, State, ThingAt, Treatment};
 use dynvox_core::{Config, Mapper};
 
 /// Frames whose errors are drawn at most.

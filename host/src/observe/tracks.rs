@@ -2,7 +2,8 @@
 
 use crate::evaluate::objects::{TrackErrors, median};
 use crate::run::FrameRow;
-use dynvox_core::instances::{Class, PixelBox, State, TrackReport};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::{Class, State, TrackReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -10,7 +10,7 @@ use crate::dataset::{ExactFrame, StereoImages};
 use crate::observe::{LidarAtWork, Reference, evaluable, pictures};
 use crate::segmentation::Sighting;
 use dynvox_core::geometry::{Transform, exp};
-use dynvox_core::instances::Detection;
+use dynvox_core::tracking::Detection;
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Mapper, Severity, Stage, StereoFrame};
 use std::time::Instant;

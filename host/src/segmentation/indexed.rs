@@ -3,7 +3,7 @@
 
 use super::{Frames, Segmenter, Sightings, class_of, read_labels, read_text, sighting, unusable};
 use crate::dataset::{DatasetError, StereoImages};
-use dynvox_core::instances::Class;
+use dynvox_core::tracking::Class;
 use std::path::{Path, PathBuf};
 
 /// A folder of instance PNGs.

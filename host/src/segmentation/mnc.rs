@@ -5,7 +5,8 @@
 
 use super::{Frames, Segmenter, Sighting, Sightings, read_text, unusable};
 use crate::dataset::{DatasetError, StereoImages};
-use dynvox_core::instances::{Class, PixelBox};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::Class;
 use std::path::{Path, PathBuf};
 
 /// PASCAL VOC's classes from 1 on.

@@ -23,7 +23,7 @@ pub use sighting::{MOST_BYTES, MOST_SIGHTINGS, Refusals, Sighting, Sightings};
 pub use source::{Choice, attach};
 
 use crate::dataset::{DatasetError, Image, StereoImages};
-use dynvox_core::instances::Class;
+use dynvox_core::tracking::Class;
 use std::path::Path;
 
 /// Gives the masks of a frame.

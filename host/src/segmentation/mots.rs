@@ -6,7 +6,8 @@
 
 use super::{Frames, Segmenter, Sighting, Sightings, read_labels, rle, sighting, unusable};
 use crate::dataset::{DatasetError, StereoImages};
-use dynvox_core::instances::{Class, PixelBox};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::Class;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

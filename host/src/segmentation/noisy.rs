@@ -4,8 +4,9 @@
 
 use super::{Segmenter, Sighting, Sightings, sighting::union};
 use crate::dataset::{DatasetError, StereoImages};
-use dynvox_core::instances::{Class, PixelBox};
+use dynvox_core::masks::PixelBox;
 use dynvox_core::random::Random;
+use dynvox_core::tracking::Class;
 
 /// How often a mask is missed, percent.
 const MISSED: u32 = 10;

@@ -1,7 +1,8 @@
 //! One thing seen in one frame, with its mask, and what had to be left out.
 
 use crate::dataset::Image;
-use dynvox_core::instances::{Class, Detection, PixelBox};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::{Class, Detection};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::dataset::{self, Dataset, Images, StreetFrames};
 use crate::synth::StreetConfig;
-use dynvox_core::instances::PixelBox;
+use dynvox_core::masks::PixelBox;
 use image::{ImageBuffer, Luma};
 use std::fs;
 use std::path::PathBuf;

@@ -42,7 +42,7 @@ fn a_bit_of_a_voxel_of_the_background() {
 
 #[test]
 fn a_bit_of_a_voxel_of_an_object() {
-    assert_eq!(named(|mapper| assert_eq!(mapper.instances.flip_voxel(100, 3), Some(1))), Some(Digested::Object(1)));
+    assert_eq!(named(|mapper| assert_eq!(mapper.objects.flip_voxel(100, 3), Some(1))), Some(Digested::Object(1)));
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn a_bit_of_a_component_of_the_pose() {
 #[test]
 fn a_bit_of_a_disparity_and_of_a_track() {
     assert_eq!(named(|mapper| mapper.stereo.flip(WIDTH * 80 + 133, 0)), Some(Digested::Disparity));
-    assert_eq!(named(|mapper| mapper.instances.flip_track(0)), Some(Digested::Tracks));
+    assert_eq!(named(|mapper| mapper.tracker.flip_track(0)), Some(Digested::Tracks));
 }
 
 #[test]
@@ -105,5 +105,5 @@ fn what_changes_in_memory_between_two_frames_is_named_in_the_next_one() {
         mapper.background.flip_behind_its_back(slot, 200, 23);
     };
     assert_eq!(named(&raw), Some(Digested::Background));
-    assert_eq!(named(&|mapper| mapper.instances.flip_track(0)), Some(Digested::Tracks));
+    assert_eq!(named(&|mapper| mapper.tracker.flip_track(0)), Some(Digested::Tracks));
 }

@@ -1,6 +1,6 @@
 //! What a point belongs to.
 
-use dynvox_core::instances::{State, ThingAt, Treatment};
+use dynvox_core::tracking::{State, ThingAt, Treatment};
 
 /// What a point belongs to, by what its pixel shows in its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,8 @@ use super::*;
 use crate::dataset::LidarScan;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
-use dynvox_core::instances::{Class, PixelBox, State, ThingAt};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::{Class, State, ThingAt};
 
 const FOCAL_PX: f64 = 700.0;
 const BASELINE_M: f64 = 0.55;

@@ -7,7 +7,7 @@
 //! the threshold is one, and the boxes are those of masks. Things too small to be a detection are not missed, tracks in regions of which the
 //! labels say nothing are not spurious.
 
-use dynvox_core::instances::PixelBox;
+use dynvox_core::masks::PixelBox;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -21,7 +21,8 @@ pub use track::TrackErrors;
 use crate::dataset::{ObjectsTruth, TrueObject};
 use association::Association;
 use dynvox_core::geometry::Transform;
-use dynvox_core::instances::{PixelBox, State, TrackReport};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::{State, TrackReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -1,7 +1,8 @@
 use super::*;
 use crate::dataset::TrueObject;
 use dynvox_core::geometry::exp;
-use dynvox_core::instances::{Class, PixelBox};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::Class;
 use nalgebra::Vector3;
 
 const SIZE: (usize, usize) = (640, 192);

@@ -1,7 +1,7 @@
 //! Errors of one track.
 
 use super::{FAR_M, Judged, median, rms};
-use dynvox_core::instances::State;
+use dynvox_core::tracking::State;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
 //! `frames.csv`: one row a frame.
 
 use crate::run::FrameRow;
-use dynvox_core::instances::State;
+use dynvox_core::tracking::State;
 use dynvox_core::{Digested, Stage};
 use std::io::{self, Write};
 

@@ -6,7 +6,7 @@ use crate::evaluate::surfaces::SurfaceFigures;
 use crate::observe::{KeptObject, TrackRecord, state_name};
 use crate::run::RunRecord;
 use base64::{Engine, engine::general_purpose::STANDARD};
-use dynvox_core::instances::State;
+use dynvox_core::tracking::State;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 

@@ -7,7 +7,7 @@ use dynvox_core::{
     Capacity, Mapper, Serial, StereoFrame,
     digest::Digest,
     image::View,
-    instances::{ObjectSink, RetiredObject},
+    objects::{ObjectSink, RetiredObject},
     view::Raycaster,
     volume::{BlockStore, LeavingBlock, ObservationWeight, ReturningBlock},
 };

@@ -1,0 +1,271 @@
+//! What a frame shows of one object: its virtual frame, cut to the object's box (Section III-B of the paper).
+//!
+//! A crop is the disparity under the copy mask, 0 elsewhere, and the picture of the box. Beside an edge the matcher's surface runs on behind
+//! what is in front, and would hang on the object like a flag that no later frame takes down: pixels just beside much nearer ones are left out.
+//! Crops of objects whose motion is not known yet wait
+//! in a ring until it is; when the ring is full the oldest crop goes, and is counted.
+//!
+//! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of 144 bytes.
+
+use crate::{
+    digest::Digest,
+    geometry::StereoRig,
+    image::View,
+    masks::{MaskPlace, MaskStore, PixelBox},
+    memory::{Capacity, Carver, region_bytes},
+    snapshot::Archive,
+};
+use bytemuck::{Pod, Zeroable};
+
+/// Most crops that wait.
+pub const CROPS_MAX: usize = 128;
+/// Half pixels of disparity the median is sought among: up to 256 px.
+const BINS: usize = 512;
+/// Disparity units in a half pixel.
+const BIN: u16 = 128;
+
+/// How far an edge spoils what is behind it, px.
+const EDGE_REACH_PX: i32 = 3;
+/// What is nearer by more disparity than this is an edge: on a surface that wide a step is not that high unless it is seen edge-on.
+const EDGE_Q8: u16 = 384;
+
+/// Whether a pixel of that disparity lies just behind an edge.
+fn is_behind_edge(disparity_q8: View<'_, u16>, u: i32, v: i32, disparity: u16) -> bool {
+    let nearer = |u: i32, v: i32| {
+        let pixel = usize::try_from(u).ok().zip(usize::try_from(v).ok());
+        pixel.and_then(|(u, v)| disparity_q8.get(u, v)).is_some_and(|other| other > disparity.saturating_add(EDGE_Q8))
+    };
+    (1..=EDGE_REACH_PX).any(|px| nearer(u - px, v) || nearer(u + px, v) || nearer(u, v - px) || nearer(u, v + px))
+}
+
+/// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 beside the mask, just behind edges, and where the depth is
+/// farther than `extent_m` from the median. Returns how many pixels have one.
+pub(super) fn cut(
+    rig: &StereoRig,
+    extent_m: f32,
+    disparity_q8: View<'_, u16>,
+    masks: &MaskStore<'_>,
+    place: &MaskPlace,
+    crop: &mut [u16],
+) -> u32 {
+    let PixelBox { left, top, width, height } = place.pixels;
+    let (Ok(left_u), Ok(top_v)) = (usize::try_from(left), usize::try_from(top)) else { return 0 };
+    let mut counts = [0u32; BINS];
+    let mut total = 0;
+    for (v, row) in (0..height.max(0) as usize).zip(crop.chunks_exact_mut(width.max(1) as usize)) {
+        let from = disparity_q8.row(top_v + v).get(left_u..).unwrap_or(&[]);
+        for ((u, to), &disparity) in (left..).zip(row.iter_mut()).zip(from) {
+            *to = if masks.contains(place, u, top + v as i32) { disparity } else { 0 };
+            if let (true, Some(count)) = (*to > 0, counts.get_mut(usize::from(*to / BIN))) {
+                *count += 1;
+                total += 1;
+            }
+        }
+    }
+    let mut below = 0;
+    let median = counts.iter().position(|&count| {
+        below += count;
+        2 * below > total
+    });
+    let depth = rig.focal_baseline_px_m() / ((median.unwrap_or(0) as f64 + 0.5) * 0.5);
+    let [low, high] = [depth + f64::from(extent_m), depth - f64::from(extent_m)].map(|depth_m| {
+        let disparity = rig.focal_baseline_px_m() / depth_m * 256.0;
+        if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
+    });
+    let mut kept = 0;
+    for (v, row) in (top..top + height.max(0)).zip(crop.chunks_exact_mut(width.max(1) as usize)) {
+        for (u, disparity) in (left..).zip(row) {
+            // What has none lies below `low`, or is found 0.
+            let near = *disparity >= low && *disparity <= high;
+            *disparity = if near && !is_behind_edge(disparity_q8, u, v, *disparity) { *disparity } else { 0 };
+            kept += u32::from(*disparity > 0);
+        }
+    }
+    kept
+}
+
+/// A crop that waits. Transforms as in the track.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Crop {
+    pub t_world_camera: [f64; 7],
+    pub t_world_object: [f64; 7],
+    pub pixels: PixelBox,
+    /// Track it belongs to; 0 none.
+    pub id: u32,
+    /// First pixel in the ring.
+    pub start: u32,
+    /// Pixels.
+    pub len: u32,
+    /// Whether it has colour, 0 or 1.
+    pub coloured: u32,
+}
+
+/// The left picture a crop is cut from.
+#[derive(Clone, Copy, Debug)]
+pub struct Picture<'a> {
+    /// In grey.
+    pub grey: View<'a, u8>,
+    /// In colour, where there is one.
+    pub colour: Option<View<'a, [u8; 3]>>,
+}
+
+impl Picture<'_> {
+    /// The part in a box within the picture.
+    pub(super) fn part(&self, pixels: &PixelBox) -> Option<Self> {
+        let [left, top, width, height] = [pixels.left, pixels.top, pixels.width, pixels.height].map(|side| side.max(0) as usize);
+        let grey = self.grey.part(left, top, width, height)?;
+        Some(Self { grey, colour: self.colour.and_then(|image| image.part(left, top, width, height)) })
+    }
+}
+
+/// The ring.
+#[derive(Debug)]
+pub(super) struct Crops<'s> {
+    disparity_q8: &'s mut [u16],
+    grey: &'s mut [u8],
+    colour: &'s mut [[u8; 3]],
+    entries: &'s mut [Crop],
+    /// Entries in use, oldest first.
+    len: usize,
+    /// Where the next crop begins.
+    next: usize,
+}
+
+impl<'s> Crops<'s> {
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        region_bytes::<u16>(capacity.crop_pixels)
+            + region_bytes::<u8>(capacity.crop_pixels)
+            + if capacity.colour { region_bytes::<[u8; 3]>(capacity.crop_pixels) } else { 0 }
+            + region_bytes::<Crop>(CROPS_MAX)
+    }
+
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        let pixels = capacity.crop_pixels;
+        Self {
+            disparity_q8: carver.alloc("instances.crop_disparity", pixels),
+            grey: carver.alloc("instances.crop_grey", pixels),
+            colour: if capacity.colour { carver.alloc("instances.crop_colour", pixels) } else { &mut [] },
+            entries: carver.alloc("instances.crop", CROPS_MAX),
+            len: 0,
+            next: 0,
+        }
+    }
+
+    /// Puts a crop, its disparity given row by row, into the ring. Returns how many crops still waiting went for it, or `None` when it is
+    /// larger than the ring.
+    pub fn push(&mut self, crop: Crop, disparity_q8: &[u16], picture: &Picture<'_>) -> Option<u32> {
+        let picture = picture.part(&crop.pixels)?;
+        let len = crop.pixels.area() as usize;
+        if len > self.disparity_q8.len() || len == 0 {
+            return None;
+        }
+        if self.next + len > self.disparity_q8.len() {
+            self.next = 0;
+        }
+        let room = self.next..self.next + len;
+        let waiting = self.drop_where(|old, count| {
+            let overlaps = (old.start as usize) < room.end && (old.start + old.len) as usize > room.start;
+            overlaps || count >= CROPS_MAX
+        });
+        let width = (crop.pixels.width as usize).max(1);
+        self.disparity_q8.get_mut(room.clone())?.iter_mut().zip(disparity_q8).for_each(|(to, from)| *to = *from);
+        for (to, from) in self.grey.get_mut(room.clone())?.chunks_exact_mut(width).zip(picture.grey.rows()) {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+        }
+        let coloured = picture.colour.filter(|_| !self.colour.is_empty());
+        if let Some(image) = coloured {
+            for (to, from) in self.colour.get_mut(room.clone())?.chunks_exact_mut(width).zip(image.rows()) {
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+            }
+        }
+        *self.entries.get_mut(self.len)? = Crop {
+            start: room.start as u32,
+            len: len as u32,
+            coloured: u32::from(coloured.is_some()),
+            ..crop
+        };
+        self.len += 1;
+        self.next = room.end;
+        Some(waiting)
+    }
+
+    /// Drops the crops `drop` says, handed each and how many are left; how many of those still waited.
+    fn drop_where(&mut self, mut drop: impl FnMut(&Crop, usize) -> bool) -> u32 {
+        let (mut kept, mut left, mut waiting) = (0, self.len, 0);
+        for index in 0..self.len {
+            let Some(crop) = self.entries.get(index).copied() else { break };
+            if drop(&crop, left) {
+                left -= 1;
+                waiting += u32::from(crop.id != 0);
+            } else if let Some(slot) = self.entries.get_mut(kept) {
+                *slot = crop;
+                kept += 1;
+            }
+        }
+        self.len = kept;
+        waiting
+    }
+
+    /// Drops the crops of a track.
+    pub fn forget(&mut self, id: u32) {
+        self.drop_where(|crop, _| crop.id == id);
+    }
+
+    /// The crops of a track, oldest first.
+    pub fn of(&self, id: u32) -> impl Iterator<Item = (&Crop, &[u16], Picture<'_>)> {
+        let entries = self.entries.get(..self.len).unwrap_or(&[]);
+        entries.iter().filter(move |crop| crop.id == id).filter_map(|crop| {
+            let (disparity_q8, picture) = self.picture(crop)?;
+            Some((crop, disparity_q8, picture))
+        })
+    }
+
+    fn picture(&self, crop: &Crop) -> Option<(&[u16], Picture<'_>)> {
+        let room = crop.start as usize..(crop.start + crop.len) as usize;
+        let (width, height) = (crop.pixels.width as usize, crop.pixels.height as usize);
+        let colour = match crop.coloured {
+            0 => None,
+            _ => View::new(self.colour.get(room.clone())?, width, height),
+        };
+        let grey = View::new(self.grey.get(room.clone())?, width, height)?;
+        Some((self.disparity_q8.get(room)?, Picture { grey, colour }))
+    }
+
+    /// Writes or reads the crops that wait, with their pixels.
+    pub fn archive(&mut self, archive: &mut impl Archive) {
+        let (most, pixels) = (self.entries.len(), self.disparity_q8.len());
+        archive.count(&mut self.len, most);
+        archive.count(&mut self.next, pixels);
+        for crop in self.entries.iter_mut().take(self.len) {
+            archive.f64s(&mut crop.t_world_camera);
+            archive.f64s(&mut crop.t_world_object);
+            crop.pixels.archive(archive);
+            [&mut crop.id, &mut crop.start, &mut crop.len, &mut crop.coloured].into_iter().for_each(|number| archive.u32(number));
+            let end = crop.start as usize + crop.len as usize;
+            let room = crop.start as usize..end;
+            if end > pixels || i64::from(crop.len) != crop.pixels.area() {
+                archive.refuse();
+                return;
+            }
+            archive.u16s(self.disparity_q8.get_mut(room.clone()).unwrap_or(&mut []));
+            archive.raw(self.grey.get_mut(room.clone()).unwrap_or(&mut []));
+            if crop.coloured > 0 {
+                archive.raw(self.colour.get_mut(room).unwrap_or(&mut []).as_flattened_mut());
+            }
+        }
+    }
+
+    /// Takes which crops wait, and from where they were taken, into a digest.
+    pub fn enter(&self, digest: &mut Digest) {
+        for crop in self.entries.iter().take(self.len) {
+            crop.t_world_camera.iter().chain(&crop.t_world_object).for_each(|&number| digest.f64(number));
+            digest.u64(u64::from(crop.id) << 32 | u64::from(crop.len));
+        }
+    }
+
+    /// Crops waiting.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+}

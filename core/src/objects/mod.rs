@@ -1,0 +1,68 @@
+//! Objects: what a frame shows of each is cut out and goes into a volume of its own (Section III-E of Bârsan et al., ICRA 2018).
+//!
+//! Memory: crops and volumes as their modules say.
+
+mod archive;
+mod crop;
+mod object;
+mod placed;
+mod reconstruct;
+mod report;
+#[cfg(test)]
+mod tests;
+
+pub use crop::{CROPS_MAX, Picture};
+pub use object::{MAX_OBJECTS, NoSink, Object, ObjectSink, ObjectSummary, RetiredObject, Retirement};
+pub use placed::PlacedObject;
+pub use reconstruct::ObjectFrame;
+pub use report::{InstancesReport, ObjectCount};
+
+use crate::{
+    digest::Digest,
+    memory::{Capacity, Carver, Footprint},
+    stage_digests::ObjectDigests,
+    tracking::ObjectVolumeConfig,
+};
+use crop::{Crop, Crops};
+use object::ObjectVolumes;
+
+/// The objects' crops and volumes.
+#[derive(Debug)]
+pub struct Objects<'s> {
+    config: ObjectVolumeConfig,
+    crops: Crops<'s>,
+    volumes: ObjectVolumes<'s>,
+    report: ObjectCount,
+}
+
+impl<'s> Objects<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        Crops::bytes(capacity) + ObjectVolumes::bytes(capacity)
+    }
+
+    /// Cuts its regions.
+    pub fn new_in(capacity: &Capacity, config: &ObjectVolumeConfig, carver: &mut Carver<'s>) -> Self {
+        Self {
+            config: *config,
+            crops: Crops::new_in(capacity, carver),
+            volumes: ObjectVolumes::new_in(capacity, config, carver),
+            report: ObjectCount::default(),
+        }
+    }
+
+    /// Takes what waits to be fused into a digest.
+    pub fn enter(&self, digest: &mut Digest) {
+        self.crops.enter(digest);
+    }
+
+    /// Digests of the objects.
+    pub fn digests(&self) -> ObjectDigests {
+        ObjectDigests::of(self.volumes.objects.iter().filter_map(|object| object.digest()))
+    }
+
+    /// Enters what is in use into a footprint.
+    pub fn note_use(&self, footprint: &mut Footprint) {
+        footprint.set_use::<Crop>("instances.crop", self.crops.len(), CROPS_MAX);
+    }
+}

@@ -1,0 +1,208 @@
+//! The objects' own volumes.
+//!
+//! An object that is static or dynamic and of a class to be reconstructed gets a volume: a map of its own whose frame moves with it. Its
+//! frame is the camera's at the beginning of the track's chain of poses. What was seen before its motion was known is fused first.
+//!
+//! | when | then |
+//! |---|---|
+//! | all volumes are taken | that of the object fused longest ago retires, of equals that of the older track, unless it was seen in this frame: then the new object gets none, and is counted |
+//! | a track is forgotten or leaves its table | its volume retires |
+//! | a track's chain of poses broke (a gap, a motion lost for too long) | its volume retires when the next chain has one to fill |
+//! | the drive ends | every volume retires |
+//!
+//! What retires is handed to an [`ObjectSink`] first, so that nothing reconstructed is lost.
+//!
+//! Every `prune_frames` fused frames, and before it retires, the whole volume is rid of voxels seen at most `prune_weight` times: the paper
+//! prunes objects whole at every frame (Section III-F); a voxel then needs the time to be seen twice, hence the interval.
+//!
+//! Memory: `capacity.objects` times a [`Volume`] of `capacity.object_blocks` blocks and 640 bytes, and 6 bytes a pixel of the largest image.
+
+use crate::{
+    digest::Digest,
+    geometry::Transform,
+    memory::{Capacity, Carver, region_bytes},
+    stage_digests::ObjectDigest,
+    tracking::{Class, ObjectVolumeConfig, State},
+    volume::Volume,
+};
+use heapless::Vec;
+
+/// Most object volumes a capacity can ask for.
+pub const MAX_OBJECTS: usize = 16;
+
+/// Why an object was handed over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Retirement {
+    /// Its track was forgotten.
+    #[default]
+    Forgotten,
+    /// Its volume was needed for another object.
+    Displaced,
+    /// It was lost and found again: its poses do not connect, and it is reconstructed anew.
+    Restarted,
+    /// The drive ended.
+    Finished,
+}
+
+/// An object as its volume knows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectSummary {
+    /// Number of its track, from 1; for a track that was lost and found again there is more than one object.
+    pub id: u32,
+    /// How many chains of poses the track began before this one ended, from 1.
+    pub chain: u32,
+    /// What it is.
+    pub class: Class,
+    /// What was last known of its motion.
+    pub state: State,
+    /// First frame fused.
+    pub first_frame: u32,
+    /// Last frame fused.
+    pub last_frame: u32,
+    /// Frames fused.
+    pub frames: u32,
+    /// Where it was last: its volume's frame to the world.
+    pub t_world_object: Transform,
+}
+
+/// An object that leaves the mapper.
+#[derive(Clone, Copy, Debug)]
+pub struct RetiredObject<'v, 's> {
+    /// What is known of it.
+    pub summary: ObjectSummary,
+    /// Why it leaves.
+    pub reason: Retirement,
+    /// Its map, in its own frame.
+    pub volume: &'v Volume<'s>,
+}
+
+/// Takes objects that leave the mapper.
+pub trait ObjectSink {
+    /// Takes one; its volume is empty afterwards.
+    fn retire(&mut self, object: RetiredObject<'_, '_>);
+}
+
+/// Lets them go.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoSink;
+
+impl ObjectSink for NoSink {
+    fn retire(&mut self, _: RetiredObject<'_, '_>) {}
+}
+
+/// An object with its volume.
+#[derive(Debug)]
+pub struct Object<'s> {
+    pub(super) volume: Volume<'s>,
+    pub(super) summary: Option<ObjectSummary>,
+}
+
+impl<'s> Object<'s> {
+    /// The object's map, in its own frame.
+    pub fn volume(&self) -> &Volume<'s> {
+        &self.volume
+    }
+
+    /// What is known of it; `None` while the volume waits for an object.
+    pub fn summary(&self) -> Option<&ObjectSummary> {
+        self.summary.as_ref()
+    }
+
+    /// Digest of what is known of it and of its map; `None` while the volume waits for an object.
+    pub fn digest(&self) -> Option<ObjectDigest> {
+        let summary = self.summary.as_ref()?;
+        let mut digest = Digest::default();
+        let numbers = [summary.chain, summary.class.code(), summary.state as u32, summary.first_frame, summary.last_frame, summary.frames];
+        numbers.iter().for_each(|&number| digest.u64(u64::from(number)));
+        let (turn, shift) = (summary.t_world_object.rotation.coords, summary.t_world_object.translation.vector);
+        turn.iter().chain(shift.iter()).for_each(|&value| digest.f64(value));
+        digest.u64(self.volume.digest());
+        Some(ObjectDigest { id: summary.id, digest: digest.finish() })
+    }
+
+    pub(super) fn retire(&mut self, config: &ObjectVolumeConfig, reason: Retirement, sink: &mut impl ObjectSink) -> bool {
+        let Some(summary) = self.summary.take() else { return false };
+        self.volume.prune_whole(if summary.frames > u32::from(config.prune_frames) { config.prune_weight } else { 0 });
+        sink.retire(RetiredObject { summary, reason, volume: &self.volume });
+        // No voxel weighs more.
+        self.volume.prune_whole(u8::MAX);
+        true
+    }
+}
+
+/// Bounds of one object's volume.
+const fn bounds(capacity: &Capacity) -> Capacity {
+    Capacity {
+        blocks: capacity.object_blocks,
+        visible_blocks: capacity.object_blocks,
+        history_frames: 1,
+        ..*capacity
+    }
+}
+
+/// Room for an [`Object`] with pointers as wide as they come.
+const OBJECT_BYTES: usize = 640;
+const _: () = assert!(size_of::<Object<'_>>() <= OBJECT_BYTES);
+
+/// All object volumes.
+#[derive(Debug)]
+pub(super) struct ObjectVolumes<'s> {
+    pub objects: Vec<&'s mut Object<'s>, MAX_OBJECTS>,
+    /// Depth of one crop, m.
+    pub depth_m: &'s mut [f32],
+    /// Disparity of one crop.
+    pub disparity_q8: &'s mut [u16],
+}
+
+impl<'s> ObjectVolumes<'s> {
+    const fn volumes(capacity: &Capacity) -> usize {
+        if capacity.objects < MAX_OBJECTS { capacity.objects } else { MAX_OBJECTS }
+    }
+
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        Self::volumes(capacity) * (Volume::bytes(&bounds(capacity)) + region_bytes::<u8>(OBJECT_BYTES))
+            + region_bytes::<f32>(capacity.pixels())
+            + region_bytes::<u16>(capacity.pixels())
+    }
+
+    pub fn new_in(capacity: &Capacity, config: &ObjectVolumeConfig, carver: &mut Carver<'s>) -> Self {
+        let (bounds, config, pixels) = (bounds(capacity), config.volume(), capacity.pixels());
+        let mut made = Self {
+            depth_m: carver.alloc("instances.depth_m", pixels),
+            disparity_q8: carver.alloc("instances.disparity", pixels),
+            objects: Vec::new(),
+        };
+        for _ in 0..Self::volumes(capacity) {
+            let object = carver.group("instances.volumes", |carver| {
+                let volume = Volume::new_in(&bounds, &config, carver);
+                carver.alloc_value("object", OBJECT_BYTES, Object { volume, summary: None })
+            });
+            object.and_then(|object| made.objects.push(object).err());
+        }
+        made
+    }
+
+    /// Position of the object of a track.
+    pub fn of(&self, id: u32) -> Option<usize> {
+        self.objects.iter().position(|object| object.summary.is_some_and(|summary| summary.id == id))
+    }
+
+    /// A volume for a new object in frame `frame`: a free one, or that of the object fused longest ago, which retires.
+    pub fn find_room(&mut self, config: &ObjectVolumeConfig, frame: u32, retired: &mut u32, sink: &mut impl ObjectSink) -> Option<usize> {
+        if let Some(free) = self.objects.iter().position(|object| object.summary.is_none()) {
+            return Some(free);
+        }
+        let summaries = self.objects.iter().enumerate().filter_map(|(at, object)| Some((at, object.summary?)));
+        let (oldest, summary) = summaries.min_by_key(|(_, summary)| (summary.last_frame, summary.id))?;
+        if summary.last_frame == frame {
+            return None;
+        }
+        *retired += u32::from(self.objects.get_mut(oldest)?.retire(config, Retirement::Displaced, sink));
+        Some(oldest)
+    }
+
+    /// Blocks in use.
+    pub fn blocks(&self) -> usize {
+        self.objects.iter().map(|object| object.volume.pool().len()).sum()
+    }
+}

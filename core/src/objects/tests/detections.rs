@@ -1,0 +1,248 @@
+//! What is let in.
+
+use super::*;
+
+fn pixels(left: i32, top: i32, width: i32, height: i32) -> PixelBox {
+    PixelBox { left, top, width, height }
+}
+
+fn admitted(config: &InstancesConfig, size: [usize; 2], detections: &[Detection<'_>]) -> (DetectionCount, Vec<f32>, u64) {
+    let capacity = Capacity { image_width: 1242, image_height: 375, mask_words: 20_000, ..CAPACITY };
+    with(&capacity, config, |instances, _| {
+        instances.admit(0, detections, size);
+        let scores = instances.tracker.detections().iter().map(|taken| taken.score).collect();
+        (instances.report().detections, scores, instances.digest())
+    })
+}
+
+#[test]
+fn a_box_must_be_strictly_larger_than_45_by_45_at_kittis_width_and_in_proportion_at_others() {
+    let mask = vec![1; 3000];
+    let taken = |width, height, image: usize| {
+        let car = detection(Class::Car, 0.9, &pixels(10, 10, width, height), &mask);
+        admitted(&InstancesConfig::default(), [image, 200], &[car]).0.taken
+    };
+    // 2024, 2025 and 2026 px.
+    assert_eq!([taken(46, 44, 1242), taken(45, 45, 1242), taken(1013, 2, 1242)], [0, 0, 1]);
+    // Half the width, a quarter of the area: 506.25 px.
+    assert_eq!([taken(23, 22, 621), taken(39, 13, 621)], [0, 1]);
+}
+
+#[test]
+fn nonsense_is_refused_by_name_and_counted_once() {
+    let mask = vec![1; 10_000];
+    let good = pixels(10, 10, 60, 60);
+    let with_score = |score| detection(Class::Car, score, &good, &mask);
+    let at = |left, top, width, height| Detection { left, top, width, height, ..with_score(0.5) };
+    let empty = vec![0; 3600];
+    let all = [
+        with_score(f32::NAN),
+        with_score(-0.1),
+        with_score(1.5),
+        with_score(f32::INFINITY),
+        at(10, 10, 0, 60),
+        at(10, 10, 60, 0),
+        at(400, 10, 60, 60),
+        at(-60, 10, 60, 60),
+        at(i32::MIN, i32::MAX, 60, 60),
+        at(10, 10, u32::MAX, u32::MAX),
+        Detection { mask: &mask[..3599], ..with_score(0.5) },
+        Detection { mask: &empty, ..with_score(0.5) },
+        detection(Class::Other, 0.5, &good, &mask),
+        at(10, 10, 5, 5),
+        with_score(0.7),
+    ];
+    let (count, scores, _) = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
+    let expected = DetectionCount {
+        given: 15,
+        taken: 1,
+        bad_score: 4,
+        bad_box: 6,
+        bad_mask: 2,
+        ignored: 1,
+        too_small: 1,
+        ..DetectionCount::default()
+    };
+    assert_eq!((count, scores), (expected, vec![0.7]));
+}
+
+#[test]
+fn of_ten_thousand_the_best_are_taken_in_whatever_order_they_come() {
+    let mask = vec![1; 3600];
+    let mut random = Random::new(1);
+    let mut all: Vec<_> = (0..10_000)
+        .map(|_| {
+            let (left, top) = (random.below(300) as i32, random.below(50) as i32);
+            detection(Class::Car, random.below(1000) as f32 / 1000.0, &pixels(left, top, 60, 60), &mask)
+        })
+        .collect();
+    let (count, scores, digest) = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
+    assert_eq!(count.taken + count.covered + count.beyond, 10_000);
+    assert_eq!(count.beyond, 9_996, "four are the bound");
+    assert!(scores.iter().all(|&score| score > 0.99), "{scores:?}");
+    for i in (1..all.len()).rev() {
+        all.swap(i, random.below(i as u32 + 1) as usize);
+    }
+    assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), (count, scores, digest));
+}
+
+#[test]
+fn where_masks_overlap_the_higher_score_is_on_top() {
+    let mask = vec![1; 3600];
+    let (low, high) =
+        (detection(Class::Car, 0.5, &pixels(10, 10, 60, 60), &mask), detection(Class::Van, 0.8, &pixels(40, 10, 60, 60), &mask));
+    let hidden = detection(Class::Car, 0.1, &pixels(15, 12, 50, 50), &mask);
+    for order in [[low, high, hidden], [hidden, high, low]] {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            instances.admit(0, &order, [WIDTH, HEIGHT]);
+            let taken = instances.tracker.detections();
+            assert_eq!((taken.len(), instances.report().detections.covered), (2, 1));
+            let on = |n: usize, u| instances.tracker.masks_now().contains(&taken[n].place, u, 20);
+            assert_eq!([on(0, 39), on(0, 40), on(1, 39), on(1, 40)], [false, true, true, false]);
+        });
+    }
+}
+
+#[test]
+fn the_static_map_sees_nothing_under_any_delete_mask_tracked_or_not() {
+    let mask = vec![1; 3600];
+    let walker = detection(Class::Person, 0.6, &pixels(300, 30, 60, 60), &mask);
+    let car = detection(Class::Car, 0.9, &pixels(20, 30, 60, 60), &mask);
+    let config = InstancesConfig { area_min_px: 2025, ..InstancesConfig::default() };
+    // A table of one track: the walker, of lower score, gets none.
+    with(&Capacity { tracks: 1, ..CAPACITY }, &config, |instances, _| {
+        instances.admit(0, &[walker, car], [WIDTH, HEIGHT]);
+        assert_eq!((instances.report().tracks.tracks, instances.report().tracks.refused), (1, 1));
+        let mut depth = vec![5.0f32; WIDTH * HEIGHT];
+        instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+        for (at, &depth) in depth.iter().enumerate() {
+            let (u, v) = ((at % WIDTH) as i32, (at / WIDTH) as i32);
+            let under = [pixels(300, 30, 60, 60), pixels(20, 30, 60, 60)].iter().any(|pixels| pixels.scaled(1200).contains(u, v));
+            assert_eq!(depth == 0.0, under, "({u}, {v})");
+        }
+        assert_eq!(instances.report().pixels_cleared, 2 * 72 * 72);
+    });
+}
+
+#[test]
+fn without_dynamic_everything_is_background() {
+    let mask = vec![1; 3600];
+    let car = detection(Class::Car, 0.9, &pixels(20, 30, 60, 60), &mask);
+    with(&CAPACITY, &InstancesConfig { dynamic: false, ..any_size() }, |instances, _| {
+        instances.admit(0, &[car], [WIDTH, HEIGHT]);
+        let mut depth = vec![5.0f32; WIDTH * HEIGHT];
+        instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+        assert!(depth.iter().all(|&depth| depth == 5.0) && instances.tracks().count() == 0);
+    });
+}
+
+#[test]
+fn what_is_too_small_to_be_reconstructed_is_tracked_in_the_room_that_is_left() {
+    let mask = vec![1; 3600];
+    let config = InstancesConfig::default();
+    let car = |score, pixels: &PixelBox| detection(Class::Car, score, pixels, &mask[..pixels.area() as usize]);
+    let [least, most] = [(30, 30), (31, 30)].map(|(width, height)| car(0.9, &pixels(200, 10, width, height)));
+    let count = |all: &[Detection<'_>]| admitted(&config, [1242, 375], all).0;
+    let counted = |taken, too_small, tracked_only, beyond, given| DetectionCount {
+        given,
+        taken,
+        too_small,
+        tracked_only,
+        beyond,
+        ..DetectionCount::default()
+    };
+    assert_eq!(count(&[least]), counted(0, 1, 0, 0, 1));
+    assert_eq!(count(&[most]), counted(0, 1, 1, 0, 1));
+    // A table of four: the small one goes first whatever its score, and is counted as small.
+    let large: Vec<_> = (0..5).map(|n| pixels(300 + 70 * n, 10, 60, 60)).collect();
+    let mut all: Vec<_> = large.iter().map(|pixels| car(0.3, pixels)).collect();
+    all.insert(0, most);
+    assert_eq!(count(&all[..5]), counted(4, 1, 0, 0, 5));
+    assert_eq!(count(&all), counted(4, 1, 0, 1, 6));
+    // A larger one keeps its pixels.
+    let over = car(0.3, &pixels(190, 5, 60, 60));
+    assert_eq!(count(&[most, over]), counted(1, 1, 0, 0, 2), "nothing of the small one is left");
+}
+
+#[test]
+fn of_more_equals_than_there_is_room_for_the_same_are_taken_in_whatever_order() {
+    let mask = vec![1; 3600];
+    let boxes: Vec<_> = (0..7).map(|n| pixels(10 + 40 * n, 10, 60, 60)).collect();
+    let mut all: Vec<_> = boxes.iter().map(|pixels| detection(Class::Car, 0.5, pixels, &mask)).collect();
+    let first = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
+    for _ in 0..7 {
+        all.rotate_left(1);
+        assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), first);
+    }
+    all.reverse();
+    assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), first);
+}
+
+#[test]
+fn a_box_of_absurd_width_is_refused_though_its_mask_is_as_wide() {
+    let mask = vec![1; 160_000];
+    let wide = |width: u32| Detection {
+        left: 0,
+        top: 10,
+        width,
+        height: 4,
+        ..detection(Class::Car, 0.9, &pixels(0, 0, 1, 1), &mask)
+    };
+    let count = |width| admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &[wide(width)]).0;
+    assert_eq!((count(32_768).taken, count(32_769).bad_box, count(40_000).bad_box), (1, 1, 1));
+}
+
+#[test]
+fn of_a_box_half_beside_the_image_the_half_within_counts() {
+    let mask = vec![1; 3600];
+    for (left, within) in [(-30, 0), (370, 370)] {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            instances.admit(0, &[detection(Class::Car, 0.9, &pixels(left, 100, 60, 60), &mask)], [WIDTH, HEIGHT]);
+            let taken = instances.tracker.detections()[0];
+            assert_eq!(taken.place.pixels, pixels(within, 100, 30, 20));
+            assert_eq!(instances.tracker.masks_now().area(&taken.place), 30 * 20, "and no pixel beside it");
+        });
+    }
+}
+
+#[test]
+fn a_score_below_the_least_is_ignored() {
+    let mask = vec![1; 3600];
+    let car = |score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask);
+    let config = InstancesConfig { score_min: 0.4, ..any_size() };
+    let count = |score| admitted(&config, [WIDTH, HEIGHT], &[car(score)]).0;
+    assert_eq!([count(0.39), count(0.4)].map(|count| (count.taken, count.ignored)), [(0, 1), (1, 0)]);
+}
+
+#[test]
+fn a_score_of_minus_nothing_is_nothing() {
+    let mask = vec![1; 3600];
+    let cars = [-0.0, 0.5].map(|score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask));
+    let (count, scores, _) = admitted(&any_size(), [WIDTH, HEIGHT], &cars);
+    assert_eq!((count.covered, scores), (1, vec![0.5]), "the better one is on top");
+}
+
+#[test]
+fn of_two_alike_but_for_class_box_or_mask_the_same_is_on_top_in_either_order() {
+    let whole = vec![1; 3600];
+    let left: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 < 40)).collect();
+    let right: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 >= 20)).collect();
+    let car = detection(Class::Car, 0.5, &pixels(10, 10, 60, 60), &whole);
+    let pairs = [
+        [car, Detection { class: Class::Van, ..car }],
+        [car, Detection { left: 11, ..car }],
+        [Detection { mask: &left, ..car }, Detection { mask: &right, ..car }],
+    ];
+    for [a, b] in pairs {
+        let seen = |order: [Detection<'_>; 2]| {
+            with(&CAPACITY, &any_size(), |instances, _| {
+                instances.admit(0, &order, [WIDTH, HEIGHT]);
+                let (masks, taken) = (instances.tracker.masks_now(), instances.tracker.detections());
+                taken.iter().map(|taken| (taken.class(), taken.place.pixels, masks.area(&taken.place))).collect::<Vec<_>>()
+            })
+        };
+        let digest = |order: [Detection<'_>; 2]| admitted(&any_size(), [WIDTH, HEIGHT], &order).2;
+        assert_eq!(seen([a, b]), seen([b, a]));
+        assert_eq!(digest([a, b]), digest([b, a]));
+    }
+}

@@ -1,0 +1,204 @@
+//! Which matches count, and for whom.
+
+use super::*;
+
+const MASK: [u8; 3600] = [1; 3600];
+
+fn car(left: i32, score: f32) -> Detection<'static> {
+    detection(Class::Car, score, &PixelBox { left, top: 30, width: 60, height: 60 }, &MASK)
+}
+
+/// Points of a thing that leaves a standing camera by 0.2 m, seen in a band of the box of `car(left, _)`, no two within 5 px.
+fn points(count: u32, left: i32, top: i32, depth_m: f64) -> Vec<Match> {
+    let seen = |n: u32| {
+        let pixel = [f64::from(left) + 5.0 + f64::from(7 * n % 50), f64::from(top) + f64::from(13 * n % 20)];
+        let z = depth_m * (1.0 + 0.01 * f64::from(n % 5));
+        let per_px = z / RIG.focal_px;
+        let point = Point3::new((pixel[0] - RIG.center_u_px) * per_px, (pixel[1] - RIG.center_v_px) * per_px, z);
+        let ([previous_left, previous_right], [current_left, current_right]) =
+            (project(&point), project(&(point + Vector3::new(0.0, 0.0, 0.2))));
+        Match { previous_left, previous_right, current_left, current_right }
+    };
+    (0..count).map(seen).collect()
+}
+
+/// How many matches a car counts in its second frame.
+fn counted(refined: &[Match], sparse: &[Match]) -> u32 {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        take_frame(instances, estimator, 0, &[car(100, 0.9)], [&[], &[]]);
+        take_frame(instances, estimator, 1, &[car(100, 0.9)], [refined, sparse]);
+        instances.tracks().next().unwrap().matches
+    })
+}
+
+#[test]
+fn a_match_that_leaves_the_mask_or_enters_it_is_not_counted() {
+    let stays = points(20, 100, 35, 10.0);
+    let aside = |[u, v]: [f32; 2]| [u + 100.0, v];
+    let leaves = points(5, 100, 65, 10.0).into_iter().map(|m| Match { current_left: aside(m.current_left), ..m });
+    let enters = points(5, 100, 65, 10.0).into_iter().map(|m| Match {
+        previous_left: aside(m.previous_left),
+        previous_right: aside(m.previous_right),
+        ..m
+    });
+    let all: Vec<Match> = stays.iter().copied().chain(leaves).chain(enters).collect();
+    assert_eq!([counted(&stays, &[]), counted(&all, &[])], [20; 2]);
+}
+
+#[test]
+fn sparse_matches_fill_up_where_refined_ones_are_few_and_none_is_counted_twice() {
+    let (few, sparse) = (points(20, 100, 35, 10.0), points(30, 100, 65, 10.0));
+    assert_eq!(counted(&few, &sparse), 50);
+    let again = |m: &Match| Match { current_left: [m.current_left[0] + 0.5, m.current_left[1]], ..*m };
+    let with_doubles: Vec<Match> = sparse.iter().copied().chain(few.iter().take(5).map(again)).collect();
+    assert_eq!(counted(&few, &with_doubles), 50, "the same feature says nothing new");
+    assert_eq!(counted(&points(60, 100, 35, 10.0), &sparse), 60, "enough are enough");
+}
+
+#[test]
+fn what_shows_through_the_windows_and_what_stands_before_the_car_are_not_counted() {
+    let own = points(20, 100, 35, 10.0);
+    let behind = points(5, 100, 65, 60.0);
+    let before = points(5, 100, 65, 3.0);
+    for other in [behind, before] {
+        let all: Vec<Match> = own.iter().copied().chain(other).collect();
+        assert_eq!(counted(&all, &[]), 20);
+    }
+}
+
+#[test]
+fn what_is_seen_for_the_first_time_has_no_matches_whatever_was_there_before() {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        take_frame(instances, estimator, 0, &[car(100, 0.9)], [&[], &[]]);
+        take_frame(instances, estimator, 1, &[car(250, 0.9)], [&points(30, 250, 35, 10.0), &[]]);
+        let matches: Vec<(u32, u32)> = instances.tracks().map(|track| (track.id, track.matches)).collect();
+        assert_eq!(matches, [(1, 0), (2, 0)]);
+    });
+}
+
+/// A car that crosses at 8 m/s before a standing camera.
+fn crossing(frame: u32) -> [Transform; 2] {
+    [Transform::identity(), shift(-2.0 + 0.8 * f64::from(frame), 0.2, 10.0)]
+}
+
+/// The car's track in the frame after `boards`, each shown in one frame.
+fn after(config: &InstancesConfig, boards: &[Board]) -> TrackReport {
+    with(&CAPACITY, config, |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        for (frame, board) in (0..).zip(boards) {
+            let [camera, place] = crossing(frame);
+            drive.step(camera, &[(board, Some(place))]);
+        }
+        drive.track(1).unwrap()
+    })
+}
+
+#[test]
+fn nine_matches_do_once_there_is_a_motion_to_go_by_and_eight_do_not() {
+    let measured = |points| after(&any_size(), &[Board::CAR, Board::CAR, Board::CAR, Board { points, ..Board::CAR }]).measured;
+    assert_eq!([measured(8), measured(9)], [false, true]);
+}
+
+#[test]
+fn the_motion_so_far_is_found_again_where_draws_alone_would_miss_it() {
+    // One draw only, and two thirds of what is under the mask stands: three points of the car are drawn once in 27 times.
+    let config = InstancesConfig { motion: MotionConfig { samples: 1, ..MotionConfig::default() }, ..any_size() };
+    let hidden = Board { background: 40, ..Board::CAR };
+    let track = after(&config, &[Board::CAR, Board::CAR, Board::CAR, hidden]);
+    assert!(track.measured && (15..=25).contains(&track.inliers), "{} inliers", track.inliers);
+    assert!((track.speed_m_s.unwrap()[0] - 8.0).abs() < 0.3, "{:?}", track.speed_m_s);
+}
+
+#[test]
+fn matches_of_one_thing_err_alike_so_four_times_as_many_do_not_make_it_twice_as_sure() {
+    let config = InstancesConfig {
+        motion: MotionConfig { camera_rad: 0.0, ..MotionConfig::default() },
+        ..any_size()
+    };
+    let sigma = |points| after(&config, &[Board { points, ..Board::CAR }, Board { points, ..Board::CAR }]).speed_m_s.unwrap()[1];
+    let [few, many] = [60, 240].map(sigma);
+    assert!((many / few - 1.0).abs() < 0.2, "{few} and {many} m/s");
+}
+
+#[test]
+fn a_slow_car_is_not_called_moving_where_the_cameras_errors_could_make_it_seem_so() {
+    let state = |motion: MotionConfig| {
+        with(&CAPACITY, &InstancesConfig { motion, ..any_size() }, |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            for frame in 0..8 {
+                let t = 0.1 * f64::from(frame);
+                drive.step(shift(0.0, 0.0, 6.0 * t), &[(&Board::CAR, Some(shift(3.5, 0.3, 14.0 + 3.0 * t)))]);
+            }
+            drive.track(1).unwrap().state
+        })
+    };
+    let exact = MotionConfig { bias_px: 0.0, lens_px: 0.0, camera_rad: 0.0, ..MotionConfig::default() };
+    assert_eq!(state(exact), State::Dynamic);
+    for poor in
+        [MotionConfig { bias_px: 5.0, ..exact }, MotionConfig { lens_px: 200.0, ..exact }, MotionConfig { camera_rad: 0.02, ..exact }]
+    {
+        assert_eq!(state(poor), State::Uncertain, "{poor:?}");
+    }
+}
+
+fn at(u: f32) -> Match {
+    Match { current_left: [u, 60.0], ..Match::default() }
+}
+
+#[test]
+fn under_its_own_mask_a_match_is_a_things_own_though_anothers_delete_mask_is_there_too() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        // The first one's mask ends at 99, its delete mask at 105; the second's begins at 101.
+        instances.admit(0, &[car(40, 0.9), car(101, 0.5)], [WIDTH, HEIGHT]);
+        instances.claim(&[at(100.0), at(105.0)], &[]);
+        assert_eq!(instances.tracker.owner()[1], 2);
+    });
+}
+
+/// A thing seen to be as fast as that, surely.
+fn seen_at(speed_m_s: f32) -> Option<Evidence> {
+    Some(Evidence { speed_m_s, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s: 0.0 })
+}
+
+#[test]
+fn a_small_thing_takes_its_neighbours_matches_only_once_it_moves() {
+    let config = InstancesConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..InstancesConfig::default() };
+    with(&CAPACITY, &config, |instances, _| {
+        instances.admit(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
+        instances.claim(&[at(97.0)], &[]);
+        assert_eq!(instances.tracker.owner()[0], 1);
+        let certain = StateConfig { confirm_frames: 1, ..StateConfig::default() };
+        instances.tracker.all_mut()[1].judgement.advance(&certain, seen_at(9.0));
+        instances.claim(&[at(97.0)], &[]);
+        assert_eq!(instances.tracker.owner()[0], AMBIGUOUS);
+    });
+}
+
+#[test]
+fn what_may_lie_on_either_of_two_things_guides_the_camera_only_if_both_may() {
+    for (large_share, guides) in [(1.0, true), (0.0, false)] {
+        with(&CAPACITY, &InstancesConfig { large_share, ..any_size() }, |instances, _| {
+            instances.admit(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
+            instances.claim(&[at(97.0)], &[]);
+            assert_eq!(instances.tracker.owner()[0], AMBIGUOUS);
+            assert_eq!(instances.tracker.guides_camera([WIDTH, HEIGHT])(0), guides);
+        });
+    }
+}
+
+#[test]
+fn a_motion_is_not_made_of_two_points() {
+    use crate::tracking::tests::{Filter, Sighting};
+    let config = MotionConfig::default();
+    let sighting = |x: f64| Sighting {
+        standing: Point3::new(x, 0.0, 10.0),
+        left: [30.0 * x, 0.0],
+        right: [30.0 * x - 15.0, 0.0],
+    };
+    let taken = |count: usize| {
+        let mut filter = Filter::default();
+        filter.predict(&config, 0.1);
+        filter.update(&config, &RIG, &Transform::identity(), 0.1, 0.3, [0.0, 1.0, 0.5].into_iter().take(count).map(sighting))
+    };
+    assert_eq!([taken(2), taken(3)], [false, true]);
+}

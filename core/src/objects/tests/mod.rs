@@ -1,0 +1,308 @@
+//! Stories of instances, on scenes of points with closed answers.
+
+mod detections;
+mod full;
+mod gaps;
+mod looks;
+mod masks;
+mod matches;
+mod motions;
+mod objects;
+mod settings;
+mod tracks;
+mod volumes;
+
+use super::*;
+use crate::{
+    Serial,
+    digest::Digest,
+    egomotion::Estimator,
+    geometry::{StereoRig, Transform, exp},
+    image::{View, ViewMut},
+    masks::{MaskStore, PixelBox, ScaledMask},
+    memory::SLAB_ALIGN,
+    random::Random,
+    scene_flow::Match,
+    tracking::{
+        CameraMotion, Class, Detection, DetectionCount, Evidence, InstancesConfig, MotionConfig, Overlap, Seen, State, StateConfig,
+        ThingAt, TrackCount, TrackReport, Tracker,
+        tests::{AMBIGUOUS, LOOKS, step_px},
+    },
+};
+use nalgebra::{Point3, Vector3};
+use std::{vec, vec::Vec};
+
+pub(super) const WIDTH: usize = 400;
+pub(super) const HEIGHT: usize = 120;
+pub(super) const RIG: StereoRig = StereoRig { focal_px: 300.0, center_u_px: 200.0, center_v_px: 60.0, baseline_m: 0.5 };
+pub(super) const CAPACITY: Capacity = Capacity {
+    image_width: WIDTH,
+    image_height: HEIGHT,
+    detections: 4,
+    mask_words: 2_000,
+    tracks: 4,
+    objects: 2,
+    object_blocks: 400,
+    crop_pixels: 40_000,
+    ..Capacity::TINY
+};
+
+/// What a sink was handed.
+#[derive(Default)]
+pub(super) struct Taken(pub Vec<(ObjectSummary, Retirement, usize)>);
+
+impl ObjectSink for Taken {
+    fn retire(&mut self, object: RetiredObject<'_, '_>) {
+        self.0.push((object.summary, object.reason, object.volume.pool().len()));
+    }
+}
+
+/// Tracks and objects as a mapper has them.
+pub(super) struct Instances<'s> {
+    pub tracker: Tracker<'s>,
+    pub objects: Objects<'s>,
+}
+
+impl<'s> Instances<'s> {
+    const fn bytes(capacity: &Capacity) -> usize {
+        Tracker::bytes(capacity) + Objects::bytes(capacity)
+    }
+
+    fn new_in(capacity: &Capacity, config: &InstancesConfig, carver: &mut Carver<'s>) -> Self {
+        Self {
+            tracker: Tracker::new_in(capacity, config, carver),
+            objects: Objects::new_in(capacity, &config.volume, carver),
+        }
+    }
+
+    pub fn admit(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) {
+        self.tracker.admit(frame, detections, size);
+    }
+
+    pub fn claim(&mut self, refined: &[Match], sparse: &[Match]) {
+        self.tracker.claim(refined, sparse);
+    }
+
+    pub fn follow(&mut self, rig: &StereoRig, seen: &Seen<'_, '_>, camera: &CameraMotion, estimator: &mut Estimator<'_>) {
+        self.tracker.follow(rig, seen, camera, estimator);
+    }
+
+    pub fn clear(&mut self, depth_m: &mut ViewMut<'_, f32>) {
+        self.tracker.clear(depth_m);
+    }
+
+    pub fn reconstruct(&mut self, frame: Option<&ObjectFrame<'_>>, sink: &mut impl ObjectSink) {
+        self.objects.reconstruct(&self.tracker, frame, &Serial, sink);
+        self.tracker.settle();
+    }
+
+    pub fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
+        self.objects.finish(sink)
+    }
+
+    pub fn report(&self) -> InstancesReport {
+        self.objects.report(self.tracker.report())
+    }
+
+    pub fn tracks(&self) -> impl Iterator<Item = TrackReport> {
+        self.objects.tracks(&self.tracker)
+    }
+
+    pub fn objects(&self) -> impl Iterator<Item = (&ObjectSummary, &Object<'s>)> {
+        self.objects.objects()
+    }
+
+    pub fn placed(&self) -> impl Iterator<Item = PlacedObject<'_, 's>> {
+        self.objects.placed(&self.tracker)
+    }
+
+    pub fn at(&self, u: i32, v: i32) -> Option<ThingAt> {
+        self.tracker.at(u, v)
+    }
+
+    fn digest(&self) -> u64 {
+        let mut digest = Digest::default();
+        self.tracker.enter(&mut digest);
+        self.objects.enter(&mut digest);
+        digest.finish()
+    }
+}
+
+/// Calls `drive` with instances and an estimator in a slab.
+pub(super) fn with<R>(capacity: &Capacity, config: &InstancesConfig, drive: impl FnOnce(&mut Instances<'_>, &mut Estimator<'_>) -> R) -> R {
+    let bytes = Instances::bytes(capacity) + Estimator::bytes(capacity);
+    let mut room = vec![0u8; bytes + SLAB_ALIGN];
+    let start = room.as_ptr().align_offset(SLAB_ALIGN);
+    let mut carver = Carver::new(&mut room[start..start + bytes], bytes).unwrap();
+    let mut instances = Instances::new_in(capacity, config, &mut carver);
+    assert_eq!(carver.footprint().bytes(), Instances::bytes(capacity), "the formula is what is cut");
+    let mut estimator = Estimator::new_in(capacity, &mut carver);
+    drive(&mut instances, &mut estimator)
+}
+
+/// A rectangle of points square to the camera, with its place over time.
+pub(super) struct Board {
+    pub class: Class,
+    pub score: f32,
+    /// Half its width and height, m.
+    pub half_m: [f64; 2],
+    pub points: usize,
+    /// Of these the first so many stand still instead, as background under the mask does.
+    pub background: usize,
+}
+
+impl Board {
+    pub const CAR: Self = Self { class: Class::Car, score: 0.9, half_m: [1.5, 0.75], points: 60, background: 0 };
+}
+
+pub(super) fn shift(x: f64, y: f64, z: f64) -> Transform {
+    exp(Vector3::zeros(), Vector3::new(x, y, z))
+}
+
+fn project(p: &Point3<f64>) -> [[f32; 2]; 2] {
+    let per_m = RIG.focal_px / p.z;
+    let (u, v) = (p.x * per_m + RIG.center_u_px, p.y * per_m + RIG.center_v_px);
+    [[u as f32, v as f32], [(u - RIG.focal_px * RIG.baseline_m / p.z) as f32, v as f32]]
+}
+
+/// A drive past boards, frame by frame.
+pub(super) struct Drive<'i, 's, 't> {
+    pub instances: &'i mut Instances<'s>,
+    pub estimator: &'i mut Estimator<'t>,
+    pub frame: u32,
+    pub t_world_camera: Transform,
+    /// Whether the camera's pose is known, and not a guess.
+    pub known: bool,
+    pub sink: Taken,
+    before: Vec<Option<Transform>>,
+}
+
+impl<'i, 's, 't> Drive<'i, 's, 't> {
+    pub fn new(instances: &'i mut Instances<'s>, estimator: &'i mut Estimator<'t>) -> Self {
+        Self {
+            instances,
+            estimator,
+            frame: 0,
+            t_world_camera: Transform::identity(),
+            known: true,
+            sink: Taken::default(),
+            before: Vec::new(),
+        }
+    }
+
+    /// Takes a frame: the camera at a place, each board at its (none: not seen).
+    pub fn step(&mut self, t_world_camera: Transform, boards: &[(&Board, Option<Transform>)]) -> InstancesReport {
+        self.step_behind(t_world_camera, boards, &[])
+    }
+
+    /// The same with boards in front of which no detector knows.
+    pub fn step_behind(
+        &mut self,
+        t_world_camera: Transform,
+        seen: &[(&Board, Option<Transform>)],
+        unseen: &[(&Board, Option<Transform>)],
+    ) -> InstancesReport {
+        let boards: Vec<_> = seen.iter().chain(unseen).copied().collect();
+        let t_current_previous = t_world_camera.inverse() * self.t_world_camera;
+        self.before.resize(boards.len(), None);
+        let (mut matches, mut disparity) = (Vec::new(), vec![0u16; WIDTH * HEIGHT]);
+        let mut owned: Vec<(Class, f32, PixelBox, Vec<u8>)> = Vec::new();
+        for (index, ((board, now), before)) in boards.iter().zip(&self.before).enumerate() {
+            let Some(now) = now else { continue };
+            let camera_board = t_world_camera.inverse() * now;
+            let [half_x, half_y] = board.half_m;
+            let corner = |x: f64, y: f64| project(&(camera_board * Point3::new(x, y, 0.0)))[0];
+            let ([l, t], [r, b]) = (corner(-half_x, -half_y), corner(half_x, half_y));
+            let pixels = PixelBox { left: l as i32, top: t as i32, width: (r - l) as i32, height: (b - t) as i32 };
+            let depth = camera_board.translation.vector.z;
+            for v in pixels.top.max(0)..(pixels.top + pixels.height).min(HEIGHT as i32) {
+                for u in pixels.left.max(0)..(pixels.left + pixels.width).min(WIDTH as i32) {
+                    disparity[v as usize * WIDTH + u as usize] = (RIG.focal_px * RIG.baseline_m / depth * 256.0) as u16;
+                }
+            }
+            if index < seen.len() {
+                owned.push((board.class, board.score, pixels, vec![1; pixels.area() as usize]));
+            }
+            let Some(before) = before else { continue };
+            let mut random = Random::new(9);
+            for n in 0..board.points {
+                let mut along = |half: f64| (f64::from(random.below(1001)) / 500.0 - 1.0) * half * 0.9;
+                // Not all in one plane.
+                let point = Point3::new(along(half_x), along(half_y), along(0.8));
+                let after = if n < board.background { before * point } else { now * point };
+                let [previous_left, previous_right] = project(&(self.t_world_camera.inverse() * before * point));
+                let [current_left, current_right] = project(&(t_world_camera.inverse() * after));
+                matches.push(Match { previous_left, previous_right, current_left, current_right });
+            }
+        }
+        let detections: Vec<_> = owned.iter().map(|(class, score, pixels, mask)| detection(*class, *score, pixels, mask)).collect();
+        let camera = CameraMotion {
+            t_world_camera,
+            t_current_previous: (self.frame > 0).then_some(t_current_previous),
+        };
+        self.instances.admit(self.frame, &detections, [WIDTH, HEIGHT]);
+        self.instances.claim(&matches, &[]);
+        self.instances.follow(&RIG, &Seen { refined: &matches, sparse: &[], images: None }, &camera, self.estimator);
+        let grey = vec![128u8; WIDTH * HEIGHT];
+        let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
+        let disparity = View::new(&disparity, WIDTH, HEIGHT).unwrap();
+        let shown = ObjectFrame { rig: &RIG, t_world_camera: &t_world_camera, picture, disparity_q8: disparity };
+        self.instances.reconstruct(self.known.then_some(&shown), &mut self.sink);
+        self.frame += 1;
+        self.t_world_camera = t_world_camera;
+        self.before = boards.iter().map(|(_, now)| *now).collect();
+        self.instances.report()
+    }
+
+    pub fn track(&self, id: u32) -> Option<TrackReport> {
+        self.instances.tracks().find(|track| track.id == id)
+    }
+}
+
+pub(super) fn detection<'a>(class: Class, score: f32, pixels: &PixelBox, mask: &'a [u8]) -> Detection<'a> {
+    let &PixelBox { left, top, width, height } = pixels;
+    Detection { class, score, left, top, width: width as u32, height: height as u32, mask }
+}
+
+/// Takes a frame of a camera that stands: detections and matches as they are given, and no depth.
+pub(super) fn take_frame(
+    instances: &mut Instances<'_>,
+    estimator: &mut Estimator<'_>,
+    frame: u32,
+    detections: &[Detection<'_>],
+    [refined, sparse]: [&[Match]; 2],
+) {
+    let camera = CameraMotion {
+        t_world_camera: Transform::identity(),
+        t_current_previous: (frame > 0).then(Transform::identity),
+    };
+    instances.admit(frame, detections, [WIDTH, HEIGHT]);
+    instances.claim(refined, sparse);
+    instances.follow(&RIG, &Seen { refined, sparse, images: None }, &camera, estimator);
+    let (grey, nothing) = (vec![128u8; WIDTH * HEIGHT], vec![0u16; WIDTH * HEIGHT]);
+    let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
+    let disparity_q8 = View::new(&nothing, WIDTH, HEIGHT).unwrap();
+    let shown = ObjectFrame { rig: &RIG, t_world_camera: &camera.t_world_camera, picture, disparity_q8 };
+    instances.reconstruct(Some(&shown), &mut NoSink);
+}
+
+/// No detection is too small.
+pub(super) fn any_size() -> InstancesConfig {
+    InstancesConfig { area_min_px: 0, ..InstancesConfig::default() }
+}
+
+/// The same where standing takes as long to confirm as moving: either is known in the fourth frame.
+pub(super) fn known_in_the_fourth_frame() -> InstancesConfig {
+    let state = StateConfig { standing_frames: 3, ..StateConfig::default() };
+    InstancesConfig { state, ..any_size() }
+}
+
+impl Objects<'_> {
+    /// Flips a bit of a voxel of the first object with a volume; its id.
+    pub(crate) fn flip_voxel(&mut self, voxel: usize, bit: u32) -> Option<u32> {
+        let object = self.volumes.objects.iter_mut().find(|object| object.summary.is_some())?;
+        let slot = (0..).find(|&slot| object.volume.pool().handle(slot).is_some())?;
+        object.volume.flip(slot, voxel, bit);
+        object.summary.map(|summary| summary.id)
+    }
+}

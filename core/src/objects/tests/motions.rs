@@ -1,0 +1,187 @@
+//! Motions over ground, and what is not one.
+
+use super::*;
+
+/// A car 10 m ahead that does 8 m/s to the camera's 5.
+fn ahead(frame: u32) -> [Transform; 2] {
+    let t = f64::from(frame) * 0.1;
+    [shift(0.0, 0.0, 5.0 * t), shift(1.0, 0.3, 10.0 + 8.0 * t)]
+}
+
+fn drive(board: &Board, frames: u32, place: impl Fn(u32) -> [Transform; 2]) -> Vec<TrackReport> {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        (0..frames)
+            .map(|frame| {
+                let [camera, car] = place(frame);
+                drive.step(camera, &[(board, Some(car))]);
+                drive.track(1).unwrap()
+            })
+            .collect()
+    })
+}
+
+#[test]
+fn a_moving_cars_motion_is_its_own_and_not_the_cameras() {
+    let tracks = drive(&Board::CAR, 8, ahead);
+    for track in &tracks[1..] {
+        assert!(track.measured);
+        let moved = track.motion_world * Point3::from(track.center_world_m);
+        let error = moved - Point3::from(track.center_world_m) - Vector3::new(0.0, 0.0, 0.8);
+        assert!(error.norm() < 0.02, "{error}");
+        assert!(track.motion_world.rotation.angle().to_degrees() < 0.3);
+    }
+    let states: Vec<State> = tracks.iter().map(|track| track.state).collect();
+    assert_eq!(states[..3], [State::Uncertain; 3]);
+    assert_eq!(states[3..], [State::Dynamic; 5]);
+    let at = tracks[7].t_world_object.unwrap().translation.vector - tracks[3].t_world_object.unwrap().translation.vector;
+    assert!((at - Vector3::new(0.0, 0.0, 3.2)).norm() < 0.05, "{at}");
+}
+
+#[test]
+fn a_parked_car_follows_the_camera_and_stays_where_it_is_in_the_world() {
+    let tracks = drive(&Board::CAR, 8, |frame| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)]);
+    assert_eq!(tracks[7].state, State::Static);
+    assert_eq!(tracks[7].motion_world, Transform::identity());
+    assert_eq!(tracks[7].t_world_object, tracks[0].t_world_object, "seen from the moving camera it moves, in the world it does not");
+}
+
+#[test]
+fn seventeen_matches_make_no_first_motion_and_eighteen_do() {
+    let measured = |points| drive(&Board { points, ..Board::CAR }, 2, ahead)[1].measured;
+    assert_eq!([measured(17), measured(18)], [false, true]);
+}
+
+#[test]
+fn two_fifths_of_background_under_the_mask_do_no_harm() {
+    let tracks = drive(&Board { background: 24, ..Board::CAR }, 6, ahead);
+    assert!((tracks[5].speed_m_s.unwrap()[0] - 8.0).abs() < 0.2, "{:?}", tracks[5].speed_m_s);
+    assert!(tracks[5].inliers <= 40);
+}
+
+#[test]
+fn a_match_counts_only_from_mask_to_mask() {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        let [camera, car] = ahead(0);
+        drive.step(camera, &[(&Board::CAR, Some(car))]);
+        let [camera, car] = ahead(1);
+        drive.step(camera, &[(&Board::CAR, Some(car))]);
+        let pixels = drive.track(1).unwrap().pixels;
+        let delete = pixels.scaled(1200);
+        let at = |u: i32, v: i32| Match { current_left: [u as f32, v as f32], ..Match::default() };
+        let (last, beyond) = (delete.left, delete.left - 1);
+        drive.instances.claim(&[at(last, pixels.top + 5), at(beyond, pixels.top + 5), at(pixels.left + 5, pixels.top + 5)], &[]);
+        assert_eq!(drive.instances.tracker.owner()[..3], [1, 0, 1]);
+        drive.instances.claim(&[Match { current_left: [f32::NAN, 5.0], ..Match::default() }], &[]);
+        assert_eq!(drive.instances.tracker.owner()[0], 0);
+    });
+}
+
+#[test]
+fn the_camera_listens_to_no_moving_car_and_to_no_large_one_of_unknown_state() {
+    let guides = |config: &InstancesConfig, frames: u32, place: &dyn Fn(u32) -> [Transform; 2], board: &Board| {
+        with(&CAPACITY, config, |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            for frame in 0..frames {
+                let [camera, car] = place(frame);
+                drive.step(camera, &[(board, Some(car))]);
+            }
+            let pixels = drive.track(1).unwrap().pixels;
+            let middle = [pixels.left + pixels.width / 2, pixels.top + pixels.height / 2].map(|px| px as f32);
+            drive.instances.claim(&[Match { current_left: middle, ..Match::default() }], &[]);
+            let guides = drive.instances.tracker.guides_camera([WIDTH, HEIGHT]);
+            guides(0)
+        })
+    };
+    let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)];
+    let config = any_size();
+    assert!(!guides(&config, 6, &ahead, &Board::CAR), "known to move");
+    assert!(guides(&config, 6, &parked, &Board::CAR), "known to stand");
+    let small = Board { half_m: [0.9, 0.5], ..Board::CAR };
+    assert!(guides(&config, 1, &ahead, &small), "unknown and small");
+    let large = Board { half_m: [2.5, 1.2], ..Board::CAR };
+    assert!(!guides(&config, 1, &ahead, &large), "unknown and large");
+}
+
+#[test]
+fn starting_and_stopping_show_within_five_frames() {
+    // Stands for eight frames, speeds up to 5 m/s within ten, then brakes to a stop within ten.
+    let speed = |frame: u32| match frame {
+        0..=8 => 0.0,
+        9..=18 => 0.5 * f64::from(frame - 8),
+        19..=28 => 5.0,
+        29..=38 => 0.5 * f64::from(38 - frame),
+        _ => 0.0,
+    };
+    let place =
+        |frame: u32| [shift(0.0, 0.0, 0.3 * f64::from(frame)), shift(1.0, 0.3, 10.0 + (0..=frame).map(|n| 0.1 * speed(n)).sum::<f64>())];
+    let states: Vec<State> = drive(&Board::CAR, 50, place).iter().map(|track| track.state).collect();
+    let is = |state, range: core::ops::Range<usize>| range.clone().all(|frame| states[frame] == state);
+    assert!(is(State::Static, 4..9) && is(State::Dynamic, 13..38) && is(State::Static, 43..50), "{states:?}");
+}
+
+#[test]
+fn silhouettes_belong_to_nobody() {
+    let mask = [1; 3600];
+    let boxes = [PixelBox { left: 40, top: 30, width: 60, height: 60 }, PixelBox { left: 100, top: 30, width: 60, height: 60 }];
+    with(&CAPACITY, &any_size(), |instances, _| {
+        let cars = boxes.map(|pixels| detection(Class::Car, 0.5, &pixels, &mask));
+        instances.admit(0, &cars, [WIDTH, HEIGHT]);
+        let at = |u: f32| Match { current_left: [u, 60.0], ..Match::default() };
+        instances.claim(&[at(90.0), at(97.0), at(102.0), at(110.0)], &[]);
+        assert_eq!(instances.tracker.owner()[1..3], [AMBIGUOUS; 2]);
+        assert_ne!(instances.tracker.owner()[0], instances.tracker.owner()[3]);
+        assert!(instances.tracker.owner()[0] != AMBIGUOUS && instances.tracker.owner()[3] != AMBIGUOUS);
+    });
+}
+
+/// A board too small to be reconstructed, and its camera.
+fn small_car(speed_m_s: f64) -> impl Fn(u32) -> [Transform; 2] {
+    move |frame| {
+        let t = f64::from(frame) * 0.1;
+        [shift(0.0, 0.0, 5.0 * t), shift(1.0, 0.3, 14.0 + speed_m_s * t)]
+    }
+}
+
+#[test]
+fn a_small_thing_is_nothing_until_its_motion_is_measured_and_left_in_the_static_map_until_it_moves() {
+    let config = InstancesConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..InstancesConfig::default() };
+    for (speed_m_s, state) in [(8.0, State::Dynamic), (0.0, State::Static)] {
+        with(&CAPACITY, &config, |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            for frame in 0..8 {
+                let [camera, car] = small_car(speed_m_s)(frame);
+                drive.step(camera, &[(&Board::CAR, Some(car))]);
+                assert_eq!(drive.track(1).is_some(), frame > 0, "frame {frame}");
+                let mut depth_m = vec![5.0; WIDTH * HEIGHT];
+                drive.instances.clear(&mut ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap());
+                let moves = drive.track(1).is_some_and(|track| track.state == State::Dynamic);
+                assert_eq!(depth_m.contains(&0.0), moves, "frame {frame}");
+            }
+            assert_eq!(drive.track(1).unwrap().state, state);
+            assert_eq!(drive.instances.objects().count(), 0, "never reconstructed");
+        });
+    }
+}
+
+#[test]
+fn a_few_matches_on_what_hides_a_car_do_not_outweigh_its_own() {
+    // A post much nearer than the car, in front of it, standing; its matches count the square of sixteen times as much each.
+    let board = Board { points: 40, ..Board::CAR };
+    let post = Board { half_m: [0.04, 0.1], points: 6, ..Board::CAR };
+    let speed = |with_post: bool| {
+        with(&CAPACITY, &any_size(), |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            for frame in 0..5 {
+                let t = f64::from(frame) * 0.1;
+                let (camera, car, stands) = (shift(0.0, 0.0, 2.0 * t), shift(0.3, 0.2, 28.0 + 8.0 * t), shift(0.04, 0.03, 4.0));
+                let posts = [(&post, Some(stands))];
+                drive.step_behind(camera, &[(&board, Some(car))], if with_post { &posts } else { &[] });
+            }
+            drive.track(1).unwrap().speed_m_s.unwrap()[0]
+        })
+    };
+    assert!((speed(false) - 8.0).abs() < 0.2, "{}", speed(false));
+    assert!((speed(true) - 8.0).abs() < 0.2, "{}", speed(true));
+}

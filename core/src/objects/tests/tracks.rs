@@ -1,0 +1,233 @@
+//! Who is who from frame to frame.
+
+use super::*;
+
+const MASK: [u8; 3600] = [1; 3600];
+
+fn car(left: i32) -> Detection<'static> {
+    detection(Class::Car, 0.9, &PixelBox { left, top: 30, width: 60, height: 60 }, &MASK)
+}
+
+fn take(instances: &mut Instances<'_>, frame: u32, detections: &[Detection<'_>]) -> Vec<u32> {
+    instances.admit(frame, detections, [WIDTH, HEIGHT]);
+    instances.tracker.settle();
+    instances.tracks().filter(|track| track.seen).map(|track| track.id).collect()
+}
+
+#[test]
+fn two_cars_that_pass_each_other_keep_their_numbers() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        for frame in 0..5 {
+            let step = 20 * frame as i32;
+            assert_eq!(take(instances, frame, &[car(20 + step), car(280 - step)]), [1, 2], "frame {frame}");
+        }
+        let lefts: Vec<i32> = instances.tracks().map(|track| track.pixels.left).collect();
+        assert_eq!(lefts, [100, 200]);
+    });
+}
+
+#[test]
+fn the_best_pair_goes_first_whoever_stands_first_in_the_list() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        take(instances, 0, &[car(100)]);
+        // The nearer one is the old one, though the other has the higher score and overlaps as well.
+        let other = Detection { score: 1.0, ..car(135) };
+        take(instances, 1, &[other, car(102)]);
+        let nearest = instances.tracks().find(|track| track.id == 1).unwrap();
+        // Its mask is cut by the other's, its box is not.
+        assert_eq!((nearest.pixels.left, nearest.sightings), (102, 2));
+    });
+}
+
+#[test]
+fn frames_missed_cost_a_half_then_three_quarters() {
+    // Overlap 2/3 at 12 px... of 60: (60 - 12) / (60 + 12); times 0.9, the scores' mean: 0.6.
+    let score = 48.0 / 72.0 * 0.9;
+    for (gap, discount) in [(1, 1.0), (2, 0.5), (3, 0.25), (9, 0.25)] {
+        for (margin, expected) in [(0.99, 1), (1.01, 2)] {
+            let config = InstancesConfig { association_min: score * discount * margin, ..any_size() };
+            with(&CAPACITY, &config, |instances, _| {
+                take(instances, 0, &[car(100)]);
+                assert_eq!(take(instances, gap, &[car(112)]), [expected], "gap {gap}");
+            });
+        }
+    }
+}
+
+#[test]
+fn a_car_may_be_called_a_truck_for_a_while_but_never_a_person() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        let called = |class| Detection { class, ..car(100) };
+        for (frame, class) in [Class::Car, Class::Car, Class::Truck, Class::Van, Class::Car].into_iter().enumerate() {
+            assert_eq!(take(instances, frame as u32, &[called(class)]), [1]);
+        }
+        assert_eq!(instances.tracks().next().unwrap().class, Class::Car);
+        assert_eq!(take(instances, 5, &[called(Class::Person)]), [2]);
+    });
+}
+
+#[test]
+fn a_track_unseen_for_more_than_fifty_frames_is_forgotten() {
+    for (gap, id) in [(50, 1), (51, 2)] {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            take(instances, 0, &[car(100)]);
+            for frame in 1..gap {
+                take(instances, frame, &[]);
+            }
+            assert_eq!(take(instances, gap, &[car(100)]), [id], "gap {gap}");
+            assert_eq!(instances.report().tracks.forgotten, id - 1);
+        });
+    }
+}
+
+#[test]
+fn a_full_table_lets_the_one_unseen_for_longest_go_and_nobody_seen_lately() {
+    with(&Capacity { tracks: 2, ..CAPACITY }, &any_size(), |instances, _| {
+        take(instances, 0, &[car(20)]);
+        take(instances, 1, &[car(120)]);
+        assert_eq!(take(instances, 2, &[car(220)]), [3]);
+        assert_eq!(instances.tracks().map(|track| track.id).collect::<Vec<_>>(), [2, 3], "1 went");
+        assert_eq!(instances.report().tracks.evicted, 1);
+        // 2 was seen one frame before 3 was: both may come back any moment.
+        assert_eq!(take(instances, 3, &[car(220), car(320)]), [3, 4]);
+        assert_eq!(take(instances, 4, &[car(20)]), [0; 0]);
+        assert_eq!(instances.report().tracks.refused, 1);
+    });
+}
+
+#[test]
+fn a_mask_that_stops_filling_its_box_still_overlaps_by_what_it_fills() {
+    // Two diagonal halves of one box: full overlap as boxes, almost none as masks.
+    let half = |upper: bool| -> Vec<u8> { (0..3600).map(|i| u8::from((i % 60 > i / 60) == upper)).collect() };
+    let (upper, lower) = (half(true), half(false));
+    for (overlap, id) in [(any_size().overlap, 2), (Overlap::Box, 1)] {
+        with(&CAPACITY, &InstancesConfig { overlap, ..any_size() }, |instances, _| {
+            take(instances, 0, &[Detection { mask: &upper, ..car(100) }]);
+            assert_eq!(take(instances, 1, &[Detection { mask: &lower, ..car(100) }]), [id]);
+        });
+    }
+}
+
+#[test]
+fn a_car_that_speeds_up_is_looked_for_where_it_goes() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        for (frame, left) in [(0, 20), (1, 40), (2, 80), (3, 130), (4, 180)] {
+            assert_eq!(take(instances, frame, &[car(left)]), [1], "{left} px: the last two steps are nearly the car's width");
+        }
+    });
+}
+
+#[test]
+fn a_movement_goes_on_over_a_gap_by_its_frames_up_to_four_of_them() {
+    let found = |gap: u32, left: i32| {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            take(instances, 0, &[car(20)]);
+            take(instances, 1, &[car(40)]);
+            take(instances, 1 + gap, &[car(left)]) == [1]
+        })
+    };
+    assert_eq!([found(3, 100), found(3, 60)], [true, false], "three times 20 px");
+    assert_eq!([found(9, 120), found(9, 220)], [true, false], "four times at most");
+}
+
+#[test]
+fn a_movement_over_a_gap_is_shared_among_its_frames() {
+    with(&CAPACITY, &InstancesConfig { association_min: 0.01, ..any_size() }, |instances, _| {
+        take(instances, 0, &[car(100)]);
+        assert_eq!(take(instances, 3, &[car(130)]), [1]);
+        assert_eq!(instances.tracker.all()[0].drift, [10, 0]);
+    });
+}
+
+#[test]
+fn of_equals_the_first_detection_and_the_older_track_are_joined_and_each_once() {
+    with(&CAPACITY, &any_size(), |instances, _| {
+        take(instances, 0, &[car(100)]);
+        // As near on either side.
+        assert_eq!(take(instances, 1, &[car(70), car(130)]), [1, 2]);
+        let lefts: Vec<i32> = instances.tracks().map(|track| track.pixels.left).collect();
+        assert_eq!(lefts, [70, 130]);
+    });
+    with(&CAPACITY, &any_size(), |instances, _| {
+        take(instances, 0, &[car(70), car(130)]);
+        assert_eq!(take(instances, 1, &[car(100)]), [1], "and not both of them");
+    });
+}
+
+#[test]
+fn a_class_holds_until_others_were_seen_more_often() {
+    let heard = |classes: &[Class]| {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            let hear = |(frame, class): (u32, &Class)| {
+                take(instances, frame, &[Detection { class: *class, ..car(100) }]);
+                instances.tracks().next().unwrap().class
+            };
+            (0..).zip(classes).map(hear).collect::<Vec<_>>()
+        })
+    };
+    use Class::{Car, Truck, Van};
+    assert_eq!(heard(&[Car, Car, Truck, Car, Van, Truck]), [Car, Car, Car, Car, Car, Truck]);
+    assert_eq!(heard(&[Truck, Car, Car]), [Truck, Car, Car]);
+}
+
+#[test]
+fn a_small_thing_that_grows_is_something_though_no_motion_was_measured() {
+    let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
+    let grown = detection(Class::Car, 0.9, &PixelBox { left: 98, top: 28, width: 16, height: 16 }, &MASK[..256]);
+    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+        assert_eq!([take(instances, 0, &[small]), take(instances, 1, &[grown])], [vec![], vec![1]]);
+    });
+}
+
+#[test]
+fn what_a_pixel_shows_is_the_best_thing_whose_mask_holds_it() {
+    with(&Capacity { tracks: 1, ..CAPACITY }, &any_size(), |instances, _| {
+        let half: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 < 30)).collect();
+        let walker = Detection { class: Class::Person, score: 0.5, ..car(100) };
+        take(instances, 0, &[walker, Detection { mask: &half, ..car(100) }]);
+        let shown = |u| instances.at(u, 50).map(|thing| (thing.class, thing.track));
+        assert_eq!([shown(110), shown(140), shown(99)], [Some((Class::Car, Some(1))), Some((Class::Person, None)), None]);
+    });
+}
+
+/// The box cleared of depth in a frame, and how many pixels of it.
+fn cleared(instances: &mut Instances<'_>, frame: u32, detections: &[Detection<'_>]) -> Option<(PixelBox, u32)> {
+    instances.admit(frame, detections, [WIDTH, HEIGHT]);
+    let mut depth = vec![5.0f32; WIDTH * HEIGHT];
+    instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+    instances.tracker.settle();
+    let pixels = || (0..).zip(&depth).filter(|(_, depth)| **depth == 0.0).map(|(at, _)| (at % WIDTH as i32, at / WIDTH as i32));
+    let (left, right) = (pixels().map(|(u, _)| u).min()?, pixels().map(|(u, _)| u).max()?);
+    let (top, bottom) = (pixels().map(|(_, v)| v).min()?, pixels().map(|(_, v)| v).max()?);
+    let pixels = PixelBox { left, top, width: right + 1 - left, height: bottom + 1 - top };
+    Some((pixels, instances.report().pixels_cleared))
+}
+
+#[test]
+fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_it_would_be() {
+    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+        take(instances, 0, &[car(100)]);
+        take(instances, 1, &[car(110)]);
+        for (frame, left) in [(2, 120), (3, 130), (4, 140)] {
+            let expected = PixelBox { left, top: 30, width: 60, height: 60 }.scaled(1200);
+            assert_eq!(cleared(instances, frame, &[]), Some((expected, 72 * 72)), "frame {frame}");
+        }
+        assert_eq!(cleared(instances, 5, &[]), None, "it may be anywhere");
+        let found = PixelBox { left: 150, top: 30, width: 60, height: 60 }.scaled(1200);
+        assert_eq!(cleared(instances, 6, &[car(150)]), Some((found, 72 * 72)), "found again: nowhere else");
+        assert_eq!(instances.tracks().next().map(|track| (track.id, track.seen)), Some((1, true)));
+    });
+}
+
+#[test]
+fn what_was_seen_once_and_never_again_is_not_kept_out_longer_nor_what_is_too_small() {
+    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+        take(instances, 0, &[car(100)]);
+        assert_eq!(cleared(instances, 1, &[]), None, "a ghost");
+    });
+    let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
+    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+        (0..3).for_each(|frame| drop(take(instances, frame, &[small])));
+        assert_eq!(cleared(instances, 3, &[]), None);
+    });
+}

@@ -1,0 +1,189 @@
+//! What gets into an object's volume, and what goes out of it.
+
+use super::*;
+use crate::volume::BlockCoord;
+
+const SMALL: Board = Board { half_m: [0.8, 0.5], ..Board::CAR };
+/// The same as a mask twice too wide shows it.
+const WIDE: Board = Board { half_m: [1.6, 0.5], ..Board::CAR };
+
+/// A volume's blocks, and the greatest weight of a voxel in it.
+fn content(instances: &Instances<'_>) -> (Vec<BlockCoord>, u8) {
+    let Some((_, object)) = instances.objects().next() else { return (Vec::new(), 0) };
+    let blocks = object.volume().blocks();
+    let slots = || (0..object.volume().pool().high_water() as u32).filter(|slot| object.volume().pool().handle(*slot).is_some());
+    let heaviest = slots().filter_map(|slot| blocks.weight(slot)?.iter().max().copied()).max();
+    (slots().filter_map(|slot| blocks.coord(slot)).collect(), heaviest.unwrap_or(0))
+}
+
+/// Shows a parked car, too wide in the frames `wide` says; the blocks after each frame and what the sink gets in the end.
+fn parked(frames: u32, z: f64, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize) {
+    with(&CAPACITY, &known_in_the_fourth_frame(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        let blocks = (0..frames)
+            .map(|frame| {
+                let board = if wide(frame) { &WIDE } else { &SMALL };
+                drive.step(Transform::identity(), &[(board, Some(shift(0.0, 0.0, z)))]);
+                content(drive.instances).0.len()
+            })
+            .collect();
+        drive.instances.finish(&mut drive.sink);
+        assert_eq!(drive.instances.objects.volumes.blocks(), 0, "what was handed over is empty");
+        (blocks, drive.sink.0[0].2)
+    })
+}
+
+#[test]
+fn what_was_seen_once_goes_at_every_fourth_fused_frame_and_before_the_object_leaves() {
+    // Known to stand in frame 3: the volume's first frame; the seventh is its fourth.
+    let (blocks, _) = parked(8, 15.0, |frame| frame == 5);
+    let (careful, _) = parked(8, 15.0, |_| false);
+    assert_eq!(blocks[..5], careful[..5]);
+    assert!(blocks[5] > blocks[4], "{blocks:?}");
+    assert_eq!(blocks[6], careful[6], "it was a mistake");
+    let (blocks, handed) = parked(9, 15.0, |frame| frame == 8);
+    let (careful, expected) = parked(9, 15.0, |_| false);
+    assert!(blocks[8] > careful[8]);
+    assert_eq!(handed, expected);
+}
+
+#[test]
+fn what_was_seen_once_from_near_stays() {
+    let (blocks, handed) = parked(8, 9.0, |frame| frame == 5);
+    let (careful, expected) = parked(8, 9.0, |_| false);
+    assert!(blocks[7] > careful[7] && handed > expected, "{blocks:?} {careful:?}");
+}
+
+#[test]
+fn of_an_object_seen_but_for_a_moment_everything_is_handed_over() {
+    let (blocks, handed) = parked(6, 15.0, |frame| frame == 5);
+    let (careful, expected) = parked(6, 15.0, |_| false);
+    assert!(blocks[5] > careful[5] && handed > expected, "{handed} and {expected} blocks");
+}
+
+#[test]
+fn each_crop_that_waited_is_fused_once() {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        for _ in 0..4 {
+            drive.step(Transform::identity(), &[(&SMALL, Some(shift(0.0, 0.0, 9.0)))]);
+        }
+        assert_eq!(
+            (content(drive.instances).1, drive.instances.objects.crops.len()),
+            (40, 0),
+            "three that waited and this frame's, each of weight 10"
+        );
+    });
+}
+
+#[test]
+fn a_volume_lies_where_the_thing_is() {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        for _ in 0..4 {
+            drive.step(Transform::identity(), &[(&SMALL, Some(shift(2.0, -0.6, 9.0)))]);
+        }
+        // 1.2 to 2.8 m to the right, -1.1 to -0.1 m down, 9 m ahead and 30 cm to either side; in blocks of 40 cm, the nearest lattice point's.
+        let blocks = content(drive.instances).0;
+        let range = |of: fn(&BlockCoord) -> i16| (blocks.iter().map(of).min().unwrap(), blocks.iter().map(of).max().unwrap());
+        assert_eq!((range(|at| at.x), range(|at| at.y), range(|at| at.z)), ((2, 7), (-3, -1), (21, 23)));
+    });
+}
+
+#[test]
+fn what_counts_as_standing_is_put_where_it_was_seen_in_the_world() {
+    // Whatever it does, it counts as standing.
+    let state = StateConfig { dynamic_m_s: 50.0, static_m_s: 50.0, slow_m_s: 50.0, ..StateConfig::default() };
+    with(&Capacity { object_blocks: 2000, ..CAPACITY }, &InstancesConfig { state, ..any_size() }, |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        for frame in 0..4 {
+            drive.step(Transform::identity(), &[(&SMALL, Some(shift(0.0, 0.0, 8.0 + 0.8 * f64::from(frame))))]);
+        }
+        assert_eq!(drive.track(1).unwrap().state, State::Static);
+        let mut layers: Vec<i16> = content(drive.instances).0.iter().map(|at| at.z).collect();
+        layers.sort_unstable();
+        layers.dedup();
+        assert_eq!(layers, (19..=26).collect::<Vec<_>>(), "four places 80 cm apart");
+    });
+}
+
+#[test]
+fn beyond_twenty_metres_nothing_is_fused() {
+    let blocks = |z: f64| {
+        with(&CAPACITY, &any_size(), |instances, estimator| {
+            let mut drive = Drive::new(instances, estimator);
+            for _ in 0..5 {
+                drive.step(Transform::identity(), &[(&Board::CAR, Some(shift(0.0, 0.0, z)))]);
+            }
+            assert_eq!(drive.instances.objects().count(), 1);
+            content(drive.instances).0.len()
+        })
+    };
+    assert!(blocks(18.0) > 0);
+    assert_eq!(blocks(22.0), 0);
+}
+
+#[test]
+fn a_post_before_a_car_is_no_part_of_it() {
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        let mut drive = Drive::new(instances, estimator);
+        let post = Board { half_m: [0.05, 0.2], points: 0, ..Board::CAR };
+        for _ in 0..5 {
+            drive.step_behind(Transform::identity(), &[(&Board::CAR, Some(shift(0.0, 0.0, 10.0)))], &[(&post, Some(shift(0.0, 0.0, 4.0)))]);
+        }
+        let nearest = content(drive.instances).0.iter().map(|at| at.z).min();
+        assert_eq!(nearest, Some(24), "9.6 m");
+    });
+}
+
+/// The columns that are left of a crop 60 px wide whose mask is its left 54, of a picture with these disparities, px, in each row.
+fn cropped(disparity_px: impl Fn(i32) -> f64) -> Vec<i32> {
+    let pixels = PixelBox { left: 20, top: 10, width: 60, height: 30 };
+    let mut words = vec![0; 1000];
+    let mut store = MaskStore::new(&mut words);
+    let place = store.take(pixels).unwrap();
+    (10..40).for_each(|v| store.enter_row(&place, v, 20, &[1; 54]));
+    let row: Vec<u16> = (0..WIDTH as i32).map(|u| (disparity_px(u - 20) * 256.0) as u16).collect();
+    let disparity = row.repeat(HEIGHT);
+    let mut crop = vec![7u16; pixels.area() as usize];
+    let kept = crop::cut(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &place, &mut crop);
+    let columns = |row: &[u16]| (0..60).filter(|&u| row[u as usize] > 0).collect::<Vec<i32>>();
+    let first = columns(&crop[..60]);
+    assert!(crop.chunks_exact(60).all(|row| columns(row) == first));
+    assert_eq!(kept, 30 * first.len() as u32);
+    first
+}
+
+#[test]
+fn a_crop_is_what_lies_under_the_mask_and_near_the_middle_depth() {
+    // Stripes at 10, 14, 16, 6, 4 and again 10 m, with nothing known between.
+    let depth_m = |u: i32| match u {
+        0..20 | 53..60 => 10.0,
+        24..28 => 14.0,
+        32..36 => 16.0,
+        40..44 => 6.0,
+        48..50 => 4.0,
+        _ => f64::INFINITY,
+    };
+    let expected: Vec<i32> = (0..20).chain(24..28).chain(40..44).chain([53]).collect();
+    assert_eq!(cropped(|u| 150.0 / depth_m(u)), expected);
+}
+
+#[test]
+fn what_the_matcher_lets_run_on_behind_an_edge_is_left_out_and_a_slope_is_not() {
+    // 1.6 px from surface to surface, then 1.4.
+    let step = |height_px: f64| cropped(|u| if (20..40).contains(&u) { 15.0 + height_px } else { 15.0 });
+    assert_eq!(step(1.6), (0..17).chain(20..40).chain(43..54).collect::<Vec<_>>());
+    assert_eq!(step(1.4), (0..54).collect::<Vec<_>>());
+    assert_eq!(cropped(|u| 14.0 + 0.3 * f64::from(u)), (0..54).collect::<Vec<_>>(), "the side of a car seen from behind");
+}
+
+#[test]
+fn a_thing_without_any_depth_leaves_nothing_to_wait_for() {
+    let mask = [1; 3600];
+    let car = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 60, height: 60 }, &mask);
+    with(&CAPACITY, &any_size(), |instances, estimator| {
+        take_frame(instances, estimator, 0, &[car], [&[], &[]]);
+        assert_eq!((instances.tracks().count(), instances.objects.crops.len()), (1, 0));
+    });
+}

@@ -1,0 +1,407 @@
+//! How fast a thing goes and turns, held over frames: an extended information filter over six rates.
+//!
+//! The state is the thing's velocity and turning over ground at its middle, in world axes. Between frames it may change by a random
+//! acceleration (constant-velocity model). A frame's matches enter by their reprojection errors, not by a motion computed from them alone:
+//! Gauss-Newton minimises `sum |error|² / noise² + |rate - predicted|²` (weighted by the inverse of the prediction's covariance), so what a
+//! frame does not determine, as the turning and the depth of a car far away, is taken from the frames before. The inverse of the matrix it
+//! solves is the covariance, from which the state machine knows how sure a speed is.
+//!
+//! A point that the camera's motion alone would put at `q` (in the current camera) is expected at `c + R(turn dt) (q - c) + velocity dt`,
+//! where c is the mean of all q. Errors of matches of one thing are not independent (one mask, one rectification): no more than
+//! `independent_matches` count.
+
+use super::config::MotionConfig;
+use crate::digest::Digest;
+use crate::geometry::{StereoRig, Transform, exp};
+use crate::snapshot::Archive;
+use bytemuck::{Pod, Zeroable};
+use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
+
+/// Gauss-Newton steps per frame; what is left after them is far below the noise.
+const STEPS: usize = 4;
+/// Square of the distance, in sigmas, from what was predicted beyond which a frame contradicts it: of six normal numbers one in 10^5 lies
+/// there.
+const CONTRADICTION: f64 = 34.0;
+/// Nearest depth at which a point can be seen, m.
+const DEPTH_MIN_M: f64 = 0.05;
+
+/// A point of a thing: where it would be in the current camera if the thing stood, and where it is seen, px from the principal point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sighting {
+    pub standing: Point3<f64>,
+    pub left: [f64; 2],
+    pub right: [f64; 2],
+}
+
+/// The filter. `rate` is turning (rad/s), then velocity (m/s), in world axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Filter {
+    rate: [f64; 6],
+    covariance: [[f64; 6]; 6],
+    center_world: [f64; 3],
+    /// Frames taken in; 0 before the first.
+    frames: u32,
+    /// Frames in a row that contradicted what was known.
+    contradictions: u32,
+}
+
+impl Filter {
+    /// Writes or reads all of it.
+    pub fn archive(&mut self, archive: &mut impl Archive) {
+        archive.f64s(&mut self.rate);
+        archive.f64s(self.covariance.as_flattened_mut());
+        archive.f64s(&mut self.center_world);
+        archive.u32(&mut self.frames);
+        archive.u32(&mut self.contradictions);
+    }
+
+    /// Takes all of it into a digest.
+    pub fn enter(&self, digest: &mut Digest) {
+        self.rate.iter().chain(self.covariance.as_flattened()).chain(&self.center_world).for_each(|&number| digest.f64(number));
+        digest.u64(u64::from(self.frames) << 32 | u64::from(self.contradictions));
+    }
+
+    /// Whether a motion has ever been seen.
+    pub fn is_known(&self) -> bool {
+        self.frames > 0
+    }
+
+    fn turn(&self) -> Vector3<f64> {
+        let [x, y, z, ..] = self.rate;
+        Vector3::new(x, y, z)
+    }
+
+    /// Velocity over ground, m/s.
+    pub fn velocity(&self) -> Vector3<f64> {
+        let [.., x, y, z] = self.rate;
+        Vector3::new(x, y, z)
+    }
+
+    /// Middle of the thing in the world, m.
+    pub fn center_world(&self) -> Point3<f64> {
+        Point3::from(self.center_world)
+    }
+
+    /// Speed over ground, its error along the direction of motion and its error in all directions together, m/s.
+    pub fn speed(&self) -> [f64; 3] {
+        let velocity = self.velocity();
+        let speed = libm::sqrt(velocity.dot(&velocity));
+        let covariance = Matrix6::from(self.covariance);
+        let part: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
+        // A thing at rest has no direction: the mean of all counts.
+        let variance = if speed > 1e-6 { velocity.dot(&(part * velocity)) / (speed * speed) } else { part.trace() / 3.0 };
+        [speed, libm::sqrt(variance), libm::sqrt(part.trace())]
+    }
+
+    /// The motion over ground within a frame: maps points of the thing in the world from where they were to where they are.
+    pub fn motion(&self, interval_s: f64) -> Transform {
+        let turn = exp(self.turn() * interval_s, Vector3::zeros());
+        let center = self.center_world().coords;
+        let shift = center + self.velocity() * interval_s - turn.rotation * center;
+        Transform::from_parts(shift.into(), turn.rotation)
+    }
+
+    /// Lets a frame pass: the rates may have changed. The velocity turns with the thing.
+    pub fn predict(&mut self, config: &MotionConfig, interval_s: f64) {
+        let square = |x: f32| f64::from(x) * f64::from(x);
+        if self.frames == 0 {
+            let [tilt, turn, speed] = [config.tilt_rad_s, config.turn_rad_s, config.speed_m_s].map(square);
+            self.rate = [0.0; 6];
+            self.covariance = Matrix6::from_diagonal(&Vector6::new(tilt, turn, tilt, speed, speed, speed)).into();
+            return;
+        }
+        let turned = exp(self.turn() * interval_s, Vector3::zeros()).rotation * self.velocity();
+        let [.., x, y, z] = &mut self.rate;
+        (*x, *y, *z) = (turned.x, turned.y, turned.z);
+        let [tilt, turn, speed] = [config.tilt_acceleration_rad_s2, config.turn_acceleration_rad_s2, config.acceleration_m_s2]
+            .map(|change| square(change) * interval_s * interval_s);
+        for (i, (row, growth)) in self.covariance.iter_mut().zip([tilt, turn, tilt, speed, speed, speed]).enumerate() {
+            if let Some(entry) = row.get_mut(i) {
+                *entry += growth;
+            }
+        }
+    }
+
+    /// Carries the middle along, for a frame that brought no motion.
+    pub fn coast(&mut self, interval_s: f64) {
+        self.center_world = (self.center_world() + self.velocity() * interval_s).coords.into();
+    }
+
+    /// Takes a frame in, after [`Filter::predict`]. `noise_px` is the error of one coordinate. Afterwards `center_world` is where the middle
+    /// was before the frame's motion. `false`, and the rates unchanged, when the sightings make no sense or contradict what is known: that is
+    /// believed only when the next frame contradicts it as well, and then all before is forgotten.
+    pub fn update(
+        &mut self,
+        config: &MotionConfig,
+        rig: &StereoRig,
+        t_world_camera: &Transform,
+        interval_s: f64,
+        noise_px: f64,
+        sightings: impl Iterator<Item = Sighting> + Clone,
+    ) -> bool {
+        if self.contradictions == 0 || self.frames == 0 {
+            return self.take(config, rig, t_world_camera, interval_s, noise_px, sightings);
+        }
+        let mut kept = Self { contradictions: 0, ..*self };
+        let mut anew = Self { contradictions: 0, frames: 0, ..*self };
+        anew.predict(config, interval_s);
+        let fits = kept.take(config, rig, t_world_camera, interval_s, noise_px, sightings.clone());
+        let taken = fits || anew.take(config, rig, t_world_camera, interval_s, noise_px, sightings);
+        *self = if fits {
+            kept
+        } else if taken {
+            anew
+        } else {
+            *self
+        };
+        taken
+    }
+
+    /// As [`Filter::update`], where nothing contradicted before.
+    fn take(
+        &mut self,
+        config: &MotionConfig,
+        rig: &StereoRig,
+        t_world_camera: &Transform,
+        interval_s: f64,
+        noise_px: f64,
+        sightings: impl Iterator<Item = Sighting> + Clone,
+    ) -> bool {
+        let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+        for sighting in sightings.clone() {
+            sum += sighting.standing.coords;
+            count += 1.0;
+        }
+        let Some(information) = Cholesky::new(Matrix6::from(self.covariance)).map(|factor| factor.inverse()) else { return false };
+        let center = sum / count;
+        // False for NaN as well.
+        if !(count >= 3.0 && center.iter().all(|x| x.is_finite())) {
+            return false;
+        }
+        let independent = f64::from(config.independent_matches);
+        let weight = (if count > independent { independent / count } else { 1.0 }) / (noise_px * noise_px);
+        let world_camera = t_world_camera.rotation.to_rotation_matrix();
+        let predicted = Vector6::from(self.rate);
+        let mut rate = predicted;
+        for step in 0..=STEPS {
+            let sums = Sums::over(sightings.clone(), rig, &center, &world_camera, interval_s, &rate);
+            let (matrix, vector) = sums.in_world(&world_camera, interval_s);
+            let Some(factor) = Cholesky::new(information + matrix * weight) else { return false };
+            if step == STEPS {
+                let covariance = factor.inverse();
+                if !(rate.iter().chain(covariance.iter()).all(|x| x.is_finite())) {
+                    return false;
+                }
+                let change = rate - predicted;
+                if self.frames > 0 && change.dot(&(information * change)) > CONTRADICTION {
+                    self.contradictions += 1;
+                    return false;
+                }
+                self.covariance = symmetric(&covariance).into();
+                break;
+            }
+            rate -= factor.solve(&(vector * weight + information * (rate - predicted)));
+        }
+        self.rate = rate.into();
+        self.center_world = (t_world_camera * Point3::from(center)).coords.into();
+        self.frames += 1;
+        true
+    }
+}
+
+fn symmetric(matrix: &Matrix6<f64>) -> Matrix6<f64> {
+    (matrix + matrix.transpose()) * 0.5
+}
+
+/// Weighted J'J and J'r of the reprojection errors, by a small turning and shift in camera axes.
+struct Sums {
+    matrix: [[f64; 6]; 6],
+    vector: [f64; 6],
+}
+
+impl Sums {
+    fn over(
+        sightings: impl Iterator<Item = Sighting>,
+        rig: &StereoRig,
+        center: &Vector3<f64>,
+        world_camera: &Rotation3<f64>,
+        interval_s: f64,
+        rate: &Vector6<f64>,
+    ) -> Self {
+        let turn = world_camera.inverse() * Vector3::new(rate.x, rate.y, rate.z) * interval_s;
+        let shift = world_camera.inverse() * Vector3::new(rate.w, rate.a, rate.b) * interval_s;
+        let turned = exp(turn, Vector3::zeros()).rotation.to_rotation_matrix();
+        let mut sums = Self { matrix: [[0.0; 6]; 6], vector: [0.0; 6] };
+        for sighting in sightings {
+            let arm = turned * (sighting.standing.coords - center);
+            sums.add(rig, &arm, &(center + arm + shift), &sighting);
+        }
+        sums
+    }
+
+    /// Adds a point at `at` in the camera, `arm` from the middle. One behind the camera adds nothing.
+    fn add(&mut self, rig: &StereoRig, arm: &Vector3<f64>, at: &Vector3<f64>, seen: &Sighting) {
+        let before_camera = at.z > DEPTH_MIN_M;
+        if !before_camera {
+            return;
+        }
+        let per_m = rig.focal_px / at.z;
+        let (u, v) = (per_m * at.x, per_m * at.y);
+        let right = u - rig.focal_baseline_px_m() / at.z;
+        // Slopes of a coordinate by the point (gx, gy, gz), and by the turning: arm x g.
+        let row = |g: [f64; 3]| {
+            let turn = arm.cross(&Vector3::from(g));
+            [turn.x, turn.y, turn.z, g[0], g[1], g[2]]
+        };
+        let down = row([0.0, per_m, -v / at.z]);
+        let rows = [
+            (row([per_m, 0.0, -u / at.z]), u - seen.left[0]),
+            (row([per_m, 0.0, -right / at.z]), right - seen.right[0]),
+            (down, v - seen.left[1]),
+            (down, v - seen.right[1]),
+        ];
+        for (row, error) in rows {
+            for ((line, sum), a) in self.matrix.iter_mut().zip(&mut self.vector).zip(row) {
+                *sum += a * error;
+                line.iter_mut().zip(row).for_each(|(entry, b)| *entry += a * b);
+            }
+        }
+    }
+
+    /// The same by rates in world axes.
+    fn in_world(&self, world_camera: &Rotation3<f64>, interval_s: f64) -> (Matrix6<f64>, Vector6<f64>) {
+        let mut turn = Matrix6::zeros();
+        turn.fixed_view_mut::<3, 3>(0, 0).copy_from(world_camera.matrix());
+        turn.fixed_view_mut::<3, 3>(3, 3).copy_from(world_camera.matrix());
+        let matrix = turn * Matrix6::from(self.matrix) * turn.transpose() * (interval_s * interval_s);
+        (symmetric(&matrix), turn * Vector6::from(self.vector) * interval_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::vec::Vec;
+
+    const RIG: StereoRig = StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
+    const INTERVAL_S: f64 = 0.1;
+
+    /// A number about 0 with a standard deviation of 1: the sum of twelve uniform ones.
+    fn normal(random: &mut Random) -> f64 {
+        (0..12).map(|_| f64::from(random.below(1 << 20)) / f64::from(1 << 20)).sum::<f64>() - 6.0
+    }
+
+    /// Points on a car's back, `depth_m` before the camera, that moved by `rate` and are seen with an error; those before as well.
+    fn frame(random: &mut Random, depth_m: f64, rate: [f64; 6], noise_px: f64) -> Vec<Sighting> {
+        let center = Vector3::new(1.0, 0.5, depth_m);
+        let turn = exp(Vector3::new(rate[0], rate[1], rate[2]) * INTERVAL_S, Vector3::zeros());
+        let project = |p: Vector3<f64>| {
+            let per_m = RIG.focal_px / p.z;
+            ([p.x * per_m, p.y * per_m], [(p.x - RIG.baseline_m) * per_m, p.y * per_m])
+        };
+        (0..60)
+            .map(|_| {
+                let [x, y, z] = [(); 3].map(|()| f64::from(random.below(1000)) / 1000.0 - 0.5);
+                let point = center + Vector3::new(1.8 * x, 1.4 * y, 1.0 * z);
+                let (before, before_right) = project(point);
+                let mut noise = || normal(random) * noise_px;
+                let disparity = before[0] + noise() - before_right[0] - noise();
+                let per_px = RIG.baseline_m / disparity;
+                let standing = Point3::new((before[0] + noise()) * per_px, (before[1] + noise()) * per_px, RIG.focal_px * per_px);
+                let moved = center + turn.rotation * (point - center) + Vector3::new(rate[3], rate[4], rate[5]) * INTERVAL_S;
+                let (left, right) = project(moved);
+                Sighting {
+                    standing,
+                    left: [left[0] + noise(), left[1] + noise()],
+                    right: [right[0] + noise(), right[1] + noise()],
+                }
+            })
+            .collect()
+    }
+
+    fn track(depth_m: f64, noise_px: f64, frames: usize, rate: impl Fn(usize) -> [f64; 6]) -> Vec<Filter> {
+        let mut random = Random::new(7);
+        let mut filter = Filter::default();
+        let config = MotionConfig::default();
+        (0..frames)
+            .map(|n| {
+                filter.predict(&config, INTERVAL_S);
+                let seen = frame(&mut random, depth_m, rate(n), noise_px);
+                let noise = if noise_px > 0.1 { noise_px * 1.5 } else { 0.1 };
+                assert!(filter.update(&config, &RIG, &Transform::identity(), INTERVAL_S, noise, seen.iter().copied()));
+                filter
+            })
+            .collect()
+    }
+
+    #[test]
+    fn exact_sightings_give_the_motion_at_once() {
+        let rate = [0.0, 0.3, 0.0, 2.0, 0.0, 9.0];
+        let filter = track(12.0, 0.0, 1, |_| rate)[0];
+        let error = (filter.velocity() - Vector3::new(2.0, 0.0, 9.0)).norm();
+        assert!(error < 0.1, "{error} m/s");
+        assert!((filter.turn() - Vector3::new(0.0, 0.3, 0.0)).norm() < 0.05, "{}", filter.turn());
+    }
+
+    #[test]
+    fn a_far_car_is_known_better_after_ten_frames_than_after_one_and_says_so() {
+        let filters = track(30.0, 0.3, 40, |_| [0.0, 0.0, 0.0, 0.0, 0.0, 8.0]);
+        let error = |filter: &Filter| (filter.velocity() - Vector3::new(0.0, 0.0, 8.0)).norm();
+        let late: f64 = filters[10..].iter().map(error).sum::<f64>() / 30.0;
+        assert!(late * INTERVAL_S < 0.05, "{late} m/s");
+        assert!(filters[20].speed()[1] < 0.7 * filters[0].speed()[1], "{:?} {:?}", filters[20].speed(), filters[0].speed());
+        let within = filters.iter().filter(|filter| error(filter) < 3.0 * filter.speed()[1]).count();
+        assert!(within >= 38, "the error is what it says to be: {within} of 40");
+    }
+
+    #[test]
+    fn a_car_that_brakes_is_followed() {
+        let filters = track(15.0, 0.3, 30, |n| [0.0, 0.0, 0.0, 0.0, 0.0, if n < 10 { 8.0 } else { 8.0 - 0.3 * (n - 10) as f64 }]);
+        let late = filters[29].speed();
+        assert!((late[0] - 2.3).abs() < 0.8, "{late:?}");
+    }
+
+    #[test]
+    fn one_contradicting_frame_is_not_believed_but_two_are() {
+        let still = [0.0; 6];
+        let fast = [0.0, 0.0, 0.0, 0.0, 0.0, 9.0];
+        let mut random = Random::new(3);
+        let config = MotionConfig::default();
+        let mut filter = Filter::default();
+        let mut take = |rate: [f64; 6]| {
+            filter.predict(&config, INTERVAL_S);
+            let seen = frame(&mut random, 12.0, rate, 0.3);
+            (filter.update(&config, &RIG, &Transform::identity(), INTERVAL_S, 0.4, seen.iter().copied()), filter.speed()[0])
+        };
+        for _ in 0..5 {
+            assert!(take(still).0);
+        }
+        let (taken, speed) = take(fast);
+        assert!(!taken && speed < 0.5, "{speed}");
+        assert!(take(still).0, "an outlier is forgotten");
+        assert!(!take(fast).0);
+        let (taken, speed) = take(fast);
+        assert!(taken && (speed - 9.0).abs() < 1.0, "{speed}");
+    }
+
+    #[test]
+    fn the_motion_turns_about_the_middle() {
+        let filter = track(10.0, 0.0, 1, |_| [0.0, 0.5, 0.0, 1.0, 0.0, 3.0])[0];
+        let center = filter.center_world();
+        let moved = filter.motion(INTERVAL_S) * center;
+        assert!((moved - center - filter.velocity() * INTERVAL_S).norm() < 1e-12);
+    }
+
+    #[test]
+    fn nonsense_is_refused_and_changes_nothing() {
+        let config = MotionConfig::default();
+        let mut filter = Filter::default();
+        filter.predict(&config, INTERVAL_S);
+        let before = filter;
+        let bad = [Sighting { standing: Point3::new(f64::NAN, 0.0, 10.0), left: [0.0; 2], right: [0.0; 2] }; 4];
+        assert!(!filter.update(&config, &RIG, &Transform::identity(), INTERVAL_S, 0.3, bad.iter().copied()));
+        assert_eq!(filter, before);
+    }
+}

@@ -1,0 +1,273 @@
+//! Uncertain, static, dynamic: what is known about whether a thing moves.
+//!
+//! A frame's motion has a speed, an error of it (one sigma) and a bias the cameras may add. It speaks for *dynamic* when the speed less the
+//! bias and `sigmas` times the error is above `dynamic_m_s`; for *static* when that is below `static_m_s` and the speed with `static_sigmas`
+//! times the error in all directions is below `slow_m_s`, of a thing known to move below `dynamic_m_s`; otherwise for neither. So a far car that may stand and
+//! is surely slower than somebody walking counts as standing, and one of which not even that can be said stays uncertain; but what was
+//! seen moving must be seen to have stopped. With `sigmas` 0, `confirm_frames` 1 and `slow_m_s` equal to `static_m_s` this is the published
+//! rule (Section III-D).
+//!
+//! ```text
+//!      standing_frames or confirm_frames agree         change_frames agree
+//! uncertain ----------------------> static or dynamic <-------------------> the other
+//!     ^                                    |
+//!     +------------------------------------+  no motion for more than static_frames or dynamic_frames frames
+//! ```
+//!
+//! A frame in which the thing is not seen is a frame without a motion. It neither confirms nor refutes: what the frames before spoke for
+//! still counts until the state is lost, or for as long with none.
+
+use super::config::StateConfig;
+use crate::digest::Digest;
+use crate::snapshot::Archive;
+use bytemuck::{Pod, Zeroable};
+
+/// What is known about a thing's motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(u8)]
+pub enum State {
+    /// It may move or not.
+    #[default]
+    Uncertain,
+    /// It stands.
+    Static,
+    /// It moves.
+    Dynamic,
+}
+
+impl State {
+    /// Name in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Uncertain => "uncertain",
+            Self::Static => "static",
+            Self::Dynamic => "dynamic",
+        }
+    }
+
+    /// The code, as tables keep it.
+    pub(crate) const fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// The state of a code; [`State::Uncertain`] for one there is none for.
+    pub(crate) fn from_code(code: u32) -> Self {
+        match code {
+            1 => Self::Static,
+            2 => Self::Dynamic,
+            _ => Self::Uncertain,
+        }
+    }
+}
+
+/// What a frame says about a thing's speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evidence {
+    /// Speed over ground, m/s.
+    pub speed_m_s: f32,
+    /// Its error along the direction of motion, one sigma, m/s.
+    pub sigma_m_s: f32,
+    /// Its error in all directions together, m/s: of what seems to stand the direction says nothing.
+    pub spread_m_s: f32,
+    /// By how much the cameras' own errors may make it too high, m/s: of a thing that stands they can make one that moves.
+    pub bias_m_s: f32,
+}
+
+impl Evidence {
+    /// The state it speaks for; `Uncertain` when it speaks for neither, or is not a number.
+    fn vote(&self, config: &StateConfig, state: State) -> State {
+        let least = self.speed_m_s - self.bias_m_s - config.sigmas * self.sigma_m_s;
+        let most = self.speed_m_s + config.static_sigmas * self.spread_m_s;
+        let slow_m_s = if state == State::Dynamic { config.dynamic_m_s } else { config.slow_m_s };
+        if least > config.dynamic_m_s {
+            State::Dynamic
+        } else if least < config.static_m_s && most < slow_m_s {
+            State::Static
+        } else {
+            State::Uncertain
+        }
+    }
+}
+
+/// The state of one track.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Judgement {
+    state: u32,
+    /// What the last frames spoke for, and how many in a row did.
+    vote: u32,
+    streak: u32,
+    /// Frames since there was a motion.
+    since_motion: u32,
+}
+
+impl Judgement {
+    pub fn state(&self) -> State {
+        State::from_code(self.state)
+    }
+
+    /// Writes or reads all of it.
+    pub fn archive(&mut self, archive: &mut impl Archive) {
+        let Self { state, vote, streak, since_motion } = self;
+        [state, vote, streak, since_motion].into_iter().for_each(|number| archive.u32(number));
+    }
+
+    /// Takes all of it into a digest.
+    pub fn enter(&self, digest: &mut Digest) {
+        [self.state, self.vote, self.streak, self.since_motion].iter().for_each(|&number| digest.u64(u64::from(number)));
+    }
+
+    /// Takes in a frame, seen or not, with a motion or without. Returns the new state.
+    pub fn advance(&mut self, config: &StateConfig, evidence: Option<Evidence>) -> State {
+        match evidence {
+            Some(evidence) => {
+                self.since_motion = 0;
+                let vote = evidence.vote(config, self.state());
+                self.streak = if vote as u32 == self.vote { self.streak.saturating_add(1) } else { 1 };
+                self.vote = vote as u32;
+                let needed = match (self.state(), vote) {
+                    (State::Uncertain, State::Static) => config.standing_frames,
+                    (State::Uncertain, _) => config.confirm_frames,
+                    _ => config.change_frames,
+                };
+                let vote = vote as u32;
+                if vote != State::Uncertain as u32 && self.streak >= u32::from(needed) {
+                    self.state = vote;
+                }
+            }
+            None => {
+                self.since_motion = self.since_motion.saturating_add(1);
+                let most = match self.state() {
+                    State::Static => config.static_frames,
+                    State::Dynamic | State::Uncertain => config.dynamic_frames,
+                };
+                if self.since_motion > u32::from(most) {
+                    (self.state, self.vote, self.streak) = (State::Uncertain as u32, 0, 0);
+                }
+            }
+        }
+        self.state()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{State::*, *};
+
+    /// The published thresholds at 10 Hz: 0.03 m and 0.55 m a frame, no error, no confirmation.
+    const PUBLISHED: StateConfig = StateConfig {
+        dynamic_m_s: 5.5,
+        static_m_s: 0.3,
+        slow_m_s: 0.3,
+        sigmas: 0.0,
+        static_sigmas: 0.0,
+        confirm_frames: 1,
+        standing_frames: 1,
+        change_frames: 2,
+        static_frames: 5,
+        dynamic_frames: 1,
+    };
+
+    fn seen(metres_per_frame: f32) -> Option<Evidence> {
+        Some(Evidence {
+            speed_m_s: metres_per_frame * 10.0,
+            sigma_m_s: 0.0,
+            spread_m_s: 0.0,
+            bias_m_s: 0.0,
+        })
+    }
+
+    fn states(config: &StateConfig, frames: &[Option<Evidence>]) -> std::vec::Vec<State> {
+        let mut judgement = Judgement::default();
+        frames.iter().map(|evidence| judgement.advance(config, *evidence)).collect()
+    }
+
+    #[test]
+    fn published_thresholds_decide_to_the_millimetre() {
+        assert_eq!(states(&PUBLISHED, &[seen(0.031), seen(0.549)]), [Uncertain, Uncertain]);
+        assert_eq!(states(&PUBLISHED, &[seen(0.031), seen(0.029)]), [Uncertain, Static]);
+        assert_eq!(states(&PUBLISHED, &[seen(0.549), seen(0.551)]), [Uncertain, Dynamic]);
+    }
+
+    #[test]
+    fn a_moving_object_outlives_one_frame_without_motion_and_a_standing_one_five() {
+        let gap = |first: f32, frames: usize| {
+            let mut script = std::vec![seen(first)];
+            script.resize(1 + frames, None);
+            *states(&PUBLISHED, &script).last().unwrap()
+        };
+        assert_eq!([1, 2].map(|frames| gap(0.6, frames)), [Dynamic, Uncertain]);
+        assert_eq!([1, 5, 6].map(|frames| gap(0.0, frames)), [Static, Static, Uncertain]);
+    }
+
+    #[test]
+    fn every_motion_starts_the_count_of_frames_without_one_anew() {
+        let script = [seen(0.6), None, seen(0.4), None, seen(0.4), None, None];
+        assert_eq!(states(&PUBLISHED, &script), [Dynamic, Dynamic, Dynamic, Dynamic, Dynamic, Dynamic, Uncertain]);
+    }
+
+    #[test]
+    fn between_the_thresholds_a_state_is_kept_and_none_is_won() {
+        let script = [seen(0.3), seen(0.3), seen(0.01), seen(0.3), seen(0.3), seen(0.3)];
+        assert_eq!(states(&PUBLISHED, &script), [Uncertain, Uncertain, Static, Static, Static, Static]);
+    }
+
+    #[test]
+    fn stopping_and_starting_need_two_frames_in_a_row() {
+        let script = [seen(1.0), seen(0.0), seen(1.0), seen(0.0), seen(0.0), seen(1.0), seen(0.0), seen(1.0), seen(1.0)];
+        assert_eq!(states(&PUBLISHED, &script), [Dynamic, Dynamic, Dynamic, Dynamic, Static, Static, Static, Static, Dynamic]);
+    }
+
+    #[test]
+    fn confirmation_is_counted_in_motions_in_a_row() {
+        let config = StateConfig { confirm_frames: 3, ..PUBLISHED };
+        let script = [seen(1.0), seen(1.0), seen(0.2), seen(1.0), seen(1.0), seen(1.0)];
+        let mut expected = [Uncertain; 6];
+        expected[5] = Dynamic;
+        assert_eq!(states(&config, &script), expected);
+    }
+
+    #[test]
+    fn standing_and_moving_are_confirmed_by_counts_of_their_own() {
+        let config = StateConfig { confirm_frames: 3, standing_frames: 2, ..PUBLISHED };
+        assert_eq!(states(&config, &[seen(0.0), seen(0.0)]), [Uncertain, Static]);
+        assert_eq!(states(&config, &[seen(1.0), seen(1.0), seen(1.0)]), [Uncertain, Uncertain, Dynamic]);
+        assert_eq!(states(&config, &[seen(0.0), seen(0.2), seen(0.0), seen(0.0)]), [Uncertain, Uncertain, Uncertain, Static]);
+    }
+
+    #[test]
+    fn a_frame_without_a_motion_does_not_undo_what_those_before_spoke_for_but_two_do() {
+        let config = StateConfig { confirm_frames: 3, ..PUBLISHED };
+        let last = |script: &[Option<Evidence>]| *states(&config, script).last().unwrap();
+        assert_eq!(last(&[seen(1.0), seen(1.0), None, seen(1.0)]), Dynamic);
+        assert_eq!(last(&[seen(1.0), seen(1.0), None, None, seen(1.0)]), Uncertain);
+        assert_eq!(last(&[seen(1.0), seen(1.0), None, None, seen(1.0), seen(1.0), seen(1.0)]), Dynamic);
+    }
+
+    #[test]
+    fn what_may_stand_and_is_slower_than_a_walker_stands_but_what_moved_must_be_seen_to_stop() {
+        let config = StateConfig {
+            confirm_frames: 1,
+            standing_frames: 1,
+            change_frames: 1,
+            ..StateConfig::default()
+        };
+        let far = |speed_m_s| Some(Evidence { speed_m_s, sigma_m_s: 0.5, spread_m_s: 0.5, bias_m_s: 0.0 });
+        assert_eq!(states(&config, &[far(0.6)]), [Static]);
+        assert_eq!(states(&config, &[far(0.8)]), [Uncertain], "it may be walking");
+        assert_eq!(states(&config, &[seen(1.0), far(0.6), far(0.05)]), [Dynamic, Dynamic, Static]);
+    }
+
+    #[test]
+    fn a_noisy_motion_proves_nothing() {
+        let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, slow_m_s: 5.5, ..PUBLISHED };
+        let vote = |speed_m_s, sigma_m_s| Evidence { speed_m_s, sigma_m_s, spread_m_s: sigma_m_s, bias_m_s: 0.0 }.vote(&config, Uncertain);
+        assert_eq!([vote(8.0, 1.0), vote(8.0, 1.5)], [Dynamic, Uncertain]);
+        // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give or take 2 nothing can be told.
+        assert_eq!([vote(2.0, 1.5), vote(2.0, 2.0), vote(2.0, 0.5)], [Static, Uncertain, Uncertain]);
+        let biased = |bias_m_s| Evidence { speed_m_s: 8.0, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s }.vote(&config, Uncertain);
+        assert_eq!([biased(2.0), biased(3.0)], [Dynamic, Uncertain], "nor does one the lens could make");
+        assert_eq!([vote(f32::NAN, 0.0), vote(0.0, f32::INFINITY)], [Uncertain, Uncertain]);
+    }
+}
