@@ -1,6 +1,6 @@
 //! Shared ground of the integration tests: a slab for a mapper, and clips of the synthetic street.
 
-use dynvox::segmentation::Sighting;
+use dynvox::input::InstanceMask;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::{Capacity, Config, Mapper, StereoFrame, image::View, masks::PixelBox, memory::SLAB_ALIGN, tracking::Class};
 
@@ -55,12 +55,12 @@ impl Clip {
     }
 
     /// What a detector without faults would see in each frame.
-    pub fn sightings(&self) -> Vec<Vec<Sighting>> {
+    pub fn sightings(&self) -> Vec<Vec<InstanceMask>> {
         let of = |frame: &SynthFrame| {
             let whole = PixelBox { left: 0, top: 0, width: frame.width as i32, height: frame.height as i32 };
             let holds = |car: usize, u: i32, v: i32| usize::from(frame.instances[v as usize * frame.width + u as usize]) == car + 1;
             let cars = frame.objects.iter().enumerate();
-            cars.filter_map(|(car, _)| Sighting::drawn(Class::Car, 0.9, whole, |u, v| holds(car, u, v))).collect()
+            cars.filter_map(|(car, _)| InstanceMask::from_predicate(Class::Car, 0.9, whole, |u, v| holds(car, u, v))).collect()
         };
         self.frames.iter().map(of).collect()
     }

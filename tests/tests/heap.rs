@@ -1,7 +1,7 @@
 //! P1: after construction the core never asks for memory.
 #![expect(unsafe_code, reason = "a global allocator cannot be written without")]
 
-use dynvox::segmentation::Sighting;
+use dynvox::input::InstanceMask;
 use dynvox_core::{Capacity, Serial, StereoFrame, objects::NoSink, volume::NoStore};
 use dynvox_tests::Clip;
 use std::{
@@ -67,7 +67,7 @@ fn a_hundred_steps_a_look_and_a_mesh_make_no_heap_call() {
 fn detections_objects_and_a_look_at_them_make_no_heap_call() {
     let clip = Clip::street(480, 144, 24);
     let sightings = clip.sightings();
-    let detections: Vec<Vec<_>> = sightings.iter().map(|seen| seen.iter().map(Sighting::detection).collect()).collect();
+    let detections: Vec<Vec<_>> = sightings.iter().map(|seen| seen.iter().map(InstanceMask::detection).collect()).collect();
     let (calls, objects, shown, handed) = clip.with_mapper(&Capacity::SMALL, |mapper| {
         let before = calls();
         let (mut objects, mut shown) = (0, 0);

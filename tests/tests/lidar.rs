@@ -1,8 +1,9 @@
 //! A map made of exact depth and poses passes the evaluation; one that is off by a known disparity loses what it must.
 #![allow(missing_docs)]
 
-use dynvox::dataset::{Image, LidarScan};
 use dynvox::evaluate::lidar::{Aim, Awaited, EvaluatedFrame, Field, Layer, LidarFigures, Rule, aim, aim_at_exact};
+use dynvox::formats::Image;
+use dynvox::input::LidarScan;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame};

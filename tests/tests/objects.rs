@@ -1,7 +1,7 @@
 //! What moves stays out of the static map, is followed and reconstructed apart; shown on the synthetic street with exact masks.
 
-use dynvox::dataset::TrueObject;
 use dynvox::evaluate::surfaces::{SeenSide, TrueView};
+use dynvox::input::TrueObject;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::{
     Capacity, Config, Mapper, Report, Serial, StereoFrame,

@@ -1,7 +1,7 @@
 //! P1: making a mapper, a step on one thread, saving and restoring each stay within 32 KiB of stack, measured by painting it.
 #![expect(unsafe_code, reason = "the stack below a frame can only be written to through a pointer")]
 
-use dynvox::segmentation::Sighting;
+use dynvox::input::InstanceMask;
 use dynvox_core::{Capacity, Mapper, Serial, StereoFrame};
 use dynvox_tests::{Clip, HeapSlab};
 use std::{convert::Infallible, hint::black_box, thread};
@@ -54,7 +54,7 @@ fn making_a_mapper_a_step_saving_and_restoring_stay_within_32_kib_of_stack() {
         let mapper = made.as_mut().expect("a slab that fits");
         let mut step = 0;
         for (frame, seen) in clip.stereo().zip(clip.sightings()) {
-            let detections: Vec<_> = seen.iter().map(Sighting::detection).collect();
+            let detections: Vec<_> = seen.iter().map(InstanceMask::detection).collect();
             let (report, bytes) = painted(|| mapper.step(&StereoFrame { detections: &detections, ..frame }, &Serial));
             assert!(report.is_ok());
             step = step.max(bytes);

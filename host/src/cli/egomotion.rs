@@ -1,7 +1,7 @@
 //! `--egomotion`.
 
 use super::settings::Settings;
-use crate::dataset::{self, Dataset, DatasetError};
+use crate::input::{self, FrameSource, InputError};
 use dynvox_core::geometry::Transform;
 use dynvox_core::mapper::MotionSource;
 use std::path::PathBuf;
@@ -33,11 +33,16 @@ impl FromStr for EgomotionChoice {
 
 impl EgomotionChoice {
     /// Says it to the settings, and reads the poses of the chosen frames where they come from a file.
-    pub fn apply(&self, settings: &mut Settings, dataset: &dyn Dataset, indices: &[usize]) -> Result<Option<Vec<Transform>>, DatasetError> {
+    pub fn apply(
+        &self,
+        settings: &mut Settings,
+        dataset: &dyn FrameSource,
+        indices: &[usize],
+    ) -> Result<Option<Vec<Transform>>, InputError> {
         match self {
             Self::Stereo => settings.set_motion_source(MotionSource::Stereo),
             Self::Icp => settings.set_motion_source(MotionSource::Icp),
-            Self::File(path) => return dataset::read_given_poses(path, dataset, indices).map(Some),
+            Self::File(path) => return input::read_given_poses(path, dataset, indices).map(Some),
         }
         Ok(None)
     }

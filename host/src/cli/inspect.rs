@@ -1,7 +1,7 @@
 //! `dynvox inspect`.
 
-use crate::dataset::{self, Dataset, DatasetError, Found, Kind, Masks};
 use crate::evaluate::stereo::{StereoSetError, find_stereo_set};
+use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -10,13 +10,13 @@ pub struct InspectArgs {
     path: PathBuf,
     /// Layout of the data set; guessed from the path unless given
     #[arg(long, value_enum)]
-    dataset: Option<Kind>,
+    dataset: Option<Layout>,
 }
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
-    let (kind, found) = match dataset::survey(&args.path, args.dataset) {
+    let (kind, found) = match input::survey(&args.path, args.dataset) {
         // What cannot be mapped may be good for something else.
-        Err(error @ DatasetError::Layout { .. }) => return other(&args.path).unwrap_or(Err(error.into())),
+        Err(error @ InputError::Layout { .. }) => return other(&args.path).unwrap_or(Err(error.into())),
         survey => survey?,
     };
     println!("{}: {} ({} sequence{})", args.path.display(), kind.name(), found.len(), if found.len() == 1 { "" } else { "s" });
@@ -61,7 +61,7 @@ fn command(path: &Path, found: &Found) -> String {
     format!("dynvox run {}{sequence}", path.display())
 }
 
-fn describe(dataset: &dyn Dataset, command: &str) {
+fn describe(dataset: &dyn FrameSource, command: &str) {
     let ((width, height), rig) = (dataset.size(), dataset.rig());
     let last = dataset.len().saturating_sub(1);
     let seconds = dataset.time_s(last) - dataset.time_s(0);
@@ -104,9 +104,9 @@ fn describe(dataset: &dyn Dataset, command: &str) {
     println!("  map it: {command}{}", if evaluate { " --evaluate lidar" } else { "" });
 }
 
-fn masks(dataset: &dyn Dataset) -> String {
+fn masks(dataset: &dyn FrameSource) -> String {
     match dataset.masks() {
-        Masks::Folder(folder) => {
+        AvailableMasks::Folder(folder) => {
             let has = |index: &usize| dataset.stem(*index).is_some_and(|stem| folder.join(format!("{stem}.png")).is_file());
             let there = (0..dataset.len()).filter(has).count();
             match there {
@@ -115,13 +115,13 @@ fn masks(dataset: &dyn Dataset) -> String {
                 there => format!("masks in {} for {there} of {} frames: in the others nothing is seen", folder.display(), dataset.len()),
             }
         }
-        Masks::Exact => "exact masks: what moves is kept apart".to_owned(),
-        Masks::Absent => "no masks: cars go into the static map, unless --instances names some".to_owned(),
+        AvailableMasks::Exact => "exact masks: what moves is kept apart".to_owned(),
+        AvailableMasks::Absent => "no masks: cars go into the static map, unless --instances names some".to_owned(),
     }
 }
 
 /// Says whether there are scans; whether input and map can be held against them.
-fn lidar(dataset: &dyn Dataset) -> bool {
+fn lidar(dataset: &dyn FrameSource) -> bool {
     let scans: Vec<usize> = (0..dataset.len()).filter(|&index| dataset.has_lidar(index)).collect();
     let Some(&first) = scans.first() else {
         println!("  no LiDAR scans (velodyne/): accuracy and completeness stay unknown");

@@ -4,14 +4,14 @@ mod resume;
 
 use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
-use crate::dataset::{self, Dataset, Images, Kind, Scaled};
-use crate::depth::{self, DepthChoice};
 use crate::evaluate::objects::Medians;
-use crate::export;
+use crate::formats;
+use crate::input::depth::{self, DepthChoice};
+use crate::input::masks::{self, MaskChoice};
+use crate::input::{self, CameraPair, FrameSource, Layout, Scaled};
 use crate::observe::Reference;
 use crate::report::{self, Summary};
 use crate::run::{self, FolderError, HOST_OVERHEAD_BYTES, Plan, RunError, RunFolder, RunRecord, Stopped, Streaming};
-use crate::segmentation::{self, Choice};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -28,10 +28,10 @@ pub struct RunArgs {
     sequence: Option<String>,
     /// Layout of the data set; guessed from the path unless given
     #[arg(long, value_enum)]
-    dataset: Option<Kind>,
+    dataset: Option<Layout>,
     /// Camera pair of KITTI odometry
     #[arg(long, value_enum, default_value_t)]
-    images: Images,
+    images: CameraPair,
     /// Byte budget: tiny, small, onboard or desktop
     #[arg(long, default_value = "onboard", value_name = "NAME")]
     profile: String,
@@ -57,7 +57,7 @@ pub struct RunArgs {
     /// Where masks of what could move come from: auto, none, files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or
     /// noisy[:SEED] (the synthetic street)
     #[arg(long, default_value = "auto", value_name = "SOURCE")]
-    instances: Choice,
+    instances: MaskChoice,
     /// Whether what moves is kept out of the static map and reconstructed apart; off fuses everything into one map [default: on]
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     dynamic: Option<bool>,
@@ -139,9 +139,9 @@ impl RunArgs {
         self.quiet || self.json
     }
 
-    fn open(&self, settings: &Settings) -> anyhow::Result<Box<dyn Dataset>> {
-        let dataset: Box<dyn Dataset> = match &self.path {
-            Some(path) => dataset::open(path, self.dataset, self.sequence.as_deref(), self.images)?,
+    fn open(&self, settings: &Settings) -> anyhow::Result<Box<dyn FrameSource>> {
+        let dataset: Box<dyn FrameSource> = match &self.path {
+            Some(path) => input::open(path, self.dataset, self.sequence.as_deref(), self.images)?,
             None if self.dataset.is_some() || self.sequence.is_some() => {
                 bail!("--dataset and --sequence need a data set. Give its path: `dynvox run PATH`")
             }
@@ -149,7 +149,7 @@ impl RunArgs {
         };
         let dataset = depth::attach(dataset, &self.depth)?;
         let dataset = if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) };
-        Ok(segmentation::attach(dataset, &self.instances)?)
+        Ok(masks::attach(dataset, &self.instances)?)
     }
 }
 
@@ -262,8 +262,8 @@ fn write(folder: &RunFolder, run: &RunRecord, summary: &Summary) -> Result<(), F
     let poses = run.poses();
     let times: Vec<f64> = run.rows.iter().map(|row| row.time_s).collect();
     folder.write("config.toml", |out| std::io::Write::write_all(out, run.config_toml.as_bytes()))?;
-    folder.write("trajectory_kitti.txt", |out| export::write_kitti(out, &poses))?;
-    folder.write("trajectory_tum.txt", |out| export::write_tum(out, &times, &poses))?;
+    folder.write("trajectory_kitti.txt", |out| formats::write_kitti(out, &poses))?;
+    folder.write("trajectory_tum.txt", |out| formats::write_tum(out, &times, &poses))?;
     folder.write("frames.csv", |out| report::write_frames(out, &run.rows))?;
     folder.write("tracks.csv", |out| report::write_tracks(out, &run.rows))?;
     if !run.objects.judged.is_empty() {

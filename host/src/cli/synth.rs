@@ -1,7 +1,7 @@
 //! `dynvox synth`, and the synthetic street as a data set.
 
 use super::settings::Settings;
-use crate::dataset::{Dataset, DatasetError, StreetFrames};
+use crate::input::{FrameSource, InputError, StreetFrames};
 use crate::synth::{Street, write_kitti};
 use std::path::PathBuf;
 
@@ -22,14 +22,14 @@ pub struct SynthArgs {
 }
 
 /// The street as a data set.
-pub fn street(settings: &Settings) -> anyhow::Result<Box<dyn Dataset>> {
+pub fn street(settings: &Settings) -> anyhow::Result<Box<dyn FrameSource>> {
     Ok(Box::new(StreetFrames::new(settings.street())?))
 }
 
 pub fn run(args: &SynthArgs) -> anyhow::Result<()> {
     let mut config = Settings::resolve(args.config.as_deref(), &args.set)?.street();
     config.frames = args.frames.unwrap_or(config.frames);
-    let street = Street::new(config).map_err(|error| DatasetError::Street { reason: error.to_string() })?;
+    let street = Street::new(config).map_err(|error| InputError::Street { reason: error.to_string() })?;
     let bar = indicatif::ProgressBar::new(u64::from(street.config().frames));
     let written = write_kitti(&street, &args.out, |done, _| bar.set_position(u64::from(done)));
     bar.finish_and_clear();

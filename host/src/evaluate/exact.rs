@@ -1,6 +1,6 @@
 //! The map against a renderer's exact depth: how far off what it shows is, and how much it shows.
 
-use crate::dataset::ExactFrame;
+use crate::input::ExactFrame;
 use dynvox_core::image::View;
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +95,7 @@ fn median_bin(bins: &[u64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Image;
+    use crate::formats::Image;
 
     #[test]
     fn counts_static_near_pixels_alone() {

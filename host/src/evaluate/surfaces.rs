@@ -6,7 +6,7 @@
 //! thing's frame by where the object was in the frame in which the thing was nearest, and most of it is made: drift of the object's pose
 //! shows as distance.
 
-use crate::dataset::TrueObject;
+use crate::input::TrueObject;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::View;
 use dynvox_core::view::Triangle;

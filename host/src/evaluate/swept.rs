@@ -2,7 +2,7 @@
 //!
 //! A box is taken smaller than the thing: the ground below it and what it touches belong to the map.
 
-use crate::dataset::TrueObject;
+use crate::input::TrueObject;
 use dynvox_core::geometry::Transform;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -108,7 +108,7 @@ impl Swept {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::PlyWriter;
+    use crate::formats::PlyWriter;
     use dynvox_core::masks::PixelBox;
 
     #[test]

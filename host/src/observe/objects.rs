@@ -2,13 +2,13 @@
 
 use super::retired::{Kept, KeptObject};
 use super::tracks::{TrackRecord, TrackRow, track_records};
-use crate::dataset::StereoImages;
 use crate::evaluate::objects::{Judged, ObjectErrors, ObjectFigures};
 use crate::evaluate::surfaces::TrueView;
 use crate::evaluate::swept::Swept;
+use crate::input::MaskRefusals;
+use crate::input::StereoImages;
 use crate::run::FolderError;
 use crate::run::FrameRow;
-use crate::segmentation::Refusals;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::{DetectionCount, TrackReport};
 use dynvox_core::{Config, Mapper, Report};
@@ -29,7 +29,7 @@ pub struct ObjectsRecord {
     /// Triangles of the static map where something drove; known where the truth is exact.
     pub swept_triangles: Option<u64>,
     /// What the source of masks said and could not be used.
-    pub refusals: Refusals,
+    pub refusals: MaskRefusals,
     /// What became of the detections.
     pub detections: DetectionCount,
 }
@@ -79,7 +79,7 @@ impl ObjectsAtWork {
 
     /// Sums up. Call it when the mapper has handed over its last object.
     pub fn finish(&mut self, rows: &[FrameRow]) -> ObjectsRecord {
-        let mut refusals = Refusals::default();
+        let mut refusals = MaskRefusals::default();
         rows.iter().for_each(|row| refusals.add(&row.refusals));
         ObjectsRecord {
             tracks: track_records(rows, &self.errors.tracks()),

@@ -1,9 +1,9 @@
 //! The evaluation against LiDAR beside a run: points are settled while their frame is there, the map is looked at when the frame is due.
 
 use super::pictures;
-use crate::dataset::{Dataset, DatasetError, StereoImages};
 use crate::evaluate::lidar::{Aim, Awaited, Delay, EvaluatedFrame, Field, Layer, LidarFigures, aim, aim_at_exact};
-use crate::segmentation::Sighting;
+use crate::input::InstanceMask;
+use crate::input::{FrameSource, InputError, StereoImages};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::masks::PixelBox;
@@ -73,7 +73,7 @@ pub struct LidarAtWork {
 }
 
 /// Positions among `indices` whose frames can be evaluated within the run.
-pub fn evaluable(dataset: &dyn Dataset, indices: &[usize], reference: Reference, delay: usize) -> Vec<usize> {
+pub fn evaluable(dataset: &dyn FrameSource, indices: &[usize], reference: Reference, delay: usize) -> Vec<usize> {
     let in_time = indices.len().saturating_sub(delay);
     let has = |&at: &usize| match reference {
         Reference::Lidar => indices.get(at).is_some_and(|&index| dataset.has_lidar(index)),
@@ -119,8 +119,8 @@ impl LidarAtWork {
         index: usize,
         images: &StereoImages,
         mapper: &Mapper<'_>,
-        (dataset, t_world_camera): (&dyn Dataset, &Transform),
-    ) -> Result<Option<Awaited>, DatasetError> {
+        (dataset, t_world_camera): (&dyn FrameSource, &Transform),
+    ) -> Result<Option<Awaited>, InputError> {
         let aim = match self.reference {
             Reference::Lidar => dataset.lidar(index)?.map(|scan| aim(&scan, &self.field)),
             Reference::Exact => images.exact.as_ref().map(|exact| aim_at_exact(&exact.depth_m, &self.rig, &self.field)),
@@ -141,7 +141,7 @@ impl LidarAtWork {
             if depth_m >= self.field.near_m && depth_m <= self.field.far_m { px } else { 0.0 }
         };
         let layer = |u: i32, v: i32| {
-            let thing = if self.instances.dynamic { mapper.thing_at(u, v) } else { self.masked(&images.sightings.all, u, v) };
+            let thing = if self.instances.dynamic { mapper.thing_at(u, v) } else { self.masked(&images.masks.instances, u, v) };
             Layer::of(thing.as_ref())
         };
         Awaited::settle(index, *t_world_camera, aim, input_px, layer)
@@ -149,14 +149,14 @@ impl LidarAtWork {
 
     /// What a pixel shows where nothing is tracked: what could move is then of unknown motion, so that maps with and without it are held against
     /// the same points of the street.
-    fn masked(&self, sightings: &[Sighting], u: i32, v: i32) -> Option<ThingAt> {
+    fn masked(&self, sightings: &[InstanceMask], u: i32, v: i32) -> Option<ThingAt> {
         let image = PixelBox {
             left: 0,
             top: 0,
             width: self.field.width as i32,
             height: self.field.height as i32,
         };
-        let taken = |one: &&Sighting| {
+        let taken = |one: &&InstanceMask| {
             one.contains(u, v)
                 && one.class.treatment() != Treatment::Ignore
                 && one.score >= self.instances.score_min

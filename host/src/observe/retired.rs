@@ -4,7 +4,7 @@
 use super::thumbnail::portrait;
 use super::volume_copy::VolumeCopy;
 use crate::evaluate::surfaces::{SeenSide, SurfaceFigures};
-use crate::export::{PlyWriter, write_numbered};
+use crate::formats::{PlyWriter, write_numbered};
 use crate::run::{FolderError, RunFolder};
 use dynvox_core::geometry::Transform;
 use dynvox_core::objects::{ObjectSink, ObjectSummary, RetiredObject};

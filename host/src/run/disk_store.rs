@@ -2,7 +2,7 @@
 
 use super::store::{self, BlockFile, Position, StoreError};
 use super::{FolderError, RunFolder};
-use crate::export::{Mesh, PlyWriter};
+use crate::formats::{Mesh, PlyWriter};
 use dynvox_core::view::Triangle;
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictionReport, LeavingBlock, ReturningBlock};
 use dynvox_core::{Capacity, Config, Mapper};

@@ -1,7 +1,7 @@
 //! Why a run ends early, in sentences.
 
 use super::{FolderError, ResumeError};
-use crate::dataset::DatasetError;
+use crate::input::InputError;
 use crate::observe::Reference;
 use crate::run::store::StoreError;
 use dynvox_core::memory::SlabError;
@@ -12,7 +12,7 @@ use dynvox_core::{NewError, StepError};
 pub enum RunError {
     /// The data set, or a frame of it.
     #[error(transparent)]
-    Dataset(#[from] DatasetError),
+    Dataset(#[from] InputError),
     /// The run folder.
     #[error(transparent)]
     Folder(#[from] FolderError),

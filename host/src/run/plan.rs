@@ -2,7 +2,7 @@
 
 use super::disk_store::Streaming;
 use super::{RunError, Snapshots};
-use crate::dataset::Dataset;
+use crate::input::FrameSource;
 use crate::observe::{Reference, evaluable};
 use dynvox_core::geometry::Transform;
 use dynvox_core::{Capacity, Config};
@@ -14,7 +14,7 @@ pub const HOST_OVERHEAD_BYTES: u64 = 256 << 20;
 /// What to run.
 pub struct Plan {
     /// The frames.
-    pub dataset: Box<dyn Dataset>,
+    pub dataset: Box<dyn FrameSource>,
     /// Numbers of the frames to take.
     pub indices: Vec<usize>,
     /// Poses of these frames to take in place of the camera's own motion.
@@ -91,7 +91,7 @@ pub fn frame_indices(len: usize, start: usize, stride: usize, frames: Option<usi
 }
 
 /// Median time between two of the frames, s; `None` where there is only one.
-pub fn frame_interval_s(dataset: &dyn Dataset, indices: &[usize]) -> Option<f64> {
+pub fn frame_interval_s(dataset: &dyn FrameSource, indices: &[usize]) -> Option<f64> {
     let mut steps: Vec<f64> = indices.windows(2).map(|pair| dataset.time_s(pair[1]) - dataset.time_s(pair[0])).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied()

@@ -1,6 +1,6 @@
 //! Decodes frames ahead of the mapper on a thread of its own, at most [`AHEAD`] of them.
 
-use crate::dataset::{Dataset, DatasetError, StereoImages};
+use crate::input::{FrameSource, InputError, StereoImages};
 use std::sync::mpsc::{Receiver, sync_channel};
 
 /// Frames decoded and not yet taken.
@@ -8,9 +8,9 @@ pub const AHEAD: usize = 2;
 
 /// Runs `consume` with frames `indices` of the data set, decoded ahead in order. It ends when `consume` returns.
 pub fn read_ahead<R>(
-    dataset: &dyn Dataset,
+    dataset: &dyn FrameSource,
     indices: &[usize],
-    consume: impl FnOnce(&Receiver<(usize, Result<StereoImages, DatasetError>)>) -> R,
+    consume: impl FnOnce(&Receiver<(usize, Result<StereoImages, InputError>)>) -> R,
 ) -> R {
     std::thread::scope(|scope| {
         // The channel holds one less: one more waits in the sender's hand.

@@ -2,9 +2,9 @@
 
 use super::{ShelfUse, StageTime, Streaming, disk_store};
 use crate::evaluate::{exact::ExactFigures, trajectory::TrajectoryErrors};
-use crate::export::Mesh;
+use crate::formats::Mesh;
+use crate::input::MaskRefusals;
 use crate::observe::{LidarRecord, ObjectsRecord, TrackRow};
-use crate::segmentation::Refusals;
 use dynvox_core::egomotion::MotionStatus;
 use dynvox_core::egomotion::icp::IcpStatus;
 use dynvox_core::geometry::{StereoRig, Transform};
@@ -28,7 +28,7 @@ pub struct FrameRow {
     /// Tracks seen in this frame, by age.
     pub tracks: Vec<TrackRow>,
     /// What the source of masks said and could not be used.
-    pub refusals: Refusals,
+    pub refusals: MaskRefusals,
     /// Values of a given depth image that are none: not finite, negative, or no disparity of this rig.
     pub depth_refused: u32,
     /// Wall time of the whole step, ms.

@@ -6,9 +6,9 @@ use super::execute::from_first;
 use super::state::Gathered;
 use super::{FolderError, RunFolder};
 use super::{FrameRow, Keyframe, Plan, Progress, ResumeError, Stopped, Threads, checkpoint, read_ahead, resident_bytes};
-use crate::dataset::{ExactFrame, StereoImages};
+use crate::input::InstanceMask;
+use crate::input::{ExactFrame, StereoImages};
 use crate::observe::{LidarAtWork, Reference, evaluable, pictures};
-use crate::segmentation::Sighting;
 use dynvox_core::geometry::{Transform, exp};
 use dynvox_core::tracking::Detection;
 use dynvox_core::volume::PruneReport;
@@ -101,7 +101,7 @@ impl<'p, 's> Course<'p, 's> {
     fn same_frames(&self) -> Result<(), RunError> {
         let Some((at, row)) = self.gathered.rows.iter().enumerate().next_back() else { return Ok(()) };
         let images = self.plan.dataset.frame(row.frame)?;
-        let detections: Vec<_> = images.sightings.all.iter().map(Sighting::detection).collect();
+        let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
         let digest = self.stereo_frame(at, &images, &detections).map(|frame| frame.digest());
         if digest == Some(row.report.digests.input) {
             return Ok(());
@@ -174,7 +174,7 @@ impl<'p, 's> Course<'p, 's> {
 
     fn step(&mut self, index: usize, images: &StereoImages) -> Result<FrameRow, RunError> {
         let refused = |reason: String| RunError::Step { frame: index, reason };
-        let detections: Vec<_> = images.sightings.all.iter().map(Sighting::detection).collect();
+        let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
         let frame = self.stereo_frame(self.gathered.rows.len(), images, &detections);
         let frame = frame.ok_or_else(|| refused("the images are empty".to_owned()))?;
         self.threads.take_times();
@@ -195,7 +195,7 @@ impl<'p, 's> Course<'p, 's> {
             history_frames: self.mapper.background().history().len(),
             step_ms,
             tracks,
-            refusals: images.sightings.refusals,
+            refusals: images.masks.refusals,
             depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count()) + report.stereo.refused,
             rss_bytes: resident_bytes().map(|(now, _)| now),
             stages: self.threads.take_times(),
@@ -209,8 +209,8 @@ impl<'p, 's> Course<'p, 's> {
         let (mapper, threads) = (&mut self.mapper, &self.threads);
         let Ok(seen) = threads.run(|| mapper.raycast(t_world_camera, threads)) else { return };
         if let (Some(exact), Some(depth_m)) = (exact, seen.depth_m()) {
-            let apart = |sighting: &Sighting, u, v| self.plan.config.instances.dynamic && sighting.contains(u, v);
-            self.gathered.exact.add(&depth_m, exact, |u, v| images.sightings.all.iter().any(|one| apart(one, u as i32, v as i32)));
+            let apart = |sighting: &InstanceMask, u, v| self.plan.config.instances.dynamic && sighting.contains(u, v);
+            self.gathered.exact.add(&depth_m, exact, |u, v| images.masks.instances.iter().any(|one| apart(one, u as i32, v as i32)));
         }
         if let (Some(frame), Some(disparity_png), Some(grey)) = (keyframe, disparity_png, images.left.view()) {
             let input = images.colour.as_ref().and_then(|colour| colour.view());

@@ -1,8 +1,8 @@
 //! `dynvox evaluate stereo`.
 
 use crate::cli::settings::Settings;
-use crate::dataset::{Image, read_png, read_png_deep, read_png_u16};
 use crate::evaluate::stereo::{BAD_PX, StereoFigures, StereoPair, StereoTally, filled, find_stereo_set};
+use crate::formats::{Image, read_png, read_png_deep, read_png_u16};
 use crate::run::{HostSlab, Threads};
 use anyhow::bail;
 use dynvox_core::Capacity;

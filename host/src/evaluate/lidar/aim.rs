@@ -1,6 +1,7 @@
 //! From a scan to pixels with a true disparity.
 
-use crate::dataset::{Image, LidarScan};
+use crate::formats::Image;
+use crate::input::LidarScan;
 use dynvox_core::geometry::StereoRig;
 
 /// Rows of a point's two projections may differ by this much, px.

@@ -1,7 +1,7 @@
 //! Frames that wait for their evaluation. What a frame's points belong to and what the input measured is settled while the frame is there.
 
 use super::{Aim, EvaluatedFrame, Layer, ScanCount, Tally, Target};
-use crate::dataset::Image;
+use crate::formats::Image;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
 use std::collections::VecDeque;

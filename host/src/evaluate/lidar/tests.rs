@@ -1,5 +1,5 @@
 use super::*;
-use crate::dataset::LidarScan;
+use crate::input::LidarScan;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
 use dynvox_core::masks::PixelBox;

@@ -18,7 +18,7 @@ pub use figures::{Medians, ObjectFigures};
 pub use late::Late;
 pub use track::TrackErrors;
 
-use crate::dataset::{ObjectsTruth, TrueObject};
+use crate::input::{ObjectsTruth, TrueObject};
 use association::Association;
 use dynvox_core::geometry::Transform;
 use dynvox_core::masks::PixelBox;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::dataset::TrueObject;
+use crate::input::TrueObject;
 use dynvox_core::geometry::exp;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::Class;

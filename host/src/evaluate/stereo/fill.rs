@@ -1,6 +1,6 @@
 //! Filling holes as the benchmarks do before they rank: along each row by the farther of the two neighbours.
 
-use crate::dataset::Image;
+use crate::formats::Image;
 
 /// Fills every hole of a disparity image (0 is none): each run of holes in a row by the smaller of the disparities at its ends, at the image's sides by
 /// the one there is; rows without any by the nearest row above that has some, else below. An image without disparity stays empty.

@@ -13,8 +13,8 @@ mod tests;
 pub use fill::filled;
 pub use layout::{StereoPair, StereoSet, StereoSetError, find_stereo_set};
 
-use crate::dataset::Image;
 use crate::evaluate::lidar::Rule;
+use crate::formats::Image;
 use serde::Serialize;
 
 /// Plain thresholds, px.

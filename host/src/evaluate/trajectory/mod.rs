@@ -8,7 +8,7 @@
 mod align;
 mod files;
 
-pub use files::{Trajectory, TrajectoryError, read_trajectory, together};
+pub use files::{TrajectoryError, read_trajectory, together};
 
 use align::aligned_error_m;
 use dynvox_core::geometry::Transform;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::export::{write_kitti, write_tum};
+use crate::formats::{Trajectory, write_kitti, write_tum};
 use dynvox_core::geometry::exp;
 use nalgebra::Vector3;
 use std::path::Path;
@@ -133,6 +133,6 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
         write_kitti(out, &poses[..1]).unwrap();
         write_tum(out, &times, &poses[..1]).unwrap();
     });
-    assert!(read_trajectory(&mixed).unwrap_err().to_string().contains("line 3 is no pose"));
+    assert!(read_trajectory(&mixed).unwrap_err().to_string().contains("line 3 is of another format"));
     assert!(read_trajectory(&folder.path().join("none")).unwrap_err().to_string().contains("cannot be read"));
 }

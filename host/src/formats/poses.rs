@@ -1,0 +1,86 @@
+//! Camera trajectories in text files, read and written: KITTI's rows of twelve numbers, TUM's rows of time, position and quaternion.
+//!
+//! Numbers are written so that reading them gives the same bits.
+
+use super::rows::{lines_of, numbers_of};
+use super::{FormatError, read_text};
+use dynvox_core::geometry::{Transform, renormalised};
+use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Poses from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    /// Times, s; `None` in KITTI's format.
+    pub times_s: Option<Vec<f64>>,
+    /// `t_world_camera` of each row.
+    pub poses: Vec<Transform>,
+}
+
+/// Reads a file of either format. Empty lines and lines that begin with `#` are passed over.
+///
+/// # Errors
+/// The file cannot be read, a line is not a pose, or lines of both formats are mixed.
+pub fn read_poses(path: &Path) -> Result<Trajectory, FormatError> {
+    let text = read_text(path)?;
+    let (mut times_s, mut poses) = (Vec::new(), Vec::new());
+    for (line, row) in lines_of(&text) {
+        let refuse = |reason: &str| {
+            FormatError::content(
+                path,
+                format!("line {line} {reason}"),
+                "A line holds 12 numbers (KITTI: the rows of t_world_camera) or 8 (TUM: time x y z qx qy qz qw), the same in every line",
+            )
+        };
+        let (time_s, pose) = numbers_of(row).and_then(|numbers| pose_of(&numbers)).ok_or_else(|| refuse("is not a pose"))?;
+        if !poses.is_empty() && time_s.is_some() == times_s.is_empty() {
+            return Err(refuse("is of another format than the first"));
+        }
+        times_s.extend(time_s);
+        poses.push(pose);
+    }
+    Ok(Trajectory { times_s: (!times_s.is_empty()).then_some(times_s), poses })
+}
+
+/// Time, where the row has one, and pose. Rounded rotations are brought back to length 1.
+fn pose_of(numbers: &[f64]) -> Option<(Option<f64>, Transform)> {
+    if let &[r00, r01, r02, x, r10, r11, r12, y, r20, r21, r22, z] = numbers {
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::new(r00, r01, r02, r10, r11, r12, r20, r21, r22));
+        let pose = Transform::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_rotation_matrix(&rotation));
+        return Some((None, renormalised(&pose)));
+    }
+    let &[time_s, x, y, z, i, j, k, w] = numbers else { return None };
+    let quaternion = Quaternion::new(w, i, j, k);
+    let pose = Transform::from_parts(Translation3::new(x, y, z), UnitQuaternion::new_unchecked(quaternion));
+    (quaternion.norm() > 0.5).then(|| (Some(time_s), renormalised(&pose)))
+}
+
+/// KITTI: the twelve numbers of the rows of `t_world_camera`, one line a frame.
+pub fn write_kitti(out: &mut impl Write, poses: &[Transform]) -> io::Result<()> {
+    poses.iter().try_for_each(|pose| writeln!(out, "{}", kitti_row(pose)))
+}
+
+/// Poses of some frames only: the frame's number, then the twelve numbers of KITTI's row.
+pub fn write_numbered(out: &mut impl Write, poses: &[(usize, Transform)]) -> io::Result<()> {
+    poses.iter().try_for_each(|(frame, pose)| writeln!(out, "{frame} {}", kitti_row(pose)))
+}
+
+fn kitti_row(pose: &Transform) -> String {
+    let rotation = pose.rotation.to_rotation_matrix();
+    let rows = rotation.matrix().row_iter().zip(pose.translation.vector.iter());
+    joined(rows.flat_map(|(row, shift)| [row[0], row[1], row[2], *shift]))
+}
+
+/// TUM: `t x y z qx qy qz qw`, one line a frame.
+pub fn write_tum(out: &mut impl Write, times_s: &[f64], poses: &[Transform]) -> io::Result<()> {
+    for (time, pose) in times_s.iter().zip(poses) {
+        let (t, q) = (&pose.translation.vector, pose.rotation.quaternion());
+        writeln!(out, "{}", joined([*time, t.x, t.y, t.z, q.i, q.j, q.k, q.w].into_iter()))?;
+    }
+    Ok(())
+}
+
+fn joined(numbers: impl Iterator<Item = f64>) -> String {
+    numbers.map(|number| format!("{number:?}")).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,63 @@
+//! What is written can be read.
+
+use super::*;
+use dynvox_core::geometry::exp;
+use nalgebra::Vector3;
+use std::fs;
+use tempfile::TempDir;
+
+fn poses() -> Vec<dynvox_core::geometry::Transform> {
+    (0..5)
+        .map(|i| exp(Vector3::new(0.01, 0.3, -0.02) * f64::from(i), Vector3::new(1.0 / 3.0, -1e-9, 1_234.567_891_234_5) * f64::from(i)))
+        .collect()
+}
+
+#[test]
+fn kitti_trajectories_are_read_back_as_they_were() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("t.txt");
+    let mut text = Vec::new();
+    write_kitti(&mut text, &poses()).unwrap();
+    fs::write(&path, text).unwrap();
+    for (read, written) in read_poses(&path).unwrap().poses.iter().zip(poses()) {
+        assert_eq!(read.translation, written.translation, "to the last bit");
+        assert!(read.rotation.angle_to(&written.rotation) < 1e-7);
+    }
+}
+
+#[test]
+fn tum_trajectories_keep_every_digit_of_time_and_pose() {
+    let times = [0.0, 0.103_73, 1_317_354_879.123_456, 1_317_354_879.123_457, 2e9];
+    let mut text = Vec::new();
+    write_tum(&mut text, &times, &poses()).unwrap();
+    let rows: Vec<Vec<f64>> =
+        String::from_utf8(text).unwrap().lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
+    for ((row, time), pose) in rows.iter().zip(times).zip(poses()) {
+        let (t, q) = (pose.translation, pose.rotation.quaternion().coords);
+        assert_eq!(*row, [time, t.x, t.y, t.z, q.x, q.y, q.z, q.w]);
+    }
+}
+
+#[test]
+fn a_mesh_shares_recent_vertices_and_its_header_counts_are_true() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("map.ply");
+    let mut ply = PlyWriter::begin(&path).unwrap();
+    let corner = |x: f32, y: f32| ([x, y, 2.0], [10u8, 20, 30]);
+    ply.triangle([corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)]);
+    ply.triangle([corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
+    assert_eq!(ply.finish().unwrap(), Mesh { vertices: 4, triangles: 2 });
+    let bytes = fs::read(&path).unwrap();
+    let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+    let header = std::str::from_utf8(&bytes[..end]).unwrap();
+    assert!(header.contains("element vertex 0000000004\n") && header.contains("element face 0000000002\n"), "{header}");
+    let body = &bytes[end..];
+    assert_eq!(body.len(), 4 * 15 + 2 * 13);
+    let face = |at: usize| {
+        let face = &body[60 + 13 * at..][..13];
+        (face[0], [1, 5, 9].map(|from| u32::from_le_bytes(face[from..from + 4].try_into().unwrap())))
+    };
+    assert_eq!((face(0), face(1)), ((3, [0, 1, 2]), (3, [1, 3, 2])));
+    assert_eq!(f32::from_le_bytes(body[15..19].try_into().unwrap()), 1.0);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the file of faces is gone");
+}

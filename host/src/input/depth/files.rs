@@ -1,0 +1,145 @@
+//! Choosing a source and laying it over a data set.
+
+use crate::formats::{FormatError, Image, read_opencv_depth, read_pfm, read_png_deep};
+use crate::input::source::{AvailableMasks, FrameSource, GivenDepth, InputError, Layer, Overlay, Quantity, StereoImages, to_disparity};
+use dynvox_core::geometry::StereoRig;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Endings looked for, in this order.
+const ENDINGS: [&str; 3] = ["png", "pfm", "xml"];
+/// Folder the original puts its files in, below the one it is told.
+const INNER: &str = "Frames";
+
+/// Where depth comes from, as the command line says it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum DepthChoice {
+    /// The core's stereo matching.
+    #[default]
+    Elas,
+    /// A folder of files; its name tells whether they hold disparity or depth.
+    Files(PathBuf),
+    /// A folder of disparities: PNG in 1/256 px, PFM in px.
+    Disparity(PathBuf),
+    /// A folder of depths: PNG and XML in mm, PFM in m.
+    Depth(PathBuf),
+    /// The synthetic street's exact depth.
+    Exact,
+}
+
+impl FromStr for DepthChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let folder = |path: &str| if path.is_empty() { Err(format!("{text} names no folder")) } else { Ok(PathBuf::from(path)) };
+        Ok(match text.split_once(':') {
+            None if text == "elas" => Self::Elas,
+            None if text == "exact" => Self::Exact,
+            Some(("files", path)) => Self::Files(folder(path)?),
+            Some(("disparity", path)) => Self::Disparity(folder(path)?),
+            Some(("depth", path)) => Self::Depth(folder(path)?),
+            _ => return Err("one of elas, files:DIR, disparity:DIR, depth:DIR, exact".to_owned()),
+        })
+    }
+}
+
+/// Lays the chosen depth over a data set whose images have their full size.
+///
+/// # Errors
+/// The folder does not exist, has nothing for the first frame, or the data set has no exact depth.
+pub fn attach(dataset: Box<dyn FrameSource>, choice: &DepthChoice) -> Result<Box<dyn FrameSource>, InputError> {
+    let (folder, quantity) = match choice {
+        DepthChoice::Elas => return Ok(dataset),
+        DepthChoice::Exact if dataset.masks() != AvailableMasks::Exact => {
+            return Err(InputError::depth(Path::new(dataset.name()), "only the synthetic street has exact depth".to_owned()));
+        }
+        DepthChoice::Exact => return Ok(Box::new(Overlay::new(dataset, Source::Exact, "exact depth".to_owned()))),
+        DepthChoice::Files(folder) => (folder, quantity_of(folder)),
+        DepthChoice::Disparity(folder) => (folder, Quantity::DisparityPx),
+        DepthChoice::Depth(folder) => (folder, Quantity::DepthM),
+    };
+    if !folder.is_dir() {
+        return Err(InputError::depth(folder, "there is no such folder".to_owned()));
+    }
+    let folders = if folder.join(INNER).is_dir() { vec![folder.clone(), folder.join(INNER)] } else { vec![folder.clone()] };
+    let stems: Vec<String> = (0..dataset.len()).map(|index| dataset.stem(index).unwrap_or_else(|| format!("{index:06}"))).collect();
+    let files: Vec<Option<PathBuf>> = stems.iter().map(|stem| file_of(&folders, stem)).collect();
+    let there = files.iter().flatten().count();
+    if there == 0 {
+        let example = stems.first().map_or("000000", String::as_str);
+        return Err(InputError::depth(folder, format!("it has nothing for any frame; the first would be {example}.png, .pfm or .xml")));
+    }
+    let what = match quantity {
+        Quantity::DisparityPx => "disparity",
+        Quantity::DepthM => "depth",
+    };
+    let part = if there == files.len() { String::new() } else { format!(" for {there} of {} frames", files.len()) };
+    let note = format!("{what} from {}{part}", folder.display());
+    let expected = stems.iter().map(|stem| folder.join(format!("{stem}.png"))).collect();
+    Ok(Box::new(Overlay::new(dataset, Source::Files { files, expected, quantity }, note)))
+}
+
+/// A folder whose name speaks of depth and not of disparity holds depth: `precomputed-depth-dispnet` holds disparity.
+fn quantity_of(folder: &Path) -> Quantity {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    if name.contains("depth") && !name.contains("disp") { Quantity::DepthM } else { Quantity::DisparityPx }
+}
+
+/// The file of a frame: named as its image, or by its number in four digits as the original does.
+fn file_of(folders: &[PathBuf], stem: &str) -> Option<PathBuf> {
+    let short = stem.parse::<u32>().ok().map(|number| format!("{number:04}"));
+    let stems = std::iter::once(stem).chain(short.as_deref());
+    let places = stems.flat_map(|stem| folders.iter().map(move |folder| (folder, stem)));
+    let mut files = places.flat_map(|(folder, stem)| ENDINGS.map(|ending| folder.join(format!("{stem}.{ending}"))));
+    files.find(|path| path.is_file())
+}
+
+/// Reads one file. What it holds follows from its format and `quantity`.
+pub(super) fn read(path: &Path, quantity: Quantity, size: (usize, usize), rig: &StereoRig) -> Result<GivenDepth, InputError> {
+    let (values, quantity) = match path.extension().and_then(|ending| ending.to_str()) {
+        Some("pfm") => (read_pfm(path, size).map_err(InputError::depth_format)?, quantity),
+        Some("xml") => (read_opencv_depth(path, size).map_err(InputError::depth_format)?, Quantity::DepthM),
+        _ => {
+            let image = read_png_deep(path).map_err(InputError::depth_format)?;
+            if (image.width(), image.height()) != size {
+                return Err(InputError::depth_format(FormatError::other_size(path, (image.width(), image.height()), size)));
+            }
+            let unit = match quantity {
+                Quantity::DisparityPx => 1.0 / 256.0,
+                Quantity::DepthM => 1e-3,
+            };
+            (image.map(|&value| f32::from(value) * unit), quantity)
+        }
+    };
+    Ok(to_disparity(&values, quantity, rig))
+}
+
+enum Source {
+    Files {
+        files: Vec<Option<PathBuf>>,
+        /// Where a missing file is missed.
+        expected: Vec<PathBuf>,
+        quantity: Quantity,
+    },
+    Exact,
+}
+
+impl Layer for Source {
+    fn add(&self, dataset: &dyn FrameSource, index: usize, images: &mut StereoImages) -> Result<(), InputError> {
+        let (size, rig) = (dataset.size(), dataset.rig());
+        images.depth = match self {
+            Self::Exact => images.exact.as_ref().map(|exact| {
+                // The sky is no value that could not be used.
+                let depth_m: Image<f32> = exact.depth_m.map(|&depth_m| if depth_m.is_finite() { depth_m } else { 0.0 });
+                to_disparity(&depth_m, Quantity::DepthM, &rig)
+            }),
+            Self::Files { files, expected, quantity } => match (files.get(index).and_then(Option::as_ref), expected.get(index)) {
+                (Some(path), _) => Some(read(path, *quantity, size, &rig)?),
+                (None, Some(path)) => return Err(InputError::depth(path, "it is missing, as are .pfm and .xml of that name".to_owned())),
+                // Frames beyond the data set are its own to refuse.
+                (None, None) => None,
+            },
+        };
+        Ok(())
+    }
+}

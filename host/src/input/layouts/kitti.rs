@@ -1,0 +1,183 @@
+//! KITTI's layouts: odometry and tracking.
+
+use super::CameraPair;
+use super::labels;
+use super::lidar::LidarFiles;
+use super::sequence::{Parts, Sequence};
+use crate::formats::calibration::KittiCalibration;
+use crate::formats::{read_poses, read_times};
+use crate::input::source::{InputError, read_failed};
+use nalgebra::{Isometry3, Translation3};
+use std::path::{Path, PathBuf};
+
+/// Time between two frames of the tracking benchmark, s.
+const LABELS_INTERVAL_S: f64 = 0.1;
+
+/// Opens a sequence of the odometry benchmark. `path` is its root (with `sequences/`), the `sequences` folder or one sequence.
+pub fn open_odometry(path: &Path, sequence: Option<&str>, images: CameraPair) -> Result<Sequence, InputError> {
+    let folder = odometry_folder(path, sequence)?;
+    let number = folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let calibration =
+        KittiCalibration::read(&present(folder.join("calib.txt"), "Every sequence needs its calib.txt: copy it from the benchmark")?)?;
+    let has = |cameras: [&str; 2]| cameras.iter().all(|camera| folder.join(camera).is_dir());
+    let (grey, colour) = (has(["image_0", "image_1"]), has(["image_2", "image_3"]));
+    let mut notes = Vec::new();
+    let (left, right) = match images {
+        CameraPair::Grey => (0, 1),
+        CameraPair::Colour => (2, 3),
+        CameraPair::Auto if grey => {
+            if colour {
+                notes.push("grey and colour images are there: the grey ones are used; --images colour takes the others".to_owned());
+            }
+            (0, 1)
+        }
+        CameraPair::Auto if colour => (2, 3),
+        CameraPair::Auto => (0, 1),
+    };
+    let camera = |number: usize| {
+        present(
+            folder.join(format!("image_{number}")),
+            "A pair is image_0 and image_1 (grey) or image_2 and image_3 (colour): fetch the other half",
+        )
+    };
+    let (left_folder, right_folder) = (camera(left)?, camera(right)?);
+    let times = folder.join("times.txt");
+    let times = if times.is_file() { Some((times.clone(), read_times(&times)?)) } else { None };
+    let poses = match odometry_poses(&folder, &number) {
+        // The benchmark's poses are those of camera 0; the colour camera sees the same motion from its own place.
+        Some(path) => {
+            let t_camera_zero =
+                Isometry3::from_parts(Translation3::from(calibration.offset_m(left)?), nalgebra::UnitQuaternion::identity());
+            let poses = read_poses(&path)?.poses.iter().map(|pose| t_camera_zero * pose * t_camera_zero.inverse()).collect();
+            Some((path, poses))
+        }
+        None => None,
+    };
+    Sequence::from_parts(Parts {
+        name: format!("kitti-odometry-{number}"),
+        left: left_folder,
+        right: right_folder,
+        rig: calibration.rig(left, right)?,
+        times,
+        poses,
+        numbered: true,
+        notes,
+        instances: folder.join("instances"),
+        objects: Vec::new(),
+        lidar: LidarFiles::at(folder.join("velodyne"), &calibration, [left, right])?,
+    })
+}
+
+/// Opens a sequence of the tracking benchmark. `path` is its root, its `training` or `testing` folder.
+pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, InputError> {
+    let split = tracking_split(path).ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
+    let names = tracking_sequences(&split)?;
+    let name = chosen(path, sequence, &names)?;
+    let action = "The tracking benchmark keeps left images in image_02/NNNN, right ones in image_03/NNNN: fetch what is missing";
+    let calibration =
+        KittiCalibration::read(&present(split.join("calib").join(format!("{name}.txt")), "Fetch the benchmark's calibration files")?)?;
+    let poses = split.join("poses").join(format!("{name}.txt"));
+    let labels = split.join("label_02").join(format!("{name}.txt"));
+    // Labels have a scale of their own: poses on it are preferred.
+    let scaled = split.join("poses").join(format!("{name}.scaled.txt"));
+    let labels_poses = [&scaled, &poses].into_iter().find(|path| path.is_file() && labels.is_file());
+    let objects = match labels_poses {
+        Some(path) => labels::read_labels(&labels, &read_poses(path)?.poses, calibration.offset_m(2)?, LABELS_INTERVAL_S)?,
+        None => Vec::new(),
+    };
+    Sequence::from_parts(Parts {
+        left: present(split.join("image_02").join(&name), action)?,
+        right: present(split.join("image_03").join(&name), action)?,
+        rig: calibration.rig(2, 3)?,
+        times: None,
+        poses: if poses.is_file() { Some((poses.clone(), read_poses(&poses)?.poses)) } else { None },
+        numbered: true,
+        notes: Vec::new(),
+        instances: split.join("instances").join(&name),
+        objects,
+        lidar: LidarFiles::at(split.join("velodyne").join(&name), &calibration, [2, 3])?,
+        name: format!("kitti-tracking-{name}"),
+    })
+}
+
+/// The sequences folder of an odometry root, if it is one.
+pub fn odometry_root(path: &Path) -> Option<PathBuf> {
+    let below = path.join("sequences");
+    if below.is_dir() {
+        return Some(below);
+    }
+    let named = path.file_name().is_some_and(|name| name == "sequences");
+    (named && path.is_dir()).then(|| path.to_path_buf())
+}
+
+/// Whether the folder is one sequence of the odometry benchmark.
+pub fn is_odometry_sequence(path: &Path) -> bool {
+    path.join("calib.txt").is_file() && ["image_0", "image_2"].iter().any(|camera| path.join(camera).is_dir())
+}
+
+/// The split (`training`, `testing`) of a tracking root, if it is one.
+pub fn tracking_split(path: &Path) -> Option<PathBuf> {
+    let is_split = |folder: &Path| {
+        // Images directly below image_02 would be another layout: here each sequence has a folder of its own.
+        folder.join("image_02").is_dir() && super::sequence::png_files(&folder.join("image_02")).is_err()
+    };
+    [path.to_path_buf(), path.join("training"), path.join("testing")].into_iter().find(|folder| is_split(folder))
+}
+
+/// Names of the sequences in a folder of folders.
+pub fn sequences(folder: &Path) -> Result<Vec<String>, InputError> {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(read_failed(folder))? {
+        let entry = entry.map_err(read_failed(folder))?;
+        if entry.path().is_dir() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// Names of the sequences of a tracking split.
+pub fn tracking_sequences(split: &Path) -> Result<Vec<String>, InputError> {
+    sequences(&split.join("image_02"))
+}
+
+fn odometry_folder(path: &Path, sequence: Option<&str>) -> Result<PathBuf, InputError> {
+    if let Some(root) = odometry_root(path) {
+        return Ok(root.join(chosen(path, sequence, &sequences(&root)?)?));
+    }
+    if let Some(wanted) = sequence.filter(|wanted| path.file_name().is_none_or(|name| name.to_string_lossy() != **wanted)) {
+        let known = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        return Err(InputError::Sequence {
+            sequence: wanted.to_owned(),
+            root: path.to_path_buf(),
+            known: format!("only {known}"),
+        });
+    }
+    Ok(path.to_path_buf())
+}
+
+/// `poses/NN.txt` beside `sequences`, or `poses.txt` within the sequence.
+fn odometry_poses(folder: &Path, number: &str) -> Option<PathBuf> {
+    let beside = folder.parent()?.parent().map(|root| root.join("poses").join(format!("{number}.txt")));
+    beside.into_iter().chain([folder.join("poses.txt")]).find(|path| path.is_file())
+}
+
+fn chosen(root: &Path, wanted: Option<&str>, names: &[String]) -> Result<String, InputError> {
+    let known = names.join(", ");
+    match (wanted, names) {
+        (Some(wanted), _) if names.iter().any(|name| name == wanted) => Ok(wanted.to_owned()),
+        (Some(wanted), _) => {
+            let known = if known.is_empty() { "none".to_owned() } else { known };
+            Err(InputError::Sequence { sequence: wanted.to_owned(), root: root.to_path_buf(), known })
+        }
+        (None, [only]) => Ok(only.clone()),
+        (None, []) => Err(InputError::Layout { path: root.to_path_buf(), below: Vec::new() }),
+        (None, _) => Err(InputError::Choice { root: root.to_path_buf(), known }),
+    }
+}
+
+/// The path, when it is there.
+pub(super) fn present(path: PathBuf, action: &str) -> Result<PathBuf, InputError> {
+    if path.exists() { Ok(path) } else { Err(InputError::Part { path, action: action.to_owned() }) }
+}

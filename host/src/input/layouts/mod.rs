@@ -1,0 +1,27 @@
+//! Recordings, by how they lie on the disk: KITTI odometry and tracking, a plain stereo folder; and the synthetic street.
+
+mod folder;
+mod kitti;
+mod labels;
+mod lidar;
+mod open;
+mod sequence;
+mod street;
+#[cfg(test)]
+mod tests;
+
+pub use open::{Found, Layout, open, sequences_at, survey};
+pub use sequence::Sequence;
+pub use street::StreetFrames;
+
+/// Which camera pair of KITTI odometry to use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum CameraPair {
+    /// The grey pair where it is there, else the colour pair.
+    #[default]
+    Auto,
+    /// `image_0` and `image_1`.
+    Grey,
+    /// `image_2` and `image_3`: matched in grey, fused in colour.
+    Colour,
+}

@@ -1,0 +1,376 @@
+//! Each format on tiny folders made here, each kind of bad input, and the real clips' masks.
+
+use super::*;
+use crate::formats::rle;
+use crate::input::source::{FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals};
+use crate::input::{self, CameraPair, FrameSource, InputError, StreetFrames};
+use crate::synth::StreetConfig;
+use dynvox_core::masks::PixelBox;
+use image::{ImageBuffer, Luma};
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+const WIDTH: u32 = 40;
+const HEIGHT: u32 = 36;
+
+/// A stereo folder with two frames.
+fn rig() -> TempDir {
+    let root = TempDir::new().unwrap();
+    for side in ["left", "right"] {
+        fs::create_dir_all(root.path().join(side)).unwrap();
+        for frame in 0..2 {
+            ImageBuffer::from_pixel(WIDTH, HEIGHT, Luma([90u8])).save(root.path().join(side).join(format!("{frame:06}.png"))).unwrap();
+        }
+    }
+    fs::write(root.path().join("calib.txt"), "focal_px 90\ncenter_u_px 20\ncenter_v_px 18\nbaseline_m 0.5\n").unwrap();
+    root
+}
+
+/// A rectangle of instance k at columns 4k.., rows 10..16, 3 px wide.
+fn thing(k: i32) -> PixelBox {
+    PixelBox { left: 4 * k, top: 10, width: 3, height: 6 }
+}
+
+fn labels(path: &Path, values: &[u16], deep: bool) {
+    let at = |u: u32, v: u32| (1..).zip(values).find(|(k, _)| thing(*k).contains(u as i32, v as i32)).map_or(0, |(_, value)| *value);
+    if deep {
+        ImageBuffer::from_fn(WIDTH, HEIGHT, |u, v| Luma([at(u, v)])).save(path).unwrap();
+    } else {
+        ImageBuffer::from_fn(WIDTH, HEIGHT, |u, v| Luma([at(u, v) as u8])).save(path).unwrap();
+    }
+}
+
+fn laid_over(root: &Path, choice: &MaskChoice) -> Result<Box<dyn FrameSource>, InputError> {
+    attach(input::open(root, None, None, CameraPair::Auto)?, choice)
+}
+
+fn first(root: &Path, choice: &MaskChoice) -> Result<FrameMasks, InputError> {
+    Ok(laid_over(root, choice)?.frame(0)?.masks)
+}
+
+/// Writes frame 0 of `instances/` and reads it.
+fn listed(values: &[u16], list: &str) -> Result<FrameMasks, InputError> {
+    let root = rig();
+    let folder = root.path().join("instances");
+    fs::create_dir(&folder).unwrap();
+    labels(&folder.join("000000.png"), values, false);
+    fs::write(folder.join("000000.txt"), list).unwrap();
+    first(root.path(), &MaskChoice::Auto)
+}
+
+fn said<T>(result: Result<T, InputError>) -> String {
+    result.map(|_| ()).unwrap_err().to_string()
+}
+
+#[test]
+fn a_list_names_the_instances_of_the_picture_best_first() {
+    let masks =
+        listed(&[1, 2, 3], "# id class score x1 y1 x2 y2\n1 car 0.4 0 0 9 9\n3 person 0.9 1.5 2 3 4\n2 traffic light 0.7 0 0 1 1\n")
+            .unwrap();
+    let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.score, one.pixels)).collect();
+    assert_eq!(of, [(Class::Person, 0.9, thing(3)), (Class::Other, 0.7, thing(2)), (Class::Car, 0.4, thing(1))]);
+    assert!(masks.instances.iter().all(|one| one.mask.len() == 18 && one.mask.iter().all(|&pixel| pixel == 1)));
+    assert_eq!(masks.refusals, MaskRefusals::default());
+}
+
+#[test]
+fn what_cannot_be_used_of_a_list_is_counted() {
+    let masks = listed(&[1, 2, 3], "1 car 0.4 0 0 9 9\n2 hovercraft 0.5 0 0 1 1\n9 car 0.9 0 0 1 1\n").unwrap();
+    assert_eq!(masks.refusals, MaskRefusals { unnamed: 1, unknown_class: 1, empty: 1, ..MaskRefusals::default() });
+    assert_eq!(
+        masks.instances.iter().map(|one| one.class).collect::<Vec<_>>(),
+        [Class::Other, Class::Car],
+        "an unknown class is kept as other"
+    );
+    // Scores are the core's to judge: it refuses and counts these two.
+    let masks = listed(&[1, 2], "1 car nan 0 0 9 9\n2 car 1.5 0 0 9 9\n").unwrap();
+    assert!(
+        masks.instances.len() == 2
+            && masks.instances.iter().any(|one| one.score.is_nan())
+            && masks.instances.iter().any(|one| one.score == 1.5)
+    );
+}
+
+#[test]
+fn a_list_that_is_none_is_refused_with_its_line() {
+    for (list, reason) in [
+        ("1 car 0.4 0 0 9\n", "line 1 is not"),
+        ("\n1 car 0.4 0 0 9 nine\n", "line 2 is not"),
+        ("0 car 0.4 0 0 9 9\n", "line 1 is not"),
+        ("1 car 0.4 0 0 9 9\n1 bus 0.4 0 0 9 9\n", "a second time"),
+    ] {
+        let message = said(listed(&[1], list));
+        assert!(message.contains(reason) && message.contains("000000.txt") && message.contains("--instances"), "{message}");
+    }
+}
+
+#[test]
+fn masks_of_another_size_without_a_list_or_in_colour_are_refused() {
+    let root = rig();
+    let folder = root.path().join("instances");
+    fs::create_dir(&folder).unwrap();
+    let png = folder.join("000000.png");
+    labels(&png, &[1], false);
+    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("its list"));
+    fs::write(folder.join("000000.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
+    ImageBuffer::from_pixel(WIDTH - 1, HEIGHT, Luma([1u8])).save(&png).unwrap();
+    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("39 x 36 px, but the images are 40 x 36 px"));
+    ImageBuffer::from_pixel(WIDTH, HEIGHT, image::Rgb([1u8, 2, 3])).save(&png).unwrap();
+    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("colour image"));
+    fs::write(&png, "no picture").unwrap();
+    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("cannot be read"));
+}
+
+#[test]
+fn a_frame_without_a_file_sees_nothing_and_a_folder_without_any_is_refused_unless_nobody_asked_for_it() {
+    let root = rig();
+    let folder = root.path().join("instances");
+    fs::create_dir(&folder).unwrap();
+    labels(&folder.join("000001.png"), &[1], false);
+    fs::write(folder.join("000001.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
+    let dataset = laid_over(root.path(), &MaskChoice::Auto).unwrap();
+    assert!(dataset.notes().iter().any(|note| note.contains("for 1 of 2 frames")), "{:?}", dataset.notes());
+    assert_eq!(dataset.frame(0).unwrap().masks.refusals.missing, 1);
+    assert_eq!(dataset.frame(1).unwrap().masks.instances.len(), 1);
+    let empty = TempDir::new().unwrap();
+    let asked = |path: &Path| said(laid_over(root.path(), &MaskChoice::Files(path.to_path_buf())));
+    assert!(asked(empty.path()).contains("nothing for any frame; the first image is 000000.png"));
+    assert!(asked(&empty.path().join("no")).contains("no such folder"));
+    fs::remove_file(folder.join("000001.png")).unwrap();
+    assert!(first(root.path(), &MaskChoice::Auto).unwrap().instances.is_empty());
+    assert!(said(laid_over(root.path(), &MaskChoice::Exact)).contains("only the synthetic street"));
+}
+
+#[test]
+fn scaled_images_have_scaled_masks() {
+    let root = rig();
+    let folder = root.path().join("instances");
+    fs::create_dir(&folder).unwrap();
+    let square = |u: u32, v: u32| (8..24).contains(&u) && (12..20).contains(&v);
+    let picture = ImageBuffer::from_fn(80, 72, |u, v| Luma([u8::from(square(u, v))]));
+    for side in ["left", "right"] {
+        (0..2).for_each(|frame| picture.save(root.path().join(side).join(format!("{frame:06}.png"))).unwrap());
+    }
+    picture.save(folder.join("000000.png")).unwrap();
+    fs::write(folder.join("000000.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
+    let half = input::Scaled::new(input::open(root.path(), None, None, CameraPair::Auto).unwrap(), 0.5).unwrap();
+    let masks = attach(Box::new(half), &MaskChoice::Auto).unwrap().frame(0).unwrap().masks;
+    assert_eq!(masks.instances.len(), 1);
+    assert_eq!(masks.instances[0].pixels, PixelBox { left: 4, top: 6, width: 8, height: 4 });
+}
+
+#[test]
+fn mots_pictures_give_classes_and_leave_out_what_is_to_be_ignored() {
+    let root = rig();
+    let folder = TempDir::new().unwrap();
+    labels(&folder.path().join("000000.png"), &[1005, 2001, 10_000, 7_000], true);
+    let masks = first(root.path(), &MaskChoice::Mots(folder.path().to_path_buf())).unwrap();
+    let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.pixels)).collect();
+    assert_eq!(of, [(Class::Car, thing(1)), (Class::Person, thing(2)), (Class::Other, thing(4))]);
+    assert_eq!(masks.refusals, MaskRefusals { unknown_class: 1, ..MaskRefusals::default() });
+}
+
+fn ring(u: usize, v: usize) -> bool {
+    let from = (u as i32 - 20).pow(2) + (v as i32 - 18).pow(2);
+    (40..150).contains(&from)
+}
+
+fn mots_text(rows: &str) -> Result<FrameMasks, InputError> {
+    let root = rig();
+    let path = root.path().join("mots.txt");
+    fs::write(&path, rows).unwrap();
+    first(root.path(), &MaskChoice::Mots(path))
+}
+
+#[test]
+fn mots_text_gives_the_masks_that_were_written() {
+    let (w, h) = (WIDTH as usize, HEIGHT as usize);
+    let runs = rle::encoded(ring, w, h);
+    let ignored = rle::encoded(|u, _| u < 3, w, h);
+    let masks = mots_text(&format!("0 1001 1 {h} {w} {runs}\n1 2001 2 {h} {w} {ignored}\n0 10000 10 {h} {w} {ignored}\n")).unwrap();
+    assert_eq!(masks.instances.len(), 1, "one of this frame; one is of the next, one to be ignored");
+    let one = &masks.instances[0];
+    assert_eq!((one.class, one.score), (Class::Car, 1.0));
+    assert!((0..h).all(|v| (0..w).all(|u| one.contains(u as i32, v as i32) == ring(u, v))));
+    assert!(one.pixels.width < WIDTH as i32 && one.pixels.height < HEIGHT as i32);
+}
+
+#[test]
+fn run_lengths_are_those_of_the_published_tools() {
+    assert_eq!(rle::runs("54", 3, 3).unwrap(), [(5, 4)]);
+    // The example of COCO's documentation: 6, 1, 40, 4, 5, 4, 5, 4, 21.
+    assert_eq!(rle::runs("61X13mN000`0", 10, 9).unwrap(), [(6, 1), (47, 4), (56, 4), (65, 4)]);
+    for (width, height) in [(1, 1), (7, 5), (200, 90)] {
+        let mask = |u: usize, v: usize| (u * 31 + v * 17) % 7 < 3 || (u / 9 + v / 5).is_multiple_of(2);
+        let mut pixels = vec![false; width * height];
+        for (start, length) in rle::runs(&rle::encoded(mask, width, height), width, height).unwrap() {
+            pixels[start..start + length].fill(true);
+        }
+        assert!((0..width).all(|u| (0..height).all(|v| pixels[u * height + v] == mask(u, v))));
+    }
+}
+
+#[test]
+fn mots_text_that_is_none_is_refused_with_its_line() {
+    let (w, h) = (WIDTH as usize, HEIGHT as usize);
+    let whole = rle::encoded(|_, _| true, w, h);
+    for (rows, reason) in [
+        ("0 1001 1 36 40\n".to_owned(), "line 1 is not"),
+        (format!("0 1001 car 36 40 {whole}\n"), "line 1 is not"),
+        (format!("0 1001 1 40 36 {whole}\n"), "36 x 40 px, but the images are 40 x 36 px"),
+        ("0 1001 1 36 40 11\n".to_owned(), "hold 2 of the 1440 pixels"),
+        (format!("0 1001 1 36 40 {whole}{whole}\n"), "more than the 1440 pixels"),
+        ("0 1001 1 36 40 0P\n".to_owned(), "cut off"),
+        ("0 1001 1 36 40 0\u{7f}\n".to_owned(), "no run length"),
+        ("0 1001 1 36 40 ooooooooooooo0\n".to_owned(), "35 bits"),
+        ("0 1001 1 36 40 O1\n".to_owned(), "below 0"),
+    ] {
+        let message = said(mots_text(&rows));
+        assert!(message.contains(reason) && message.contains("line 1") | message.contains("mots.txt"), "{rows}: {message}");
+    }
+    let empty = rle::encoded(|_, _| false, w, h);
+    assert_eq!(mots_text(&format!("0 1001 1 {h} {w} {empty}\n")).unwrap().refusals.empty, 1);
+}
+
+#[test]
+fn ten_thousand_masks_are_kept_within_the_ceiling_and_the_rest_counted() {
+    let (w, h) = (WIDTH as usize, HEIGHT as usize);
+    let row = format!("0 1001 1 {h} {w} {}\n", rle::encoded(ring, w, h));
+    let masks = mots_text(&row.repeat(10_000)).unwrap();
+    assert_eq!((masks.instances.len(), masks.refusals.beyond), (MAX_MASKS, 9_000));
+    let mut large = FrameMasks::default();
+    let kept = (0..200).filter(|_| {
+        let room = large.reserve(1 << 20);
+        if room {
+            large.push(Some(InstanceMask {
+                class: Class::Car,
+                score: 1.0,
+                pixels: PixelBox::default(),
+                mask: vec![1; 1 << 20],
+            }));
+        }
+        room
+    });
+    assert_eq!(kept.count(), MAX_BYTES >> 20);
+}
+
+fn mnc(results: &[(&str, &str)]) -> Result<FrameMasks, InputError> {
+    let root = rig();
+    let folder = root.path().join("mnc");
+    fs::create_dir(&folder).unwrap();
+    for (number, (result, mask)) in results.iter().enumerate() {
+        fs::write(folder.join(format!("000000.png.{number:04}.result.txt")), result).unwrap();
+        if !mask.is_empty() {
+            fs::write(folder.join(format!("000000.png.{number:04}.mask.txt")), mask).unwrap();
+        }
+    }
+    first(root.path(), &MaskChoice::Mnc(folder))
+}
+
+const FULL: &str = "1.000000000000000000e+00 0.000000000000000000e+00 1.000000000000000000e+00\n1 1 1\n";
+
+#[test]
+fn mnc_dumps_are_read_best_first_with_boxes_inclusive() {
+    let masks =
+        mnc(&[("[4 6 6 7 0], 0.61, 7", FULL), ("[10, 2, 12, 3, 1], 0.93, 15\n", "0 1 1\n0 1 1\n"), ("[1. 1. 3. 2. 0.],0.7,99", FULL)])
+            .unwrap();
+    let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.score, one.pixels, one.mask.clone())).collect();
+    let pixels = |left, top, width, height| PixelBox { left, top, width, height };
+    assert_eq!(
+        of,
+        [
+            (Class::Person, 0.93, pixels(11, 2, 2, 2), vec![1; 4]),
+            (Class::Other, 0.7, pixels(1, 1, 3, 2), vec![1, 0, 1, 1, 1, 1]),
+            (Class::Car, 0.61, pixels(4, 6, 3, 2), vec![1, 0, 1, 1, 1, 1]),
+        ]
+    );
+    assert_eq!(masks.refusals, MaskRefusals { unknown_class: 1, ..MaskRefusals::default() });
+    assert_eq!(mnc(&[("[4 6 6 7 0], 0.61, 7", "0 0 0\n0 0 0\n")]).unwrap().refusals.empty, 1);
+}
+
+#[test]
+fn mnc_dumps_that_are_none_are_refused() {
+    for (result, mask, reason) in [
+        ("4 6 6 7 0, 0.61, 7", FULL, "is not `[x1"),
+        ("[4 6 6 7], 0.61, 7", FULL, "is not `[x1"),
+        ("[4 6 6 7 0], high, 7", FULL, "is not `[x1"),
+        ("[4 6 6 7 0], 0.61", FULL, "is not `[x1"),
+        ("[38 6 40 7 0], 0.61, 7", FULL, "does not lie within"),
+        ("[6 6 4 7 0], 0.61, 7", FULL, "does not lie within"),
+        ("[4 6 6 7 0], 0.61, 7", "", "is missing"),
+        ("[4 6 7 7 0], 0.61, 7", FULL, "3 columns, but its box is 4 px wide"),
+        ("[4 6 6 8 0], 0.61, 7", FULL, "2 rows, but its box is 3 px high"),
+        ("[4 6 6 7 0], 0.61, 7", "1 1 x\n1 1 1\n", "which is no number"),
+    ] {
+        let message = said(mnc(&[(result, mask)]));
+        assert!(message.contains(reason), "{result}: {message}");
+    }
+}
+
+fn street() -> Box<dyn FrameSource> {
+    Box::new(StreetFrames::new(StreetConfig { width: 320, height: 96, frames: 40, ..StreetConfig::default() }).unwrap())
+}
+
+#[test]
+fn the_street_knows_every_car_it_draws_parked_ones_too() {
+    let dataset = attach(street(), &MaskChoice::Auto).unwrap();
+    let frame = dataset.frame(20).unwrap();
+    let truth = frame.objects.unwrap();
+    assert_eq!(frame.masks.instances.len(), truth.objects.len());
+    assert!(truth.objects.iter().any(|object| object.moving) && truth.objects.iter().any(|object| !object.moving));
+    let mut boxes: Vec<PixelBox> = frame.masks.instances.iter().map(|one| one.pixels).collect();
+    let mut expected: Vec<PixelBox> = truth.objects.iter().map(|object| object.pixels).collect();
+    boxes.sort();
+    expected.sort();
+    assert_eq!(boxes, expected);
+    let pixels: usize = frame.masks.instances.iter().flat_map(|one| &one.mask).filter(|&&pixel| pixel == 1).count();
+    assert_eq!(pixels, frame.exact.unwrap().instances.pixels().iter().filter(|&&k| k > 0).count());
+}
+
+#[test]
+fn noise_is_a_detectors_and_the_same_again_for_the_same_seed() {
+    let exact = attach(street(), &MaskChoice::Exact).unwrap();
+    let noisy = |seed: u64| attach(street(), &MaskChoice::Noisy(seed)).unwrap();
+    let (again, other) = (noisy(3), noisy(4));
+    let noisy = noisy(3);
+    let (mut missed, mut false_ones, mut ragged, mut differs) = (0i64, 0, 0, 0);
+    for index in (0..40).step_by(2) {
+        let [a, b, c, d] = [&noisy, &again, &other, &exact].map(|dataset| dataset.frame(index).unwrap().masks);
+        assert_eq!(a, b);
+        differs += u32::from(a != c);
+        missed += d.instances.len() as i64 - a.instances.len() as i64;
+        let overlap = |one: &InstanceMask| d.instances.iter().map(|other| other.pixels.overlap(&one.pixels)).fold(0.0, f32::max);
+        false_ones += a.instances.iter().filter(|one| overlap(one) < 0.1).count();
+        ragged += a.instances.iter().filter(|one| d.instances.iter().all(|other| other.mask != one.mask)).count();
+        assert!(a.instances.iter().all(|one| (0.3..1.0).contains(&one.score)));
+    }
+    assert!(missed > 0 && false_ones > 0 && ragged > 10 && differs > 10, "{missed} {false_ones} {ragged} {differs}");
+}
+
+#[test]
+fn sources_are_named_on_the_command_line() {
+    let choice = |text: &str| text.parse::<MaskChoice>();
+    assert_eq!(choice("files:a/b"), Ok(MaskChoice::Files(PathBuf::from("a/b"))));
+    assert_eq!((choice("noisy"), choice("noisy:7")), (Ok(MaskChoice::Noisy(1)), Ok(MaskChoice::Noisy(7))));
+    for wrong in ["", "files", "files:", "onnx:a", "noisy:x", "AUTO"] {
+        assert!(choice(wrong).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+fn masks_of_the_real_clips_are_read_whole() {
+    let data =
+        std::env::var_os("DYNVOX_DATA").map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
+    let clips = [("kitti-odometry", "06"), ("kitti-odometry", "r1405"), ("kitti-tracking", "0003"), ("kitti-tracking", "0005")];
+    for (root, sequence) in clips {
+        let Ok(clip) = input::open(&data.join(root), None, Some(sequence), CameraPair::Auto) else {
+            println!("skipped: masks_of_the_real_clips_are_read_whole {root} {sequence}");
+            continue;
+        };
+        let clip = attach(clip, &MaskChoice::Auto).unwrap();
+        let frames: Vec<FrameMasks> = [0, clip.len() / 2, clip.len() - 1].iter().map(|&at| clip.frame(at).unwrap().masks).collect();
+        assert!(frames.iter().all(|masks| masks.instances.len() > 1 && masks.refusals == MaskRefusals::default()), "{root} {sequence}");
+        assert!(frames.iter().flat_map(|masks| &masks.instances).any(|one| one.class == Class::Car));
+    }
+}

@@ -1,0 +1,16 @@
+//! Where frames come from: data sets on disk, the synthetic street, and the depth and masks that other programs made of them.
+//!
+//! [`source`] says what a source of frames is and what a frame holds; it depends on nothing else here. [`layouts`] reads recordings,
+//! [`depth`] and [`masks`] lay files over any source. Loaders guess nothing silently: what they assume stands in [`FrameSource::notes`], and
+//! what they cannot use is an [`InputError`] that says what to do.
+
+pub mod depth;
+pub mod layouts;
+pub mod masks;
+pub mod source;
+
+pub use layouts::{CameraPair, Found, Layout, Sequence, StreetFrames, open, sequences_at, survey};
+pub use source::{
+    AvailableMasks, DepthRefusals, ExactFrame, FrameMasks, FrameSource, GivenDepth, InputError, InstanceMask, LidarScan, MaskRefusals,
+    ObjectsTruth, Scaled, StereoImages, TrueObject, read_given_poses,
+};

@@ -1,0 +1,202 @@
+//! What can be wrong with a source of frames. Each message says what, where, and what to do next.
+
+use crate::formats::FormatError;
+use std::path::{Path, PathBuf};
+
+/// A data set that cannot be used, or a frame of it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// The path does not exist.
+    #[error("there is no data set at {path}. Check the path; `dynvox run` without one maps the synthetic street")]
+    Absent {
+        /// Path as given.
+        path: PathBuf,
+    },
+    /// No known layout.
+    #[error(
+        "the layout of {path} is unknown. Known are KITTI odometry (sequences/NN/image_0), KITTI tracking \
+         (training/image_02/NNNN) and a folder with left/, right/ and calib.txt; --dataset says which one is meant{}",
+        hint(below)
+    )]
+    Layout {
+        /// Folder looked at.
+        path: PathBuf,
+        /// Folders in it that have a known layout.
+        below: Vec<PathBuf>,
+    },
+    /// A file in place of a folder.
+    #[error("{path} is a file. Give the folder of the data set")]
+    File {
+        /// Path as given.
+        path: PathBuf,
+    },
+    /// A folder inside a data set.
+    #[error("{path} is a part of the data set {root}. Give {root}; `dynvox inspect {root}` says what it holds")]
+    Within {
+        /// Folder looked at.
+        path: PathBuf,
+        /// The data set around it.
+        root: PathBuf,
+    },
+    /// A part of the layout is missing.
+    #[error("{path} is missing. {action}")]
+    Part {
+        /// File or folder expected.
+        path: PathBuf,
+        /// What to do.
+        action: String,
+    },
+    /// The sequence does not exist.
+    #[error("there is no sequence {sequence} in {root}. It holds {known}; choose one with --sequence")]
+    Sequence {
+        /// Name asked for.
+        sequence: String,
+        /// Root of the data set.
+        root: PathBuf,
+        /// Names there.
+        known: String,
+    },
+    /// Several sequences and no choice.
+    #[error("{root} holds several sequences: {known}. Choose one with --sequence")]
+    Choice {
+        /// Root of the data set.
+        root: PathBuf,
+        /// Names there.
+        known: String,
+    },
+    /// An image of one side has no partner on the other.
+    #[error("{image} has no partner {partner}. Add the missing image or remove this one; --start and --frames skip frames at the ends")]
+    Partner {
+        /// The image that is there.
+        image: PathBuf,
+        /// The one that is not.
+        partner: PathBuf,
+    },
+    /// No image at all.
+    #[error("{path} holds no PNG image. Images must be 8-bit PNG files, as `convert x.jpg x.png` makes them")]
+    Empty {
+        /// Folder looked at.
+        path: PathBuf,
+    },
+    /// An image of another size than the first.
+    #[error(
+        "{path} is {found_width} x {found_height} px, but the sequence began with {width} x {height}. All images must have one size: rectify or crop them alike"
+    )]
+    Size {
+        /// The image.
+        path: PathBuf,
+        /// Its width, px.
+        found_width: usize,
+        /// Its height, px.
+        found_height: usize,
+        /// Width of the sequence, px.
+        width: usize,
+        /// Height of the sequence, px.
+        height: usize,
+    },
+    /// An image that cannot be decoded.
+    #[error("{path} cannot be read: {reason}. Fetch or convert this image anew, or end before it with --frames")]
+    Image {
+        /// The image.
+        path: PathBuf,
+        /// What the decoder says.
+        reason: String,
+    },
+    /// A table of numbers that does not parse or has too few rows.
+    #[error("{path}: {reason}. {action}")]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+        /// What to do.
+        action: String,
+    },
+    /// A file that is not what its format demands.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// Masks that cannot be used.
+    #[error("the masks {path} cannot be used: {reason}. Correct them, give others with --instances, or run without: --instances none")]
+    Masks {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Depth that cannot be used.
+    #[error("the depth {path} cannot be used: {reason}. Correct it, give another folder with --depth, or have it computed: --depth elas")]
+    Depth {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The synthetic street refuses its configuration.
+    #[error("the synthetic street cannot be built: {reason}. Change its keys with --set street.<key>=<value>")]
+    Street {
+        /// What is wrong.
+        reason: String,
+    },
+    /// A scale outside (0, 1], or one that leaves no image.
+    #[error(
+        "--scale {scale} cannot be used on {width} x {height} px. Give a number above 0 and up to 1 that leaves at least {least} x {least} px"
+    )]
+    Scale {
+        /// Scale asked for.
+        scale: f64,
+        /// Width before, px.
+        width: usize,
+        /// Height before, px.
+        height: usize,
+        /// Least side left, px.
+        least: usize,
+    },
+}
+
+/// Where to look instead.
+fn hint(below: &[PathBuf]) -> String {
+    let shown: Vec<String> = below.iter().map(|path| path.display().to_string()).collect();
+    if shown.is_empty() { String::new() } else { format!(". Below it, these look like data sets: {}", shown.join(", ")) }
+}
+
+/// A failed read of a folder.
+pub fn read_failed(path: &Path) -> impl FnOnce(std::io::Error) -> InputError + '_ {
+    |source| FormatError::read(path)(source).into()
+}
+
+impl InputError {
+    /// An image of the sequence that cannot be used.
+    pub fn image(error: FormatError) -> Self {
+        match error {
+            FormatError::Content { path, reason, .. } => Self::Image { path, reason },
+            other => Self::Format(other),
+        }
+    }
+
+    /// Masks that cannot be used.
+    pub fn masks(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Masks { path: path.to_path_buf(), reason: reason.into() }
+    }
+
+    /// The same, where a file is not what its format demands.
+    pub fn masks_format(error: FormatError) -> Self {
+        match error {
+            FormatError::Content { path, reason, .. } => Self::Masks { path, reason },
+            other => Self::Format(other),
+        }
+    }
+
+    /// Depth that cannot be used.
+    pub fn depth(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Depth { path: path.to_path_buf(), reason: reason.into() }
+    }
+
+    /// The same, where a file is not what its format demands.
+    pub fn depth_format(error: FormatError) -> Self {
+        match error {
+            FormatError::Content { path, reason, .. } => Self::Depth { path, reason },
+            other => Self::Format(other),
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! What a source of frames is, what a frame holds, and what can be wrong with either.
+
+mod depth;
+mod error;
+mod given_poses;
+mod lidar;
+mod masks;
+mod overlay;
+mod scaled;
+mod truth;
+
+pub use depth::{DepthRefusals, GivenDepth, Quantity, to_disparity};
+pub use error::{InputError, read_failed};
+pub use given_poses::read_given_poses;
+pub use lidar::LidarScan;
+pub use masks::{FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals, bounding_boxes, union};
+pub use overlay::{Layer, Overlay};
+pub use scaled::Scaled;
+pub use truth::{ObjectsTruth, TrueObject};
+
+use crate::formats::Image;
+use dynvox_core::geometry::{StereoRig, Transform};
+use std::path::PathBuf;
+
+/// One stereo pair, decoded.
+#[derive(Clone, Debug)]
+pub struct StereoImages {
+    /// Left grey image.
+    pub left: Image<u8>,
+    /// Right grey image, of the same size.
+    pub right: Image<u8>,
+    /// Left image in colour, where the data set has it: the same camera as `left`.
+    pub colour: Option<Image<[u8; 3]>>,
+    /// Disparity from elsewhere; the core matches the pair where it is absent.
+    pub depth: Option<GivenDepth>,
+    /// Exact values of a rendered frame.
+    pub exact: Option<ExactFrame>,
+    /// Ground truth of the objects, where known.
+    pub objects: Option<ObjectsTruth>,
+    /// Instance masks of the left image; empty until a source of masks is laid over this one.
+    pub masks: FrameMasks,
+}
+
+/// Exact values of a frame, from its renderer.
+#[derive(Clone, Debug)]
+pub struct ExactFrame {
+    /// Depth of the left pixels, m; 0 or infinite where there is none.
+    pub depth_m: Image<f32>,
+    /// Whether the pixel belongs to an object that moves in this frame.
+    pub moving: Image<bool>,
+    /// What each left pixel sees: k is an instance of class `classes[k - 1]`, 0 is none.
+    pub instances: Image<u8>,
+    /// Class names of the instances.
+    pub classes: Vec<&'static str>,
+}
+
+/// Which masks a data set brings along.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum AvailableMasks {
+    /// None.
+    Absent,
+    /// Instance PNGs in a folder beside the images.
+    Folder(PathBuf),
+    /// Exact ones, from the renderer.
+    Exact,
+}
+
+/// A list of stereo pairs with one rig.
+pub trait FrameSource: Send + Sync {
+    /// Short name, fit for a folder: `kitti-odometry-06`.
+    fn name(&self) -> &str;
+
+    /// Frames in all.
+    fn len(&self) -> usize;
+
+    /// Whether there is no frame.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Width and height of every image, px.
+    fn size(&self) -> (usize, usize);
+
+    /// The same of the images as they are stored, before any scaling: masks in files have this size.
+    fn full_size(&self) -> (usize, usize) {
+        self.size()
+    }
+
+    /// Name of a frame's left image without its ending, where it is a file: masks in files have the same names.
+    fn stem(&self, _: usize) -> Option<String> {
+        None
+    }
+
+    /// Masks that come with the data set.
+    fn masks(&self) -> AvailableMasks {
+        AvailableMasks::Absent
+    }
+
+    /// The rig, equal for all frames.
+    fn rig(&self) -> StereoRig;
+
+    /// Time of a frame, s.
+    fn time_s(&self, index: usize) -> f64;
+
+    /// Decodes or renders a frame.
+    fn frame(&self, index: usize) -> Result<StereoImages, InputError>;
+
+    /// Whether frames come with exact depth ([`StereoImages::exact`]).
+    fn has_exact_depth(&self) -> bool {
+        self.masks() == AvailableMasks::Exact
+    }
+
+    /// Whether there is a LiDAR scan for a frame. Without a default, so that no data set laid over another loses its scans.
+    fn has_lidar(&self, index: usize) -> bool;
+
+    /// The scan of a frame, where there is one. Nothing is read of it before.
+    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError>;
+
+    /// True `t_world_camera` of every frame's left camera, where known.
+    fn truth(&self) -> Option<&[Transform]> {
+        None
+    }
+
+    /// What was assumed or left aside, as sentences.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+}

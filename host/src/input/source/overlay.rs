@@ -1,0 +1,85 @@
+//! A source of frames with depth or masks laid over it.
+
+use super::{AvailableMasks, FrameSource, InputError, LidarScan, StereoImages};
+use dynvox_core::geometry::{StereoRig, Transform};
+
+/// What is laid over frames.
+pub trait Layer: Send + Sync {
+    /// Adds to a frame of `dataset`.
+    ///
+    /// # Errors
+    /// What is to be added cannot be read.
+    fn add(&self, dataset: &dyn FrameSource, index: usize, images: &mut StereoImages) -> Result<(), InputError>;
+}
+
+/// A data set under a layer: all but the frames is the data set's own.
+pub struct Overlay<L> {
+    dataset: Box<dyn FrameSource>,
+    layer: L,
+    notes: Vec<String>,
+}
+
+impl<L: Layer> Overlay<L> {
+    /// Lays `layer` over `dataset`; `note` says of it what a user should know.
+    pub fn new(dataset: Box<dyn FrameSource>, layer: L, note: String) -> Self {
+        let mut notes = dataset.notes().to_vec();
+        notes.push(note);
+        Self { dataset, layer, notes }
+    }
+}
+
+impl<L: Layer> FrameSource for Overlay<L> {
+    fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
+        let mut images = self.dataset.frame(index)?;
+        self.layer.add(self.dataset.as_ref(), index, &mut images)?;
+        Ok(images)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn name(&self) -> &str {
+        self.dataset.name()
+    }
+
+    fn len(&self) -> usize {
+        self.dataset.len()
+    }
+
+    fn size(&self) -> (usize, usize) {
+        self.dataset.size()
+    }
+
+    fn full_size(&self) -> (usize, usize) {
+        self.dataset.full_size()
+    }
+
+    fn stem(&self, index: usize) -> Option<String> {
+        self.dataset.stem(index)
+    }
+
+    fn masks(&self) -> AvailableMasks {
+        self.dataset.masks()
+    }
+
+    fn rig(&self) -> StereoRig {
+        self.dataset.rig()
+    }
+
+    fn time_s(&self, index: usize) -> f64 {
+        self.dataset.time_s(index)
+    }
+
+    fn has_lidar(&self, index: usize) -> bool {
+        self.dataset.has_lidar(index)
+    }
+
+    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError> {
+        self.dataset.lidar(index)
+    }
+
+    fn truth(&self) -> Option<&[Transform]> {
+        self.dataset.truth()
+    }
+}
