@@ -125,8 +125,11 @@ const _: () = assert!(Capacity::ONBOARD.bytes() < 256 * MIB);
 const _: () = assert!(Capacity::DESKTOP.bytes() < 2048 * MIB);
 
 impl<'s> Mapper<'s> {
-    /// Cuts a mapper out of `slab`, which must begin at a multiple of [`crate::memory::SLAB_ALIGN`] bytes and hold at least
-    /// `capacity.bytes()`.
+    /// Makes a mapper in `slab`, which must hold at least `capacity.bytes()` from its first byte at a multiple of
+    /// [`SLAB_ALIGN`](crate::memory::SLAB_ALIGN) on: `capacity.bytes() + SLAB_ALIGN` bytes are enough anywhere.
+    ///
+    /// # Errors
+    /// The slab is too small, or the configuration is not usable.
     // Never inlined: what it needs of the stack must not stay in its caller's frame.
     #[inline(never)]
     pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {

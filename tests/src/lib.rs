@@ -1,28 +1,26 @@
-//! Shared ground of the integration tests: a slab for a mapper, and clips of the synthetic street.
+//! What the integration tests share: a slab for a mapper, clips of the synthetic street, and the repository's own source.
+//!
+//! The README's example is compiled and run with the doc tests of this package.
+#![cfg_attr(doctest, doc = include_str!("../../README.md"))]
+
+pub mod source;
 
 use dynvox::input::InstanceMask;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::{Capacity, Config, Mapper, StereoFrame, image::View, masks::PixelBox, memory::SLAB_ALIGN, tracking::Class};
 
-/// A slab on the heap, aligned as a mapper wants it.
-pub struct HeapSlab {
-    bytes: Vec<u8>,
-    start: usize,
-    len: usize,
-}
+/// A slab on the heap.
+pub struct HeapSlab(Vec<u8>);
 
 impl HeapSlab {
     /// A zeroed slab of the capacity's size.
     pub fn of(capacity: &Capacity) -> Self {
-        let len = capacity.bytes();
-        let bytes = vec![0; len + SLAB_ALIGN];
-        let start = bytes.as_ptr().align_offset(SLAB_ALIGN);
-        Self { bytes, start, len }
+        Self(vec![0; capacity.bytes() + SLAB_ALIGN])
     }
 
     /// Its bytes.
     pub fn bytes(&mut self) -> &mut [u8] {
-        &mut self.bytes[self.start..self.start + self.len]
+        &mut self.0
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a call comes back with.
 
 use core::ffi::{CStr, c_char};
-use dynvox_core::{NewError, StepError, memory::SlabError, view::RaycastError};
+use dynvox_core::{NewError, StepError, view::RaycastError};
 
 /// What a call comes back with. Whatever is not DYNVOX_STATUS_OK has changed nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,6 @@ impl DynvoxStatus {
 impl From<NewError> for DynvoxStatus {
     fn from(error: NewError) -> Self {
         match error {
-            NewError::Slab(SlabError::Misaligned) => Self::Misaligned,
             NewError::Slab(_) => Self::TooSmall,
             NewError::Config(_) => Self::Config,
         }

@@ -1,13 +1,31 @@
-//! One aligned run of bytes, and the cutter that turns it into typed regions.
+//! The slab a caller hands over, and the carver that turns it into typed regions.
 
 use super::{Footprint, OneShot};
 use allocator_api2::boxed::Box;
 use bytemuck::Pod;
+use core::{
+    fmt,
+    ops::{Deref, DerefMut},
+};
 
-/// Alignment of the slab and of every region in it, in bytes: a cache line.
+/// Alignment of every region of a slab, in bytes: a cache line.
+///
+/// A slab itself may begin anywhere: up to `SLAB_ALIGN - 1` bytes at its front are skipped.
 pub const SLAB_ALIGN: usize = 64;
 
-/// An aligned slab of `N` bytes, all zero. Put it in a `static` (it lands in `.bss`): a slab on the stack would overflow it.
+/// An aligned slab of `N` bytes, all zero, for a `static`: it lands in `.bss` and never touches the stack, in debug builds either.
+///
+/// With an allocator a `vec![0u8; capacity.bytes() + SLAB_ALIGN]` does as well: see [`Mapper::new`](crate::Mapper::new).
+///
+/// ```
+/// use dynvox_core::{Capacity, Slab};
+/// use static_cell::ConstStaticCell;
+///
+/// static SLAB: ConstStaticCell<Slab<{ Capacity::TINY.bytes() }>> = ConstStaticCell::new(Slab::ZERO);
+///
+/// let slab: &'static mut [u8] = SLAB.take(); // once: a second call panics, `try_take` returns `None`
+/// assert_eq!(slab.len(), Capacity::TINY.bytes());
+/// ```
 #[repr(C, align(64))]
 pub struct Slab<const N: usize>(pub [u8; N]);
 
@@ -16,21 +34,56 @@ impl<const N: usize> Slab<N> {
     pub const ZERO: Self = Self([0; N]);
 }
 
+impl<const N: usize> Deref for Slab<N> {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        &self.0
+    }
+}
+
+impl<const N: usize> DerefMut for Slab<N> {
+    fn deref_mut(&mut self) -> &mut [u8] {
+        &mut self.0
+    }
+}
+
 /// Why a slab cannot be used.
+///
+/// ```
+/// use dynvox_core::{Capacity, Config, Mapper, NewError, geometry::StereoRig, memory::SlabError};
+///
+/// let rig = StereoRig { focal_px: 500.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let error = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut []).unwrap_err();
+/// let NewError::Slab(SlabError::TooSmall { missing }) = error else { panic!("{error}") };
+/// assert!(missing >= Capacity::TINY.bytes());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum SlabError {
-    /// The slab ends `missing` bytes too early for the capacity asked of it.
+    /// The slab is too short for the capacity.
     TooSmall {
-        /// Bytes lacking: a slab longer by exactly this many is enough.
+        /// Bytes lacking: a slab longer by exactly this many, with the same alignment, is enough.
         missing: usize,
     },
-    /// The slab does not begin at a multiple of [`SLAB_ALIGN`] bytes.
-    Misaligned,
-    /// Something did not fit the region computed for it: a bug of the core, not of the caller.
-    Misfit,
+    /// A value did not fit the region computed for it: a bug of the core, not of the caller.
+    RegionTooSmall,
     /// More regions than the footprint can name: a bug of the core, not of the caller.
     TooManyRegions,
 }
+
+impl fmt::Display for SlabError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooSmall { missing } => write!(f, "the slab is {missing} bytes too small"),
+            Self::RegionTooSmall => f.write_str("a value does not fit its region of the slab: a bug of dynvox-core"),
+            Self::TooManyRegions => f.write_str("more regions than a footprint can name: a bug of dynvox-core"),
+        }
+    }
+}
+
+impl core::error::Error for SlabError {}
 
 /// Bytes that `count` items of `T` occupy in the slab: their size, rounded up to [`SLAB_ALIGN`].
 pub const fn region_bytes<T>(count: usize) -> usize {
@@ -52,15 +105,17 @@ pub struct Carver<'s> {
 }
 
 impl<'s> Carver<'s> {
-    /// Starts at the front of `slab`, of which `wanted` bytes will be used.
+    /// Starts at the first aligned byte of `slab`, of which `wanted` bytes will be used.
+    ///
+    /// # Errors
+    /// [`SlabError::TooSmall`]: fewer than `wanted` bytes follow the first aligned one.
     pub fn new(slab: &'s mut [u8], wanted: usize) -> Result<Self, SlabError> {
-        if !(slab.as_ptr() as usize).is_multiple_of(SLAB_ALIGN) {
-            return Err(SlabError::Misaligned);
+        let skipped = slab.as_ptr().align_offset(SLAB_ALIGN);
+        let len = slab.len();
+        match slab.get_mut(skipped..) {
+            Some(aligned) if aligned.len() >= wanted => Ok(Self { rest: Some(aligned), ..Self::without_slab() }),
+            _ => Err(SlabError::TooSmall { missing: skipped.saturating_add(wanted) - len }),
         }
-        if slab.len() < wanted {
-            return Err(SlabError::TooSmall { missing: wanted - slab.len() });
-        }
-        Ok(Self { rest: Some(slab), ..Self::without_slab() })
     }
 
     /// Records regions without memory: every region is empty.
@@ -123,7 +178,7 @@ impl<'s> Carver<'s> {
     /// Records a failure unless a value fits its region. Without a slab there is no region.
     pub(crate) fn require_fit(&mut self, fits: bool) {
         if self.rest.is_some() && !fits {
-            self.failure.get_or_insert(SlabError::Misfit);
+            self.failure.get_or_insert(SlabError::RegionTooSmall);
         }
     }
 
@@ -149,6 +204,7 @@ impl<'s> Carver<'s> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn allocates_aligned_zeroed_regions_and_records_them() {
@@ -205,7 +261,21 @@ mod tests {
     #[test]
     fn names_the_bytes_it_lacks() {
         let mut slab = std::boxed::Box::new(Slab([0u8; 128]));
-        assert_eq!(Carver::new(&mut slab.0, 200).unwrap_err(), SlabError::TooSmall { missing: 72 });
-        assert_eq!(Carver::new(&mut slab.0[1..], 64).unwrap_err(), SlabError::Misaligned);
+        assert_eq!(Carver::new(&mut slab, 200).unwrap_err(), SlabError::TooSmall { missing: 72 });
+        assert_eq!(SlabError::TooSmall { missing: 72 }.to_string(), "the slab is 72 bytes too small");
+    }
+
+    #[test]
+    fn skips_to_the_first_aligned_byte() {
+        let mut slab = std::boxed::Box::new(Slab([0u8; 192]));
+        for lead in 1..=64 {
+            let wanted = 128;
+            let mut carver = Carver::new(&mut slab[lead..], wanted).unwrap();
+            assert_eq!(carver.alloc::<u64>("a", 16).as_ptr().align_offset(SLAB_ALIGN), 0);
+            assert_eq!(carver.check(), Ok(()));
+            let short = Carver::new(&mut slab[lead..], wanted + 1).unwrap_err();
+            assert_eq!(short, SlabError::TooSmall { missing: 1 }, "{lead} bytes behind an aligned one");
+        }
+        assert_eq!(Carver::new(&mut slab[1..3], 0).unwrap_err(), SlabError::TooSmall { missing: 61 });
     }
 }
