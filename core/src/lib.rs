@@ -25,6 +25,7 @@ pub mod masks;
 pub mod memory;
 pub mod objects;
 pub mod random;
+pub mod rectify;
 pub mod report;
 pub mod scene_flow;
 pub mod snapshot;

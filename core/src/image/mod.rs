@@ -1,7 +1,9 @@
 //! Borrowed images: pixels stay where the caller or the slab keeps them.
 
+mod coverage;
 mod view;
 
+pub use coverage::{InvalidPair, InvalidPixels};
 pub use view::{View, ViewMut};
 
 /// One pixel of disparity in the core's unit: 1/256 px in `u16`, as in KITTI's 16-bit PNGs. 0 means none.

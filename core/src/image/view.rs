@@ -63,6 +63,11 @@ impl<'a, T> View<'a, T> {
         if self.stride == self.width { self.data.get(..self.width * self.height).unwrap_or(&[]) } else { &[] }
     }
 
+    /// The pixels from the first on, and how many items apart rows are.
+    pub(crate) fn strided(&self) -> (&'a [T], usize) {
+        (self.data, self.stride)
+    }
+
     /// All rows, top to bottom.
     pub fn rows(&self) -> impl Iterator<Item = &'a [T]> + use<'a, T> {
         let this = (self.data, self.width, self.stride);

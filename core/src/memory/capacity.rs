@@ -7,6 +7,10 @@ pub struct Capacity {
     pub image_width: usize,
     /// Highest image, px. A higher frame is refused.
     pub image_height: usize,
+    /// Widest raw image that is rectified, px, at most 4,096; 0 where images come rectified, and then rectification costs no byte.
+    pub raw_width: usize,
+    /// Highest raw image, px; as the width.
+    pub raw_height: usize,
     /// Features kept per image and pass. Further ones are dropped in scan order and counted.
     pub features: usize,
     /// Matches kept per pass. Further ones are dropped and counted.
@@ -38,6 +42,8 @@ impl Capacity {
     pub const TINY: Self = Self {
         image_width: 320,
         image_height: 96,
+        raw_width: 0,
+        raw_height: 0,
         features: 2_000,
         matches: 1_000,
         blocks: 2_500,
@@ -55,6 +61,8 @@ impl Capacity {
     pub const SMALL: Self = Self {
         image_width: 640,
         image_height: 192,
+        raw_width: 0,
+        raw_height: 0,
         features: 6_000,
         matches: 4_000,
         blocks: 30_000,
@@ -72,6 +80,8 @@ impl Capacity {
     pub const ONBOARD: Self = Self {
         image_width: 1_280,
         image_height: 384,
+        raw_width: 0,
+        raw_height: 0,
         features: 24_000,
         matches: 10_000,
         blocks: 53_000,
@@ -89,6 +99,8 @@ impl Capacity {
     pub const DESKTOP: Self = Self {
         image_width: 1_920,
         image_height: 1_088,
+        raw_width: 0,
+        raw_height: 0,
         features: 32_000,
         matches: 20_000,
         blocks: 550_000,

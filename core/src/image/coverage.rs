@@ -1,0 +1,83 @@
+//! Which pixels of an image show anything.
+
+/// Pixels a word has bits for.
+const WORD: usize = 64;
+
+/// One bit a pixel, set where the pixel is not to be used. Rows begin at words.
+#[derive(Clone, Copy, Debug)]
+pub struct InvalidPixels<'a> {
+    words: &'a [u64],
+    width: usize,
+    height: usize,
+}
+
+impl<'a> InvalidPixels<'a> {
+    /// Words a row of `width` pixels takes.
+    pub const fn words_a_row(width: usize) -> usize {
+        width.div_ceil(WORD)
+    }
+
+    /// Views `words` as bits of `width` x `height` pixels; `None` when there are too few.
+    pub fn new(words: &'a [u64], width: usize, height: usize) -> Option<Self> {
+        let words = words.get(..Self::words_a_row(width).checked_mul(height)?)?;
+        Some(Self { words, width, height })
+    }
+
+    /// Width and height of the image, px.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Whether pixel (u, v) is not to be used; those beyond the image are not.
+    pub fn contains(&self, u: usize, v: usize) -> bool {
+        if u >= self.width {
+            return true;
+        }
+        let word = self.words.get(v * Self::words_a_row(self.width) + u / WORD);
+        word.is_none_or(|word| word >> (u % WORD) & 1 == 1)
+    }
+
+    /// The columns of row `v` that are not to be used, from left to right.
+    pub fn in_row(&self, v: usize) -> impl Iterator<Item = usize> + use<'a> {
+        let row = Self::words_a_row(self.width);
+        let words = self.words.get(v * row..(v + 1) * row).unwrap_or(&[]);
+        words.iter().enumerate().flat_map(|(at, &word)| Bits(word).map(move |bit| at * WORD + bit))
+    }
+}
+
+/// The set bits of a word, from the lowest.
+struct Bits(u64);
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    fn next(&mut self) -> Option<usize> {
+        let bit = (self.0 != 0).then(|| self.0.trailing_zeros() as usize)?;
+        self.0 &= self.0 - 1;
+        Some(bit)
+    }
+}
+
+/// The pixels of a pair that are not to be used.
+#[derive(Clone, Copy, Debug)]
+pub struct InvalidPair<'a> {
+    /// Of the left image.
+    pub left: InvalidPixels<'a>,
+    /// Of the right image.
+    pub right: InvalidPixels<'a>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_of_a_row_come_from_left_to_right_and_outside_is_invalid() {
+        let words = [1 << 3 | 1 << 63, 1, 0, 0];
+        let invalid = InvalidPixels::new(&words, 70, 2).unwrap();
+        assert_eq!(invalid.in_row(0).collect::<std::vec::Vec<_>>(), [3, 63, 64]);
+        assert_eq!(invalid.in_row(1).count(), 0);
+        assert!(invalid.contains(64, 0) && !invalid.contains(65, 0) && invalid.contains(70, 0) && invalid.contains(0, 2));
+        assert!(InvalidPixels::new(&words, 70, 3).is_none());
+    }
+}
