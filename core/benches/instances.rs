@@ -16,7 +16,7 @@ use cpu_time::ThreadTime;
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     Capacity, Config, Executor, Mapper, Stage, StereoFrame,
-    geometry::{StereoRig, Transform, exp},
+    geometry::{StereoRig, Transform},
     image::View,
     memory::SLAB_ALIGN,
     tracking::{Class, Detection},
@@ -150,7 +150,7 @@ fn render(frame: usize) -> Frame {
     Frame {
         cars: cars.collect(),
         pair,
-        t_world_camera: exp(Vector3::zeros(), Vector3::new(0.0, 0.0, frame as f64 * STEP_M)),
+        t_world_camera: Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, frame as f64 * STEP_M)),
     }
 }
 

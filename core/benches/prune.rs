@@ -7,7 +7,7 @@ use cpu_time::ThreadTime;
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     Capacity, Serial,
-    geometry::{StereoRig, exp},
+    geometry::{StereoRig, Transform},
     image::View,
     memory::Carver,
     volume::{NoStore, Observation, Viewpoint, Volume, VolumeConfig},
@@ -38,7 +38,7 @@ fn bench(criterion: &mut Criterion) {
         rig,
         width: WIDTH,
         height: HEIGHT,
-        t_world_camera: exp(Vector3::zeros(), Vector3::zeros()),
+        t_world_camera: Transform::new(Vector3::zeros(), Vector3::zeros()),
     };
     let bytes = Volume::bytes(&capacity);
     let mut slab = vec![0u8; bytes + 64];

@@ -12,7 +12,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     Capacity, Serial,
-    geometry::{StereoRig, exp},
+    geometry::{StereoRig, Transform},
     image::View,
     memory::Carver,
     view::{MeshConfig, RaycastConfig, Raycaster},
@@ -62,7 +62,7 @@ fn depth(x: f64, y: f64, z: f64) -> f64 {
 
 fn view(frame: usize) -> Viewpoint {
     let turn = 0.05 * (frame as f64 * 0.2).sin();
-    let t_world_camera = exp(Vector3::new(0.0, turn, 0.0), Vector3::new(0.0, 0.0, frame as f64 * STEP_M));
+    let t_world_camera = Transform::new(Vector3::new(0.0, turn, 0.0), Vector3::new(0.0, 0.0, frame as f64 * STEP_M));
     Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera }
 }
 
@@ -74,7 +74,7 @@ fn drive(volume: &mut Volume<'_>) {
         for (at, (depth_m, grey)) in depth_m.iter_mut().zip(&mut grey).enumerate() {
             let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
             let ray = Vector3::new((u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px, 1.0);
-            let world = view.t_world_camera.rotation * ray;
+            let world = view.t_world_camera.rotate(ray);
             // Depth in the camera is depth along the street over the ray's share of it.
             let met = depth(world.x / world.z, world.y / world.z, frame as f64 * STEP_M) / world.z;
             *depth_m = if met < 20.0 { met as f32 } else { 0.0 };

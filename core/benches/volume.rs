@@ -6,12 +6,12 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     Capacity, Serial,
-    geometry::{StereoRig, Transform, depth_from_disparity, exp},
+    geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
     memory::Carver,
     volume::{NoStore, Observation, Viewpoint, Volume, VolumeConfig},
 };
-use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use std::path::PathBuf;
 
 struct Frame {
@@ -39,8 +39,8 @@ fn kitti() -> Option<Vec<Frame>> {
         let grey = image::open(root.join(format!("sequences/06/image_0/{i:06}.png"))).ok()?.into_luma8();
         let (width, height) = (disparity.width() as usize, disparity.height() as usize);
         let p: Vec<f64> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::new(p[0], p[1], p[2], p[4], p[5], p[6], p[8], p[9], p[10]));
-        let t_world_camera = Transform::from_parts(Translation3::new(p[3], p[7], p[11]), UnitQuaternion::from_rotation_matrix(&rotation));
+        let rotation = [[p[0], p[1], p[2]], [p[4], p[5], p[6]], [p[8], p[9], p[10]]];
+        let t_world_camera = Transform::from_rotation_matrix(&rotation, [p[3], p[7], p[11]]);
         let mut depth_m = vec![0.0; width * height];
         let disparity = View::new(disparity.as_raw(), width, height)?;
         depth_from_disparity(&rig, 0.5, 20.0, disparity, &mut ViewMut::new(&mut depth_m, width, height)?);
@@ -69,7 +69,7 @@ fn canyon() -> Vec<Frame> {
         rig,
         width,
         height,
-        t_world_camera: exp(Vector3::zeros(), Vector3::new(0.0, 0.0, z)),
+        t_world_camera: Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, z)),
     };
     (0..20)
         .map(|i| Frame {

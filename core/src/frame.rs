@@ -54,7 +54,7 @@ impl<'a> StereoFrame<'a> {
             disparity.rows().for_each(|row| digest.u16s(row));
         }
         if let Some(pose) = &self.t_world_camera {
-            pose.rotation.coords.iter().chain(pose.translation.vector.iter()).for_each(|&value| digest.f64(value));
+            pose.rotation.iter().chain(&pose.translation_m).for_each(|&value| digest.f64(value));
         }
         digest.u64(self.detections.iter().map(Detection::digest).fold(0, u64::wrapping_add));
         digest.finish()

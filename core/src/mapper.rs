@@ -67,6 +67,8 @@ pub enum StepError {
     SizeChanged,
     /// The frame's pose is not made of finite numbers.
     PoseNotFinite,
+    /// The quaternion of the frame's pose does not have length 1.
+    PoseNotRotation,
 }
 
 /// Least image width the matchers can use, px.
@@ -266,12 +268,11 @@ impl<'s> Mapper<'s> {
         if size[0] < MIN_WIDTH || size[1] < MIN_HEIGHT {
             return Err(StepError::TooSmall { width: MIN_WIDTH, height: MIN_HEIGHT });
         }
-        let finite = |pose: &Transform| {
-            let [rotation, place] = [pose.rotation.coords.as_slice(), pose.translation.vector.as_slice()];
-            rotation.iter().chain(place).all(|value| value.is_finite())
-        };
-        if !frame.t_world_camera.as_ref().is_none_or(finite) {
+        if !frame.t_world_camera.is_none_or(|pose| pose.is_finite()) {
             return Err(StepError::PoseNotFinite);
+        }
+        if !frame.t_world_camera.is_none_or(|pose| pose.is_rotation()) {
+            return Err(StepError::PoseNotRotation);
         }
         if self.size.is_some_and(|known| known != size) {
             return Err(StepError::SizeChanged);

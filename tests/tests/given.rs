@@ -1,9 +1,8 @@
 //! Depth and poses from outside take the place of the core's own, within its limits.
 
 use dynvox_core::stereo::StereoStatus;
-use dynvox_core::{Capacity, Mapper, PoseOrigin, Report, Serial, StepError, image::View};
+use dynvox_core::{Capacity, Mapper, PoseOrigin, Report, Serial, StepError, geometry::Transform, image::View};
 use dynvox_tests::{Clip, HeapSlab};
-use nalgebra::Vector3;
 
 const SIZE: (usize, usize) = (320, 96);
 
@@ -49,7 +48,7 @@ fn disparities_wider_than_the_image_are_refused_and_counted() {
 fn what_is_given_is_part_of_the_inputs_digest_and_motion_goes_on_without_it() {
     let [a, b] = [0, 1].map(|more| reports(3, move |u, v| if (u, v) == (100, 50) { 2_000 + more } else { 2_000 }));
     assert!(a.iter().zip(&b).all(|(a, b)| a.digests.input != b.digests.input));
-    assert!(a[2].pose == PoseOrigin::Estimated && a[2].t_world_camera.translation.z > 0.5, "the camera is followed on the images");
+    assert!(a[2].pose == PoseOrigin::Estimated && a[2].t_world_camera.translation_m[2] > 0.5, "the camera is followed on the images");
 }
 
 #[test]
@@ -60,10 +59,12 @@ fn wrong_sizes_and_poses_that_are_none_are_refused_and_change_nothing() {
         let frames: Vec<_> = clip.stereo().collect();
         let wrong = dynvox_core::StereoFrame { disparity_q8: View::new(&small, 100, 96), ..frames[0] };
         assert_eq!(mapper.step(&wrong, &Serial).err(), Some(StepError::SizesDiffer));
-        let mut pose = dynvox_core::geometry::Transform::identity();
-        pose.translation.vector.x = f64::NAN;
-        let wrong = dynvox_core::StereoFrame { t_world_camera: Some(pose), ..frames[0] };
-        assert_eq!(mapper.step(&wrong, &Serial).err(), Some(StepError::PoseNotFinite));
+        let mut with_pose = |pose| mapper.step(&dynvox_core::StereoFrame { t_world_camera: Some(pose), ..frames[0] }, &Serial).err();
+        assert_eq!(with_pose(Transform::from_translation([f64::NAN, 0.0, 0.0])), Some(StepError::PoseNotFinite));
+        for length in [0.0, 1e-200, 1e200] {
+            let pose = Transform { rotation: [0.0, 0.0, 0.0, length], ..Transform::IDENTITY };
+            assert_eq!(with_pose(pose), Some(StepError::PoseNotRotation), "{length}");
+        }
         assert_eq!(mapper.step(&frames[0], &Serial).map(|report| report.frame), Ok(0));
     });
 }
@@ -75,14 +76,14 @@ fn given_poses_are_where_the_camera_is_and_change_what_the_map_holds() {
         let mut slab = HeapSlab::of(&Capacity::TINY);
         let mut mapper = Mapper::new(&Capacity::TINY, &clip.config(), slab.bytes()).expect("a slab that fits");
         let steps = (0i32..).zip(clip.stereo()).map(|(at, frame)| {
-            let pose = dynvox_core::geometry::exp(Vector3::zeros(), Vector3::new(7.0, 0.0, shift_m * f64::from(at)));
+            let pose = Transform::from_translation([7.0, 0.0, shift_m * f64::from(at)]);
             mapper.step(&dynvox_core::StereoFrame { t_world_camera: Some(pose), ..frame }, &Serial).expect("a good frame")
         });
         steps.collect()
     };
     let (slow, fast) = (run(0.8), run(0.9));
     assert_eq!(slow.iter().map(|report| report.pose).collect::<Vec<_>>(), [PoseOrigin::First, PoseOrigin::Given, PoseOrigin::Given]);
-    assert_eq!(slow[2].t_world_camera.translation.vector, Vector3::new(7.0, 0.0, 1.6));
+    assert_eq!(slow[2].t_world_camera.translation_m, [7.0, 0.0, 1.6]);
     assert!(slow.iter().all(|report| report.egomotion.is_none() && report.fused));
     assert!(slow[2].digest != fast[2].digest && slow[2].digests.input != fast[2].digests.input);
 }

@@ -32,7 +32,7 @@ fn disparity_q8(street: &Street, frame: &SynthFrame) -> Vec<u16> {
 
 fn scan(street: &Street, index: u32) -> LidarScan {
     let t_camera_lidar = street.t_camera_lidar();
-    let point = |&[x, y, z, _]: &[f32; 4]| (t_camera_lidar * nalgebra::Point3::new(x, y, z).cast::<f64>()).coords.into();
+    let point = |&[x, y, z, _]: &[f32; 4]| t_camera_lidar.transform_point([x, y, z].map(f64::from));
     LidarScan::of_rig(street.lidar(index).iter().map(point).collect(), &street.rig())
 }
 

@@ -100,8 +100,8 @@ impl Drive {
         mapper.triangles(&mut |triangle| {
             let corner = triangle.vertices[0].position_m.map(f64::from);
             count += u64::from(boxes.iter().any(|(t_object_map, [width, height, length])| {
-                let at = t_object_map * nalgebra::Point3::from(corner);
-                at.x.abs() < width / 2.0 - 0.2 && at.z.abs() < length / 2.0 - 0.2 && at.y < -0.3 && at.y > 0.2 - height
+                let [x, y, z] = t_object_map.transform_point(corner);
+                x.abs() < width / 2.0 - 0.2 && z.abs() < length / 2.0 - 0.2 && y < -0.3 && y > 0.2 - height
             }));
         });
         count
@@ -147,15 +147,15 @@ fn each_cars_state_and_motion_are_the_true_ones_whatever_the_order_of_detections
         for track in mapper.tracks().filter(|track| track.seen && track.sightings > 4) {
             let Some(car) = truth(frame, seen, &track) else { continue };
             states.entry(track.id).or_default().push((car.moving, track.state));
-            let distance_m = (frame.t_world_camera.inverse() * car.t_world_object).translation.vector.z;
+            let distance_m = (frame.t_world_camera.inverse() * car.t_world_object).translation_m[2];
             let Some(before) = last.objects.iter().find(|other| other.id == car.id) else { continue };
             if !(track.measured && car.moving && distance_m < 35.0) {
                 continue;
             }
             let moved = t_map_world * car.t_world_object * before.t_world_object.inverse() * t_map_world.inverse();
-            let center = nalgebra::Point3::from(track.center_world_m);
-            errors_m.push((track.motion_world * center - moved * center).norm());
-            errors_deg.push((track.motion_world.rotation.inverse() * moved.rotation).angle().to_degrees());
+            let [a, b] = [track.motion_world, moved].map(|motion| motion.transform_point(track.center_world_m));
+            errors_m.push((0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt());
+            errors_deg.push((track.motion_world.inverse() * moved).angle_rad().to_degrees());
         }
     });
     for (id, states) in &states {

@@ -155,10 +155,7 @@ pub unsafe extern "C" fn dynvox_pose_matrix(pose: *const DynvoxPose, matrix: *mu
         (Ok(pose), Ok(matrix)) => (pose, matrix),
         (Err(status), _) | (_, Err(status)) => return status,
     };
-    let rotation = pose.rotation.to_rotation_matrix();
-    let (r, t) = (rotation.matrix(), &pose.translation);
-    let rows = [[r.m11, r.m12, r.m13, t.x], [r.m21, r.m22, r.m23, t.y], [r.m31, r.m32, r.m33, t.z]];
-    for (at, &number) in rows.as_flattened().iter().enumerate() {
+    for (at, &number) in pose.matrix_3x4().as_flattened().iter().enumerate() {
         // SAFETY: three rows of four.
         unsafe { matrix.add(at).write(number) };
     }

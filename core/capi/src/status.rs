@@ -72,7 +72,7 @@ impl From<StepError> for DynvoxStatus {
         match error {
             StepError::SizeChanged => Self::SizeChanged,
             StepError::SizesDiffer | StepError::TooLarge { .. } | StepError::TooSmall { .. } => Self::Size,
-            StepError::PoseNotFinite => Self::Pose,
+            StepError::PoseNotFinite | StepError::PoseNotRotation => Self::Pose,
         }
     }
 }

@@ -6,7 +6,6 @@ use crate::{
 };
 use core::ffi::c_char;
 use dynvox_core::{Capacity, Config, Report, Severity, geometry::StereoRig, geometry::Transform};
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 /// How large a mapper is. Numbers as in dynvox's own table of profiles.
 pub type DynvoxProfile = u32;
@@ -146,23 +145,15 @@ impl DynvoxPose {
     /// Bit for bit: nothing is normalised.
     pub(crate) fn transform(&self) -> Result<Transform, DynvoxStatus> {
         let [w, x, y, z] = self.rotation;
-        let [tx, ty, tz] = self.translation_m;
-        let off = w * w + x * x + y * y + z * z - 1.0;
-        // False for NaN as well.
-        if !(off < 1e-6 && off > -1e-6 && tx.is_finite() && ty.is_finite() && tz.is_finite()) {
-            return Err(DynvoxStatus::Pose);
-        }
-        Ok(Transform::from_parts(Translation3::new(tx, ty, tz), UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))))
+        let pose = Transform { rotation: [x, y, z, w], translation_m: self.translation_m };
+        if pose.is_finite() && pose.is_rotation() { Ok(pose) } else { Err(DynvoxStatus::Pose) }
     }
 }
 
 impl From<&Transform> for DynvoxPose {
     fn from(pose: &Transform) -> Self {
-        let (rotation, translation) = (&pose.rotation, &pose.translation);
-        Self {
-            rotation: [rotation.w, rotation.i, rotation.j, rotation.k],
-            translation_m: [translation.x, translation.y, translation.z],
-        }
+        let [x, y, z, w] = pose.rotation;
+        Self { rotation: [w, x, y, z], translation_m: pose.translation_m }
     }
 }
 

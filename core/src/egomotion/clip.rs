@@ -134,7 +134,8 @@ fn run(name: &str) -> Option<Vec<Matrix4<f64>>> {
         if let Some(estimate) = estimate {
             assert_eq!(estimate.status, MotionStatus::Estimated, "{name} {frame}: {report:?} {estimate:?}");
         }
-        trajectory.push(camera.t_world_camera().to_homogeneous());
+        let rows = camera.t_world_camera().matrix_3x4();
+        trajectory.push(Matrix4::from_fn(|r, c| rows.get(r).map_or(f64::from(u8::from(c == 3)), |row| row[c])));
     }
     let mean = |total: f64| total / trajectory.len() as f64;
     println!("{name}: scene flow {:.1} ms, egomotion {:.1} ms a frame", mean(matching_ms), mean(moving_ms));

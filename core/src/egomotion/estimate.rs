@@ -2,7 +2,7 @@
 
 use super::{
     EgomotionConfig,
-    normal::{Normal, Posed, moved},
+    normal::{Normal, Posed},
     points::{Point, Points},
 };
 use crate::{
@@ -120,7 +120,7 @@ impl<'s> Estimator<'s> {
         if matches < needed {
             return MotionEstimate::failed(MotionStatus::TooFewMatches, matches, 0, 0);
         }
-        let start = initial.copied().unwrap_or_else(Transform::identity);
+        let start = initial.copied().unwrap_or(Transform::IDENTITY);
         let (best, samples) = self.draw(config, rig, random, &start);
         let mut estimate = MotionEstimate::failed(MotionStatus::TooFewInliers, matches, 0, samples);
         let mut motion = best;
@@ -198,7 +198,7 @@ impl<'s> Estimator<'s> {
                 sums.add(point, &posed, rig, |_| 1.0);
             }
             let step = sums.solve()?;
-            motion = moved(&motion, step);
+            motion = motion.retract(step);
             if largest(step) < SAMPLE_STEP_MIN {
                 return Some(motion);
             }
@@ -220,7 +220,7 @@ impl<'s> Estimator<'s> {
                 sums.add(&point, &posed, rig, |_| side_weight(config, rig, &point));
             }
             let Some(step) = sums.solve() else { return (motion, taken, false) };
-            motion = moved(&motion, step);
+            motion = motion.retract(step);
             if largest(step) < REFINE_STEP_MIN {
                 return (motion, taken, true);
             }

@@ -1,10 +1,10 @@
 //! The normal equations of a reprojection error, and their solution.
 //!
-//! The motion is moved by a small rotation vector and translation on its left: T <- exp(step) T. Per point three different rows: u in
+//! The motion is moved by a small rotation vector and translation on its left: T <- retract(step) T. Per point three different rows: u in
 //! the left image, u in the right one, and v, which both images share and which therefore counts twice.
 
 use super::points::{DEPTH_MIN_M, Point};
-use crate::geometry::{StereoRig, Transform, exp};
+use crate::geometry::{StereoRig, Transform};
 use nalgebra::Vector3;
 
 const N: usize = 6;
@@ -30,8 +30,8 @@ pub(super) struct Posed {
 impl Posed {
     pub(super) fn new(motion: &Transform) -> Self {
         Self {
-            rotation: motion.rotation.to_rotation_matrix().into_inner(),
-            translation: motion.translation.vector,
+            rotation: motion.quaternion().to_rotation_matrix().into_inner(),
+            translation: motion.translation(),
         }
     }
 
@@ -151,11 +151,4 @@ impl Normal {
         }
         step.iter().all(|x| x.is_finite()).then_some(step)
     }
-}
-
-/// The motion after a step.
-pub(super) fn moved(motion: &Transform, step: [f64; N]) -> Transform {
-    let [a, b, c, x, y, z] = step;
-    let small = exp(Vector3::new(a, b, c), Vector3::new(x, y, z));
-    crate::geometry::renormalised(&(small * motion))
 }

@@ -177,9 +177,9 @@ struct Single {
 
 impl Single {
     fn new(motion: &Transform, rig: &StereoRig) -> Self {
-        let r = motion.rotation.to_rotation_matrix();
+        let r = motion.quaternion().to_rotation_matrix();
         let r = r.matrix();
-        let t = &motion.translation.vector;
+        let t = &motion.translation();
         Self {
             rotation: [[r.m11, r.m12, r.m13], [r.m21, r.m22, r.m23], [r.m31, r.m32, r.m33]].map(|row| row.map(|x| x as f32)),
             translation: [t.x, t.y, t.z].map(|x| x as f32),

@@ -1,7 +1,7 @@
 use super::{Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus};
 use crate::{
     executor::Serial,
-    geometry::{StereoRig, Transform, exp},
+    geometry::{StereoRig, Transform},
     image::View,
     memory::{Carver, Slab},
     random::Random,
@@ -23,7 +23,7 @@ fn estimator(slab: &mut Slab<BYTES>) -> Estimator<'_> {
 /// Distance, m, and angle, degrees, between two motions.
 fn between(a: &Transform, b: &Transform) -> (f64, f64) {
     let difference = a.inverse() * b;
-    (difference.translation.vector.norm(), difference.rotation.angle().to_degrees())
+    (difference.distance_m(), difference.angle_rad().to_degrees())
 }
 
 /// Moves a camera through the room and returns the estimate of every frame after the first beside the truth.
@@ -32,7 +32,7 @@ fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
     let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
     let mut estimator = estimator(&mut slab);
     let mut camera = Egomotion::default();
-    let mut t_world_camera = Transform::identity();
+    let mut t_world_camera = Transform::IDENTITY;
     let mut estimates = Vec::new();
     for frame in 0..=motions.len() {
         let [left, right] = see(&t_world_camera);
@@ -43,7 +43,7 @@ fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
             estimates.push((estimate, motions[frame - 1].inverse()));
         }
         if let Some(motion) = motions.get(frame) {
-            t_world_camera *= motion;
+            t_world_camera = t_world_camera * motion;
         }
     }
     let (distance, angle) = between(camera.t_world_camera(), &t_world_camera);
@@ -53,7 +53,8 @@ fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
 
 #[test]
 fn finds_its_way_through_a_textured_room() {
-    let motion = |metres: f64, turn: f64, tilt: f64| exp(Vector3::new(tilt, turn, 0.3 * turn), Vector3::new(0.1 * metres, -0.02, metres));
+    let motion =
+        |metres: f64, turn: f64, tilt: f64| Transform::new(Vector3::new(tilt, turn, 0.3 * turn), Vector3::new(0.1 * metres, -0.02, metres));
     let motions = [
         motion(0.5, 0.02, 0.0),
         motion(0.5, 0.02, 0.004),
@@ -72,11 +73,11 @@ fn finds_its_way_through_a_textured_room() {
 
 #[test]
 fn turning_on_the_spot_and_standing_still_are_motions_too() {
-    let turn = exp(Vector3::new(0.0, 0.05, 0.0), Vector3::zeros());
-    let estimates = walk(&[turn, Transform::identity()]);
+    let turn = Transform::new(Vector3::new(0.0, 0.05, 0.0), Vector3::zeros());
+    let estimates = walk(&[turn, Transform::IDENTITY]);
     let (distance, angle) = between(&estimates[0].0.t_current_previous.unwrap(), &turn.inverse());
     assert!(distance < 0.01 && angle < 0.1, "{distance} m, {angle} degrees");
-    let (distance, angle) = between(&estimates[1].0.t_current_previous.unwrap(), &Transform::identity());
+    let (distance, angle) = between(&estimates[1].0.t_current_previous.unwrap(), &Transform::IDENTITY);
     assert!(distance < 1e-6 && angle < 1e-5, "equal images: {distance} m, {angle} degrees");
 }
 
@@ -94,7 +95,8 @@ fn matches(count: usize, outliers: usize, motion: &Transform, random: &mut Rando
         .map(|i| {
             let z = uniform(random, 4.0, 30.0);
             let point = Point3::new(uniform(random, -0.7, 0.7) * z, uniform(random, -0.3, 0.3) * z, z);
-            let ([previous_left, previous_right], [mut current_left, mut current_right]) = (project(&point), project(&(motion * point)));
+            let ([previous_left, previous_right], [mut current_left, mut current_right]) =
+                (project(&point), project(&motion.transform_point(point)));
             if i < outliers {
                 for place in [&mut current_left, &mut current_right] {
                     *place = [uniform(random, 0.0, 400.0) as f32, uniform(random, 0.0, 160.0) as f32];
@@ -106,7 +108,7 @@ fn matches(count: usize, outliers: usize, motion: &Transform, random: &mut Rando
 }
 
 fn motion() -> Transform {
-    exp(Vector3::new(0.01, -0.03, 0.02), Vector3::new(0.1, 0.05, -1.1))
+    Transform::new(Vector3::new(0.01, -0.03, 0.02), Vector3::new(0.1, 0.05, -1.1))
 }
 
 fn estimate(matches: &[Match], rig: &StereoRig, seed: u64) -> (MotionEstimate, Vec<u32>) {
@@ -186,9 +188,9 @@ fn a_dark_right_camera_holds_the_last_motion() {
     let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
     let mut estimator = estimator(&mut slab);
     let mut camera = Egomotion::default();
-    let step = exp(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.4));
+    let step = Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.4));
     let dark = vec![0; WIDTH * HEIGHT];
-    let mut t_world_camera = Transform::identity();
+    let mut t_world_camera = Transform::IDENTITY;
     for frame in 0..4 {
         let [left, right] = see(&t_world_camera);
         let right = if frame < 2 { &right } else { &dark };
@@ -201,9 +203,9 @@ fn a_dark_right_camera_holds_the_last_motion() {
             let (distance, _) = between(camera.t_current_previous(), &step.inverse());
             assert!(distance < 0.02);
         }
-        t_world_camera *= step;
+        t_world_camera = t_world_camera * step;
     }
-    assert!((camera.t_world_camera().translation.vector.z - 1.2).abs() < 0.05, "three steps, two of them held");
+    assert!((camera.t_world_camera().translation().z - 1.2).abs() < 0.05, "three steps, two of them held");
 }
 
 #[test]
@@ -219,8 +221,8 @@ impl Egomotion {
     pub(crate) fn flip(&mut self, component: usize, bit: u32) {
         let pose = self.pose_mut();
         let number = match component {
-            0..4 => &mut pose.rotation.as_mut_unchecked().coords[component],
-            _ => &mut pose.translation.vector[component - 4],
+            0..4 => &mut pose.rotation[component],
+            _ => &mut pose.translation_m[component - 4],
         };
         *number = f64::from_bits(number.to_bits() ^ 1 << bit);
     }

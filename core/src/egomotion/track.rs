@@ -3,7 +3,7 @@
 use super::{EgomotionConfig, Estimator, MotionEstimate};
 use crate::{
     digest::Digest,
-    geometry::{StereoRig, Transform, renormalised},
+    geometry::{StereoRig, Transform},
     random::Random,
     scene_flow::Match,
     snapshot::Archive,
@@ -25,8 +25,8 @@ impl Default for Egomotion {
     /// A camera at the world's origin that has not moved.
     fn default() -> Self {
         Self {
-            t_world_camera: Transform::identity(),
-            t_current_previous: Transform::identity(),
+            t_world_camera: Transform::IDENTITY,
+            t_current_previous: Transform::IDENTITY,
             held: 0,
             random: Random::new(SEED),
         }
@@ -53,13 +53,13 @@ impl Egomotion {
             Some(motion) => (self.t_current_previous, self.held) = (motion, 0),
             None => self.held = self.held.saturating_add(1),
         }
-        self.t_world_camera = renormalised(&(self.t_world_camera * self.t_current_previous.inverse()));
+        self.t_world_camera = (self.t_world_camera * self.t_current_previous.inverse()).normalized();
     }
 
     /// Puts the camera where it is said to be; its motion is the way from where it was.
     pub fn place(&mut self, t_world_camera: &Transform) {
-        self.t_current_previous = renormalised(&(t_world_camera.inverse() * self.t_world_camera));
-        self.t_world_camera = renormalised(t_world_camera);
+        self.t_current_previous = (t_world_camera.inverse() * self.t_world_camera).normalized();
+        self.t_world_camera = t_world_camera.normalized();
         self.held = 0;
     }
 
@@ -72,8 +72,7 @@ impl Egomotion {
     pub fn digest(&self, estimate: Option<&MotionEstimate>) -> u64 {
         let mut digest = Digest::default();
         for transform in [&self.t_world_camera, &self.t_current_previous] {
-            let (turn, shift) = (transform.rotation.coords, transform.translation.vector);
-            turn.iter().chain(shift.iter()).for_each(|&value| digest.f64(value));
+            transform.rotation.iter().chain(&transform.translation_m).for_each(|&value| digest.f64(value));
         }
         digest.u64(u64::from(self.held));
         if let Some(estimate) = estimate {
@@ -87,8 +86,8 @@ impl Egomotion {
     /// Writes or reads all of it.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
         for transform in [&mut self.t_world_camera, &mut self.t_current_previous] {
-            archive.f64s(transform.rotation.as_mut_unchecked().coords.as_mut_slice());
-            archive.f64s(transform.translation.vector.as_mut_slice());
+            archive.f64s(&mut transform.rotation);
+            archive.f64s(&mut transform.translation_m);
         }
         archive.u32(&mut self.held);
         self.random.archive(archive);

@@ -4,7 +4,7 @@ use super::Mapper;
 use crate::{
     Stage,
     executor::Executor,
-    geometry::{Transform, renormalised},
+    geometry::Transform,
     objects::PlacedObject,
     view::{RaycastError, Raycaster},
     volume::Viewpoint,
@@ -62,7 +62,7 @@ impl<'s> Mapper<'s> {
 /// A view of the world as a view from an object's frame.
 fn from_object(view: &Viewpoint, placed: &PlacedObject<'_, '_>) -> Viewpoint {
     Viewpoint {
-        t_world_camera: renormalised(&(placed.t_world_object.inverse() * view.t_world_camera)),
+        t_world_camera: (placed.t_world_object.inverse() * view.t_world_camera).normalized(),
         ..*view
     }
 }

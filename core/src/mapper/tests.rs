@@ -6,7 +6,7 @@ mod resume;
 use super::*;
 use crate::{
     Serial,
-    geometry::exp,
+    geometry::Transform,
     memory::SLAB_ALIGN,
     scene_flow::room::{HEIGHT, RIG, WIDTH, see},
     tracking::{Class, Detection},
@@ -26,7 +26,7 @@ impl Walk {
     const CAR: [u32; 4] = [230, 50, 90, 70];
 
     fn new(frames: usize) -> Self {
-        let pose = |frame: usize| exp(Vector3::new(0.0, 0.01 * frame as f64, 0.0), Vector3::new(0.02, 0.0, 0.15) * frame as f64);
+        let pose = |frame: usize| Transform::new(Vector3::new(0.0, 0.01 * frame as f64, 0.0), Vector3::new(0.02, 0.0, 0.15) * frame as f64);
         let [_, _, width, height] = Self::CAR;
         Self {
             pairs: (0..frames).map(|frame| see(&pose(frame))).collect(),

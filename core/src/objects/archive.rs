@@ -36,7 +36,7 @@ impl Object<'_> {
                 first_frame: 0,
                 last_frame: 0,
                 frames: 0,
-                t_world_object: Transform::identity(),
+                t_world_object: Transform::IDENTITY,
             });
             summary.archive(archive);
             self.summary = Some(summary);

@@ -114,8 +114,8 @@ impl<'s> Object<'s> {
         let mut digest = Digest::default();
         let numbers = [summary.chain, summary.class.code(), summary.state as u32, summary.first_frame, summary.last_frame, summary.frames];
         numbers.iter().for_each(|&number| digest.u64(u64::from(number)));
-        let (turn, shift) = (summary.t_world_object.rotation.coords, summary.t_world_object.translation.vector);
-        turn.iter().chain(shift.iter()).for_each(|&value| digest.f64(value));
+        let pose = &summary.t_world_object;
+        pose.rotation.iter().chain(&pose.translation_m).for_each(|&value| digest.f64(value));
         digest.u64(self.volume.digest());
         Some(ObjectDigest { id: summary.id, digest: digest.finish() })
     }

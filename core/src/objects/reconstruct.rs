@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     executor::Executor,
-    geometry::{StereoRig, Transform, depth_from_disparity, renormalised},
+    geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
     tracking::{
         State, Track, Tracker, Treatment,
@@ -126,7 +126,7 @@ impl<'s> Objects<'s> {
                 first_frame: number,
                 last_frame: number,
                 frames: 0,
-                t_world_object: Transform::identity(),
+                t_world_object: Transform::IDENTITY,
             });
             let standing = track.judgement.state() == State::Static;
             for (waiting, disparity, picture) in self.crops.of(track.id) {
@@ -191,7 +191,7 @@ fn fuse_crop<E: Executor>(
         center_v_px: rig.center_v_px - f64::from(crop.pixels.top),
         ..*rig
     };
-    let t_object_camera = renormalised(&(transform(&crop.t_world_object).inverse() * transform(&crop.t_world_camera)));
+    let t_object_camera = (transform(&crop.t_world_object).inverse() * transform(&crop.t_world_camera)).normalized();
     let view = Viewpoint { rig, width, height, t_world_camera: t_object_camera };
     let seen = Observation {
         depth_m: depth.as_view(),

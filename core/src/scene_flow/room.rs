@@ -18,7 +18,7 @@ pub(crate) fn see(t_world_camera: &Transform) -> [Vec<u8>; 2] {
 }
 
 fn image(t_world_camera: &Transform, x_m: f64) -> Vec<u8> {
-    let eye = t_world_camera.transform_point(&Point3::new(x_m, 0.0, 0.0));
+    let eye = t_world_camera.transform_point(Point3::new(x_m, 0.0, 0.0));
     let mut pixels = Vec::with_capacity(WIDTH * HEIGHT);
     for v in 0..HEIGHT {
         for u in 0..WIDTH {
@@ -26,7 +26,7 @@ fn image(t_world_camera: &Transform, x_m: f64) -> Vec<u8> {
             for (du, dv) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
                 let x = (u as f64 + du - RIG.center_u_px) / RIG.focal_px;
                 let y = (v as f64 + dv - RIG.center_v_px) / RIG.focal_px;
-                let ray = t_world_camera.rotation * Vector3::new(x, y, 1.0);
+                let ray = t_world_camera.rotate(Vector3::new(x, y, 1.0));
                 let reach = (0..3)
                     .map(|i| ((if ray[i] > 0.0 { HIGH[i] } else { LOW[i] }) - eye[i]) / ray[i])
                     .fold(1e9, |a, b| if a < b { a } else { b });

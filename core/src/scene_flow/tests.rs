@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     executor::{Serial, TwoThreads},
-    geometry::{Transform, exp},
+    geometry::Transform,
     image::View,
     memory::{Capacity, Carver, Slab},
     random::Random,
@@ -38,7 +38,7 @@ fn view(pixels: &[u8]) -> View<'_, u8> {
 }
 
 fn forward(metres: f64, turn_rad: f64) -> Transform {
-    exp(Vector3::new(0.0, turn_rad, 0.0), Vector3::new(0.05, 0.0, metres))
+    Transform::new(Vector3::new(0.0, turn_rad, 0.0), Vector3::new(0.05, 0.0, metres))
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn cuts_exactly_the_bytes_it_names() {
 
 #[test]
 fn matches_lie_where_the_room_says_and_two_threads_change_nothing() {
-    let (first, second) = (see(&Transform::identity()), see(&forward(0.4, 0.01)));
+    let (first, second) = (see(&Transform::IDENTITY), see(&forward(0.4, 0.01)));
     let mut slabs = [slab(), slab()];
     let [a, b] = &mut slabs;
     let mut serial = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut a.0, BYTES).unwrap());
@@ -119,7 +119,7 @@ fn full_lists_drop_and_count() {
     let mut slab = slab();
     let mut matcher = FlowMatcher::new_in(&SMALL, &mut Carver::new(&mut slab.0, bytes).unwrap());
     let config = SceneFlowConfig::default();
-    let picture = see(&Transform::identity());
+    let picture = see(&Transform::IDENTITY);
     matcher.push(&config, view(&picture[0]), view(&picture[1]), &Serial);
     let report = matcher.push(&config, view(&picture[0]), view(&picture[1]), &Serial);
     assert_eq!(report.left.dense, 300);
@@ -338,7 +338,7 @@ fn a_point_is_found_where_it_is_and_not_where_it_was_expected() {
         }
     };
     let push = |matcher: &mut FlowMatcher<'_>, z: f64| {
-        let images = see(&Transform::translation(0.0, 0.0, z));
+        let images = see(&Transform::from_translation([0.0, 0.0, z]));
         let [left, right] = [0, 1].map(|side| View::new(&images[side], WIDTH, HEIGHT).unwrap());
         matcher.push(&SceneFlowConfig::default(), left, right, &Serial);
     };

@@ -12,7 +12,7 @@
 
 use super::config::MotionConfig;
 use crate::digest::Digest;
-use crate::geometry::{StereoRig, Transform, exp};
+use crate::geometry::{StereoRig, Transform};
 use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
@@ -96,10 +96,10 @@ impl Filter {
 
     /// The motion over ground within a frame: maps points of the thing in the world from where they were to where they are.
     pub fn motion(&self, interval_s: f64) -> Transform {
-        let turn = exp(self.turn() * interval_s, Vector3::zeros());
+        let turn = Transform::new(self.turn() * interval_s, Vector3::zeros());
         let center = self.center_world().coords;
-        let shift = center + self.velocity() * interval_s - turn.rotation * center;
-        Transform::from_parts(shift.into(), turn.rotation)
+        let shift = center + self.velocity() * interval_s - turn.rotate(center);
+        Transform { translation_m: shift.into(), ..turn }
     }
 
     /// Lets a frame pass: the rates may have changed. The velocity turns with the thing.
@@ -111,7 +111,7 @@ impl Filter {
             self.covariance = Matrix6::from_diagonal(&Vector6::new(tilt, turn, tilt, speed, speed, speed)).into();
             return;
         }
-        let turned = exp(self.turn() * interval_s, Vector3::zeros()).rotation * self.velocity();
+        let turned = Transform::new(self.turn() * interval_s, Vector3::zeros()).rotate(self.velocity());
         let [.., x, y, z] = &mut self.rate;
         (*x, *y, *z) = (turned.x, turned.y, turned.z);
         let [tilt, turn, speed] = [config.tilt_acceleration_rad_s2, config.turn_acceleration_rad_s2, config.acceleration_m_s2]
@@ -181,7 +181,7 @@ impl Filter {
         }
         let independent = f64::from(config.independent_matches);
         let weight = (if count > independent { independent / count } else { 1.0 }) / (noise_px * noise_px);
-        let world_camera = t_world_camera.rotation.to_rotation_matrix();
+        let world_camera = t_world_camera.quaternion().to_rotation_matrix();
         let predicted = Vector6::from(self.rate);
         let mut rate = predicted;
         for step in 0..=STEPS {
@@ -204,7 +204,7 @@ impl Filter {
             rate -= factor.solve(&(vector * weight + information * (rate - predicted)));
         }
         self.rate = rate.into();
-        self.center_world = (t_world_camera * Point3::from(center)).coords.into();
+        self.center_world = t_world_camera.transform_point(center.into());
         self.frames += 1;
         true
     }
@@ -231,7 +231,7 @@ impl Sums {
     ) -> Self {
         let turn = world_camera.inverse() * Vector3::new(rate.x, rate.y, rate.z) * interval_s;
         let shift = world_camera.inverse() * Vector3::new(rate.w, rate.a, rate.b) * interval_s;
-        let turned = exp(turn, Vector3::zeros()).rotation.to_rotation_matrix();
+        let turned = Transform::new(turn, Vector3::zeros()).quaternion().to_rotation_matrix();
         let mut sums = Self { matrix: [[0.0; 6]; 6], vector: [0.0; 6] };
         for sighting in sightings {
             let arm = turned * (sighting.standing.coords - center);
@@ -296,7 +296,7 @@ mod tests {
     /// Points on a car's back, `depth_m` before the camera, that moved by `rate` and are seen with an error; those before as well.
     fn frame(random: &mut Random, depth_m: f64, rate: [f64; 6], noise_px: f64) -> Vec<Sighting> {
         let center = Vector3::new(1.0, 0.5, depth_m);
-        let turn = exp(Vector3::new(rate[0], rate[1], rate[2]) * INTERVAL_S, Vector3::zeros());
+        let turn = Transform::new(Vector3::new(rate[0], rate[1], rate[2]) * INTERVAL_S, Vector3::zeros());
         let project = |p: Vector3<f64>| {
             let per_m = RIG.focal_px / p.z;
             ([p.x * per_m, p.y * per_m], [(p.x - RIG.baseline_m) * per_m, p.y * per_m])
@@ -310,7 +310,7 @@ mod tests {
                 let disparity = before[0] + noise() - before_right[0] - noise();
                 let per_px = RIG.baseline_m / disparity;
                 let standing = Point3::new((before[0] + noise()) * per_px, (before[1] + noise()) * per_px, RIG.focal_px * per_px);
-                let moved = center + turn.rotation * (point - center) + Vector3::new(rate[3], rate[4], rate[5]) * INTERVAL_S;
+                let moved = center + turn.rotate(point - center) + Vector3::new(rate[3], rate[4], rate[5]) * INTERVAL_S;
                 let (left, right) = project(moved);
                 Sighting {
                     standing,
@@ -330,7 +330,7 @@ mod tests {
                 filter.predict(&config, INTERVAL_S);
                 let seen = frame(&mut random, depth_m, rate(n), noise_px);
                 let noise = if noise_px > 0.1 { noise_px * 1.5 } else { 0.1 };
-                assert!(filter.update(&config, &RIG, &Transform::identity(), INTERVAL_S, noise, seen.iter().copied()));
+                assert!(filter.update(&config, &RIG, &Transform::IDENTITY, INTERVAL_S, noise, seen.iter().copied()));
                 filter
             })
             .collect()
@@ -373,7 +373,7 @@ mod tests {
         let mut take = |rate: [f64; 6]| {
             filter.predict(&config, INTERVAL_S);
             let seen = frame(&mut random, 12.0, rate, 0.3);
-            (filter.update(&config, &RIG, &Transform::identity(), INTERVAL_S, 0.4, seen.iter().copied()), filter.speed()[0])
+            (filter.update(&config, &RIG, &Transform::IDENTITY, INTERVAL_S, 0.4, seen.iter().copied()), filter.speed()[0])
         };
         for _ in 0..5 {
             assert!(take(still).0);
@@ -390,7 +390,7 @@ mod tests {
     fn the_motion_turns_about_the_middle() {
         let filter = track(10.0, 0.0, 1, |_| [0.0, 0.5, 0.0, 1.0, 0.0, 3.0])[0];
         let center = filter.center_world();
-        let moved = filter.motion(INTERVAL_S) * center;
+        let moved = filter.motion(INTERVAL_S).transform_point(center);
         assert!((moved - center - filter.velocity() * INTERVAL_S).norm() < 1e-12);
     }
 
@@ -401,7 +401,7 @@ mod tests {
         filter.predict(&config, INTERVAL_S);
         let before = filter;
         let bad = [Sighting { standing: Point3::new(f64::NAN, 0.0, 10.0), left: [0.0; 2], right: [0.0; 2] }; 4];
-        assert!(!filter.update(&config, &RIG, &Transform::identity(), INTERVAL_S, 0.3, bad.iter().copied()));
+        assert!(!filter.update(&config, &RIG, &Transform::IDENTITY, INTERVAL_S, 0.3, bad.iter().copied()));
         assert_eq!(filter, before);
     }
 }

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     egomotion::Estimator,
-    geometry::{StereoRig, Transform, renormalised},
+    geometry::{StereoRig, Transform},
     scene_flow::Match,
 };
 
@@ -74,9 +74,9 @@ fn judge(config: &InstancesConfig, rig: &StereoRig, camera: &CameraMotion, track
         let interval_s = f64::from(config.frame_interval_s);
         let [speed, sigma, spread] = track.filter.speed();
         let camera_world = camera.t_world_camera.inverse();
-        let standing = camera_world * track.filter.center_world();
-        let now = standing + camera_world.rotation * track.filter.velocity() * interval_s;
-        let passing = (now - t_current_previous.inverse() * standing).norm() / interval_s;
+        let standing = camera_world.transform_point(track.filter.center_world());
+        let now = standing + camera_world.rotate(track.filter.velocity()) * interval_s;
+        let passing = (now - t_current_previous.inverse().transform_point(standing)).norm() / interval_s;
         let turned = f64::from(config.motion.camera_rad) * standing.z / interval_s;
         track.sigma_m_s = libm::sqrt(sigma * sigma + turned * turned) as f32;
         // Depth goes with the inverse of disparity, its change with the inverse square.
@@ -96,7 +96,7 @@ fn judge(config: &InstancesConfig, rig: &StereoRig, camera: &CameraMotion, track
 /// Motion over ground in this frame: none for an object that stands.
 pub(super) fn motion_world(track: &Track, interval_s: f64) -> Transform {
     if track.judgement.state() == State::Static || !track.filter.is_known() {
-        return Transform::identity();
+        return Transform::IDENTITY;
     }
     track.filter.motion(interval_s)
 }
@@ -106,7 +106,7 @@ fn place(track: &mut Track, t_world_camera: &Transform, was_known: bool, interva
     let is_known = track.judgement.state() != State::Uncertain;
     let connects = track.chain > 0 && (track.measured == 1 || is_known);
     if connects {
-        let moved = renormalised(&(motion_world(track, interval_s) * transform(&track.t_world_object)));
+        let moved = (motion_world(track, interval_s) * transform(&track.t_world_object)).normalized();
         let stands = track.judgement.state() == State::Static;
         track.t_world_object = if stands && !was_known { track.t_world_origin } else { numbers(&moved) };
         track.chain += 1;

@@ -101,7 +101,7 @@ pub(crate) fn step_px(width: i32, height: i32) -> i32 {
 fn expected(rig: &StereoRig, [u, v]: [i32; 2], disparity_px: f64, t_previous_current: &Transform) -> Option<Match> {
     let per_px = rig.baseline_m / disparity_px;
     let (x, y) = (f64::from(u) - rig.center_u_px, f64::from(v) - rig.center_v_px);
-    let before = t_previous_current * Point3::new(x * per_px, y * per_px, rig.focal_px * per_px);
+    let before = t_previous_current.transform_point(Point3::new(x * per_px, y * per_px, rig.focal_px * per_px));
     // Not so for NaN.
     let ahead = before.z > DEPTH_MIN_M;
     if !ahead {

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     egomotion::Estimator,
-    geometry::{StereoRig, Transform, renormalised},
+    geometry::{StereoRig, Transform},
     random::Random,
     scene_flow::Match,
 };
@@ -99,7 +99,7 @@ pub(super) fn measure<'m>(
     // Where the motion so far would take the object, seen from the camera.
     let camera_world = ground.t_world_camera.inverse();
     let motion_camera = camera_world * filter.motion(ground.interval_s) * ground.t_world_camera;
-    let mut expected = renormalised(&(motion_camera * ground.t_current_previous));
+    let mut expected = (motion_camera * ground.t_current_previous).normalized();
     let mut found: &'m [Match] = &[];
     if let Some((look, room)) = look {
         if !filter.is_known() {
@@ -163,7 +163,7 @@ fn sighting(m: &Match, ground: &Ground<'_>) -> Option<Sighting> {
     let per_px = rig.baseline_m / disparity;
     let before = Point3::new(u * per_px, 0.5 * (v + v_right) * per_px, rig.focal_px * per_px);
     Some(Sighting {
-        standing: ground.t_current_previous * before,
+        standing: ground.t_current_previous.transform_point(before),
         left: centered(m.current_left),
         right: centered(m.current_right),
     })

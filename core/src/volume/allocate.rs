@@ -137,7 +137,7 @@ impl Volume<'_> {
         // Block coordinates relative to the camera's block keep their precision however far the camera has come.
         let block_m = f64::from(self.config.voxel_size_m) * BLOCK_SIDE as f64;
         let half_voxel = 0.5 / BLOCK_SIDE as f64;
-        let camera = view.t_world_camera.translation.vector / block_m + Vector3::repeat(half_voxel);
+        let camera = view.t_world_camera.translation() / block_m + Vector3::repeat(half_voxel);
         let Some(base) = base_block(&camera) else {
             report.beyond = depth_m.rows().flatten().filter(|&&depth| depth > 0.0).count() as u32;
             return report;

@@ -83,7 +83,7 @@ impl SeenSide {
                 let per_px = depth_m / view.rig.focal_px;
                 let camera =
                     Point3::new((f64::from(u) - view.rig.center_u_px) * per_px, (f64::from(v) - view.rig.center_v_px) * per_px, depth_m);
-                let point = t_thing_camera * camera;
+                let point = t_thing_camera.transform_point(camera);
                 if inside(&point) {
                     let cell = self.cells.entry(cell(&point, CELL_M)).or_default();
                     [point.x, point.y, point.z, 1.0].iter().zip(cell).for_each(|(value, sum)| *sum += value);
@@ -93,7 +93,7 @@ impl SeenSide {
         }
         if seen {
             self.frames += 1;
-            let distance_m = t_thing_camera.translation.vector.norm();
+            let distance_m = t_thing_camera.distance_m();
             if self.nearest.is_none_or(|(nearest_m, _)| distance_m < nearest_m) {
                 self.nearest = Some((distance_m, *t_thing_object));
             }
@@ -108,7 +108,7 @@ impl SeenSide {
             self.cells.iter().map(|(cell, [x, y, z, count])| (*cell, Point3::new(x / count, y / count, z / count))).collect();
         samples.sort_by_key(|(cell, _)| *cell);
         let samples: Vec<Point3<f64>> = samples.into_iter().map(|(_, point)| point).collect();
-        let of = |position_m: [f32; 3]| t_thing_object * Point3::from(position_m.map(f64::from));
+        let of = |position_m: [f32; 3]| t_thing_object.transform_point(Point3::from(position_m.map(f64::from)));
         let middles: Vec<Point3<f64>> = triangles
             .iter()
             .map(|triangle| {
@@ -175,7 +175,7 @@ mod tests {
         let thing = TrueObject {
             id: 1,
             pixels: PixelBox { left: 0, top: 0, width: 100, height: 80 },
-            t_world_object: Transform::translation(0.0, 1.0, 10.0),
+            t_world_object: Transform::from_translation([0.0, 1.0, 10.0]),
             dimensions_m: [2.0, 1.5, 4.0],
             moving: true,
             speed_m_s: 5.0,
@@ -184,7 +184,7 @@ mod tests {
         let view = TrueView {
             rig: &RIG,
             depth_m: View::new(&depth_m, SIZE.0, SIZE.1).unwrap(),
-            t_world_camera: Transform::identity(),
+            t_world_camera: Transform::IDENTITY,
             far_m: 20.0,
         };
         let mut side = SeenSide::default();

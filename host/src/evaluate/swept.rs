@@ -28,7 +28,7 @@ struct SweptBox {
 
 impl SweptBox {
     fn contains(&self, point: &Point3<f64>) -> bool {
-        let ([width, height, length], place) = (self.dimensions_m, self.t_object_map * point);
+        let ([width, height, length], place) = (self.dimensions_m, self.t_object_map.transform_point(*point));
         place.x.abs() < 0.5 * width - SIDE_M && place.z.abs() < 0.5 * length - SIDE_M && place.y < -FOOT_M && place.y > -height
     }
 }
@@ -51,7 +51,7 @@ impl Swept {
     pub fn add(&mut self, object: &TrueObject, t_map_world: &Transform) {
         if object.moving {
             let t_map_object = t_map_world * object.t_world_object;
-            let ([width, height, length], foot) = (object.dimensions_m, t_map_object.translation.vector);
+            let ([width, height, length], foot) = (object.dimensions_m, Point3::from(t_map_object.translation_m));
             // The box may lean: no corner is farther away than this.
             let reach = (0.25 * (width * width + length * length) + height * height).sqrt();
             let number = self.boxes.len() as u32;
@@ -116,14 +116,14 @@ mod tests {
         let car = |z: f64, moving| TrueObject {
             id: 1,
             pixels: PixelBox::default(),
-            t_world_object: Transform::translation(3.0, 1.6, z),
+            t_world_object: Transform::from_translation([3.0, 1.6, z]),
             dimensions_m: [1.8, 1.5, 4.0],
             moving,
             speed_m_s: 10.0,
         };
         let mut swept = Swept::default();
-        (0..5).for_each(|frame| swept.add(&car(10.0 + f64::from(frame), true), &Transform::identity()));
-        swept.add(&car(30.0, false), &Transform::identity());
+        (0..5).for_each(|frame| swept.add(&car(10.0 + f64::from(frame), true), &Transform::IDENTITY));
+        swept.add(&car(30.0, false), &Transform::IDENTITY);
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("map.ply");
         let mut ply = PlyWriter::begin(&path).unwrap();

@@ -4,8 +4,7 @@
 
 use super::rows::{lines_of, numbers_of};
 use super::{FormatError, read_text};
-use dynvox_core::geometry::{Transform, renormalised};
-use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use dynvox_core::geometry::Transform;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -46,14 +45,12 @@ pub fn read_poses(path: &Path) -> Result<Trajectory, FormatError> {
 /// Time, where the row has one, and pose. Rounded rotations are brought back to length 1.
 fn pose_of(numbers: &[f64]) -> Option<(Option<f64>, Transform)> {
     if let &[r00, r01, r02, x, r10, r11, r12, y, r20, r21, r22, z] = numbers {
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::new(r00, r01, r02, r10, r11, r12, r20, r21, r22));
-        let pose = Transform::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_rotation_matrix(&rotation));
-        return Some((None, renormalised(&pose)));
+        let rotation = [[r00, r01, r02], [r10, r11, r12], [r20, r21, r22]];
+        return Some((None, Transform::from_rotation_matrix(&rotation, [x, y, z]).normalized()));
     }
     let &[time_s, x, y, z, i, j, k, w] = numbers else { return None };
-    let quaternion = Quaternion::new(w, i, j, k);
-    let pose = Transform::from_parts(Translation3::new(x, y, z), UnitQuaternion::new_unchecked(quaternion));
-    (quaternion.norm() > 0.5).then(|| (Some(time_s), renormalised(&pose)))
+    let pose = Transform { rotation: [i, j, k, w], translation_m: [x, y, z] };
+    pose.is_rotation().then(|| (Some(time_s), pose.normalized()))
 }
 
 /// KITTI: the twelve numbers of the rows of `t_world_camera`, one line a frame.
@@ -67,16 +64,13 @@ pub fn write_numbered(out: &mut impl Write, poses: &[(usize, Transform)]) -> io:
 }
 
 fn kitti_row(pose: &Transform) -> String {
-    let rotation = pose.rotation.to_rotation_matrix();
-    let rows = rotation.matrix().row_iter().zip(pose.translation.vector.iter());
-    joined(rows.flat_map(|(row, shift)| [row[0], row[1], row[2], *shift]))
+    joined(pose.matrix_3x4().as_flattened().iter().copied())
 }
 
 /// TUM: `t x y z qx qy qz qw`, one line a frame.
 pub fn write_tum(out: &mut impl Write, times_s: &[f64], poses: &[Transform]) -> io::Result<()> {
     for (time, pose) in times_s.iter().zip(poses) {
-        let (t, q) = (&pose.translation.vector, pose.rotation.quaternion());
-        writeln!(out, "{}", joined([*time, t.x, t.y, t.z, q.i, q.j, q.k, q.w].into_iter()))?;
+        writeln!(out, "{}", joined([*time].into_iter().chain(pose.translation_m).chain(pose.rotation)))?;
     }
     Ok(())
 }

@@ -1,14 +1,19 @@
 //! What is written can be read.
 
 use super::*;
-use dynvox_core::geometry::exp;
+use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 use std::fs;
 use tempfile::TempDir;
 
 fn poses() -> Vec<dynvox_core::geometry::Transform> {
     (0..5)
-        .map(|i| exp(Vector3::new(0.01, 0.3, -0.02) * f64::from(i), Vector3::new(1.0 / 3.0, -1e-9, 1_234.567_891_234_5) * f64::from(i)))
+        .map(|i| {
+            Transform::new(
+                Vector3::new(0.01, 0.3, -0.02) * f64::from(i),
+                Vector3::new(1.0 / 3.0, -1e-9, 1_234.567_891_234_5) * f64::from(i),
+            )
+        })
         .collect()
 }
 
@@ -20,8 +25,8 @@ fn kitti_trajectories_are_read_back_as_they_were() {
     write_kitti(&mut text, &poses()).unwrap();
     fs::write(&path, text).unwrap();
     for (read, written) in read_poses(&path).unwrap().poses.iter().zip(poses()) {
-        assert_eq!(read.translation, written.translation, "to the last bit");
-        assert!(read.rotation.angle_to(&written.rotation) < 1e-7);
+        assert_eq!(read.translation_m, written.translation_m, "to the last bit");
+        assert!((read.inverse() * written).angle_rad() < 1e-7);
     }
 }
 
@@ -33,8 +38,8 @@ fn tum_trajectories_keep_every_digit_of_time_and_pose() {
     let rows: Vec<Vec<f64>> =
         String::from_utf8(text).unwrap().lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
     for ((row, time), pose) in rows.iter().zip(times).zip(poses()) {
-        let (t, q) = (pose.translation, pose.rotation.quaternion().coords);
-        assert_eq!(*row, [time, t.x, t.y, t.z, q.x, q.y, q.z, q.w]);
+        let ([x, y, z], [i, j, k, w]) = (pose.translation_m, pose.rotation);
+        assert_eq!(*row, [time, x, y, z, i, j, k, w]);
     }
 }
 

@@ -109,7 +109,7 @@ mod tests {
         let mut slab = HostSlab::map(bytes).unwrap();
         let mut volume = Volume::new_in(&capacity, &config, &mut Carver::new(slab.bytes_mut(), bytes).unwrap());
         let rig = StereoRig { focal_px: 80.0, center_u_px: 48.0, center_v_px: 32.0, baseline_m: 0.5 };
-        let view = Viewpoint { rig, width: WIDTH, height: HEIGHT, t_world_camera: Transform::identity() };
+        let view = Viewpoint { rig, width: WIDTH, height: HEIGHT, t_world_camera: Transform::IDENTITY };
         let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| 40 + (i % 200) as u8).collect();
         for walls_m in [[1.0, 2.0], [0.0, 2.0]] {
             let depth_m: Vec<f32> = (0..WIDTH * HEIGHT).map(|i| walls_m[usize::from(i % WIDTH > 40)]).collect();

@@ -162,6 +162,7 @@ pub(super) fn step_reason(error: StepError) -> String {
         StepError::SizesDiffer => "its images differ in size".to_owned(),
         StepError::SizeChanged => "its images have another size than those before".to_owned(),
         StepError::PoseNotFinite => "its pose holds numbers that are none".to_owned(),
+        StepError::PoseNotRotation => "the quaternion of its pose does not have length 1".to_owned(),
         StepError::TooLarge { width, height } => format!("its images are larger than {width} x {height} px"),
         StepError::TooSmall { width, height } => format!("its images are smaller than {width} x {height} px"),
     }

@@ -9,7 +9,7 @@ use super::{FrameRow, Keyframe, Plan, Progress, ResumeError, Stopped, Threads, c
 use crate::input::InstanceMask;
 use crate::input::{ExactFrame, StereoImages};
 use crate::observe::{LidarAtWork, Reference, evaluable, pictures};
-use dynvox_core::geometry::{Transform, exp};
+use dynvox_core::geometry::Transform;
 use dynvox_core::tracking::Detection;
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Mapper, Severity, Stage, StereoFrame};
@@ -279,7 +279,7 @@ impl<'p, 's> Course<'p, 's> {
     pub fn overview(&mut self) -> Vec<u8> {
         let Some(row) = self.gathered.rows.last() else { return Vec::new() };
         let down = nalgebra::Vector3::new(-OVERVIEW_PITCH_RAD, 0.0, 0.0);
-        let t_world_camera = row.report.t_world_camera * exp(down, OVERVIEW_PLACE_M.into());
+        let t_world_camera = row.report.t_world_camera * Transform::new(down, OVERVIEW_PLACE_M);
         let (mapper, threads) = (&mut self.mapper, &self.threads);
         threads
             .run(|| mapper.raycast(&t_world_camera, threads))

@@ -1,6 +1,6 @@
 //! Where the camera is: along the street at constant speed, with a driver's and a car's small motions.
 
-use dynvox_core::geometry::{StereoRig, Transform, exp};
+use dynvox_core::geometry::{StereoRig, Transform};
 use nalgebra::Vector3;
 
 use super::config::StreetConfig;
@@ -32,9 +32,9 @@ pub fn t_street_camera(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64
     let on_road = stretch.t_street_local(along_m(config, time_s), drift, yaw);
     let height = Vector3::new(0.0, bounce - config.camera_height_m, 0.0);
     on_road
-        * exp(Vector3::zeros(), height)
-        * exp(Vector3::new(pitch, 0.0, 0.0), Vector3::zeros())
-        * exp(Vector3::new(0.0, 0.0, roll), Vector3::zeros())
+        * Transform::new(Vector3::zeros(), height)
+        * Transform::new(Vector3::new(pitch, 0.0, 0.0), Vector3::zeros())
+        * Transform::new(Vector3::new(0.0, 0.0, roll), Vector3::zeros())
 }
 
 /// The rig of a configured street: KITTI's proportions.

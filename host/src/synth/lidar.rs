@@ -4,7 +4,7 @@
 //! y left, z up. Time: a few tens of milliseconds a scan.
 
 use dynvox_core::geometry::Transform;
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::draws::{hash, unit};
@@ -38,9 +38,7 @@ struct Face {
 impl Street {
     /// Sensor to left camera.
     pub fn t_camera_lidar(&self) -> Transform {
-        let turn = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
-        Isometry3::from_parts(Translation3::from(Vector3::from(PLACE_M)), rotation)
+        Transform::from_rotation_matrix(&[[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], PLACE_M)
     }
 
     /// One scan at frame `index`: x forward, y left, z up in metres, and reflectance 0 to 1; beam by beam from the top, each from behind

@@ -1,7 +1,7 @@
 //! Triangle meshes and the few shapes the street is built from.
 
 use dynvox_core::geometry::Transform;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::surface::Surface;
 
@@ -140,9 +140,9 @@ impl Mesh {
 
     /// Moves everything from vertex `first` on into another frame.
     pub fn place(&mut self, first: usize, t_mesh_part: &Transform) {
-        let turn = t_mesh_part.rotation.to_rotation_matrix();
+        let turn = Matrix3::from(t_mesh_part.rotation_matrix()).transpose();
         for vertex in &mut self.vertices[first..] {
-            vertex.place_m = turn * vertex.place_m + t_mesh_part.translation.vector;
+            vertex.place_m = turn * vertex.place_m + Vector3::from(t_mesh_part.translation_m);
             let normal = turn * Point::from(vertex.normal.map(f64::from));
             vertex.normal = [normal.x as f32, normal.y as f32, normal.z as f32];
         }

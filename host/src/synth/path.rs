@@ -5,8 +5,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use dynvox_core::geometry::{Transform, exp};
-use nalgebra::{Translation3, Vector3};
+use dynvox_core::geometry::Transform;
+use nalgebra::Vector3;
 
 use super::config::StreetConfig;
 use super::draws::Dice;
@@ -112,8 +112,8 @@ impl Stretch<'_> {
     pub fn t_street_local(&self, s_m: f64, lateral_m: f64, yaw_rad: f64) -> Transform {
         let heading = self.course.heading_rad(s_m);
         let right = Vector3::new(libm::cos(heading), 0.0, -libm::sin(heading));
-        let mut pose = exp(Vector3::new(0.0, heading + yaw_rad, 0.0), Vector3::zeros());
-        pose.translation = Translation3::from(self.point(s_m) + right * lateral_m);
+        let mut pose = Transform::new(Vector3::new(0.0, heading + yaw_rad, 0.0), Vector3::zeros());
+        pose.translation_m = (self.point(s_m) + right * lateral_m).into();
         pose
     }
 }

@@ -1,7 +1,7 @@
 //! One piece of street, generated from the seed and its number: ground, houses, furniture, parked cars.
 
-use dynvox_core::geometry::{Transform, exp};
-use nalgebra::{Translation3, Vector3};
+use dynvox_core::geometry::Transform;
+use nalgebra::Vector3;
 
 use super::config::{CarKind, StreetConfig};
 use super::draws::Dice;
@@ -156,11 +156,11 @@ impl<'a> Builder<'a> {
         for (surface, from, to) in strips {
             for k in 0..steps {
                 let corner = |k: usize, (lateral, y): (f64, f64)| {
-                    let place = frames[k] * nalgebra::Point3::new(lateral, y, 0.0);
-                    (place.coords, [k as f32, (lateral + y) as f32, y as f32])
+                    let place = frames[k].transform_point(Point::new(lateral, y, 0.0));
+                    (place, [k as f32, (lateral + y) as f32, y as f32])
                 };
                 let upright = from.0 == to.0;
-                let outward = if upright { frames[k].rotation * Point::new(-from.0.signum(), 0.0, 0.0) } else { -Point::y() };
+                let outward = if upright { frames[k].rotate(Point::new(-from.0.signum(), 0.0, 0.0)) } else { -Point::y() };
                 mesh.polygon(surface, outward, &[corner(k, from), corner(k, to), corner(k + 1, to), corner(k + 1, from)]);
             }
         }
@@ -185,13 +185,13 @@ impl<'a> Builder<'a> {
             }
             let setback = if dice.chance(0.2) { dice.between(1.0, 2.5) } else { 0.0 };
             let lateral = side.front_m() + side.sign() * setback;
-            let corner = |along: f64| self.local(along, lateral, 0.0).translation.vector;
+            let corner = |along: f64| Point::from(self.local(along, lateral, 0.0).translation_m);
             let (a, b) = if side == Side::Right { (corner(from), corner(to)) } else { (corner(to), corner(from)) };
             let along = b - a;
             let mut mesh = Mesh::default();
             facade::house(&mut mesh, &mut dice, along.norm());
-            let mut pose = exp(Vector3::new(0.0, libm::atan2(-along.z, along.x), 0.0), Vector3::zeros());
-            pose.translation = Translation3::from(a - Point::y() * layout::KERB_HEIGHT_M);
+            let mut pose = Transform::new(Vector3::new(0.0, libm::atan2(-along.z, along.x), 0.0), Vector3::zeros());
+            pose.translation_m = (a - Point::y() * layout::KERB_HEIGHT_M).into();
             mesh.place(0, &pose);
             things.push(mesh.finish());
             if setback > 0.0 {
@@ -224,10 +224,10 @@ impl<'a> Builder<'a> {
             furniture::fence(&mut mesh, dice, to - from);
         }
         let lateral = side.front_m() + side.sign() * 0.35;
-        let (a, b) = (self.local(from, lateral, 0.0).translation.vector, self.local(to, lateral, 0.0).translation.vector);
+        let (a, b) = (Point::from(self.local(from, lateral, 0.0).translation_m), Point::from(self.local(to, lateral, 0.0).translation_m));
         let along = b - a;
-        let mut pose = exp(Vector3::new(0.0, libm::atan2(along.x, along.z), 0.0), Vector3::zeros());
-        pose.translation = Translation3::from(a - Point::y() * layout::KERB_HEIGHT_M);
+        let mut pose = Transform::new(Vector3::new(0.0, libm::atan2(along.x, along.z), 0.0), Vector3::zeros());
+        pose.translation_m = (a - Point::y() * layout::KERB_HEIGHT_M).into();
         mesh.place(0, &pose);
         things.push(mesh.finish());
     }
@@ -235,7 +235,7 @@ impl<'a> Builder<'a> {
     /// Puts a thing on the pavement.
     fn stand(&self, mut mesh: Mesh, along_m: f64, lateral_m: f64, yaw_rad: f64, things: &mut Vec<Mesh>) {
         let mut pose = self.local(along_m, lateral_m, yaw_rad);
-        pose.translation.vector.y -= layout::KERB_HEIGHT_M;
+        pose.translation_m[1] -= layout::KERB_HEIGHT_M;
         mesh.place(0, &pose);
         things.push(mesh.finish());
     }

@@ -27,8 +27,8 @@ impl Placed {
     /// The same motion as a matrix.
     pub fn new(motion: &Transform) -> Self {
         Self {
-            turn: motion.rotation.to_rotation_matrix().into_inner(),
-            shift: motion.translation.vector,
+            turn: Matrix3::from(motion.rotation_matrix()).transpose(),
+            shift: Vector3::from(motion.translation_m),
         }
     }
 

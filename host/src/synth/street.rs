@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
-use dynvox_core::geometry::{StereoRig, Transform, renormalised};
+use dynvox_core::geometry::{StereoRig, Transform};
 use nalgebra::Vector3;
 
 use super::camera;
@@ -130,7 +130,7 @@ impl Street {
     }
 
     fn to_world(&self, t_street_camera: &Transform, index: u32) -> Transform {
-        if index == 0 { Transform::identity() } else { renormalised(&(self.t_camera0_street * t_street_camera)) }
+        if index == 0 { Transform::IDENTITY } else { (self.t_camera0_street * t_street_camera).normalized() }
     }
 
     /// Frame `index` with all its truth.
@@ -169,7 +169,7 @@ impl Street {
         ObjectTruth {
             id: car.id,
             class: car.kind.class(),
-            t_world_object: renormalised(&(self.t_camera0_street * car.t_street_car)),
+            t_world_object: (self.t_camera0_street * car.t_street_car).normalized(),
             dimensions_m: [2.0 * high.x, -low.y, 2.0 * high.z],
             moving: car.speed_m_s > STANDS_M_S,
             speed_m_s: car.speed_m_s,

@@ -87,7 +87,7 @@ fn a_static_pixel_carried_to_the_next_frame_finds_its_own_grey() {
     for v in (2..frame.height - 2).step_by(2) {
         for u in (2..frame.width - 2).step_by(2) {
             let Some(point) = seen(&street, &frame, u, v) else { continue };
-            let moved = t_next_frame * point;
+            let moved = t_next_frame.transform_point(point);
             if moved.z < 1.0 || !flat(&frame, u, v) {
                 continue;
             }
@@ -138,8 +138,8 @@ fn points_under_a_mask_lie_in_the_box_of_their_car() {
                     continue;
                 }
                 let object = &frame.objects[instance - 1];
-                let in_world = frame.t_world_camera * seen(&street, &frame, u, v).unwrap();
-                let inside = object.t_world_object.inverse() * in_world;
+                let in_world = frame.t_world_camera.transform_point(seen(&street, &frame, u, v).unwrap());
+                let inside = object.t_world_object.inverse().transform_point(in_world);
                 let [width, height, length] = object.dimensions_m;
                 let slack = 1e-3;
                 assert!(inside.x.abs() < 0.5 * width + slack && inside.z.abs() < 0.5 * length + slack, "car {} at {inside}", object.id);
@@ -160,7 +160,7 @@ fn lidar_and_depth_agree_where_both_see() {
     assert!(scan.len() > 60_000, "{} echoes", scan.len());
     let mut errors = Vec::new();
     for point in &scan {
-        let place = street.t_camera_lidar() * Point3::new(f64::from(point[0]), f64::from(point[1]), f64::from(point[2]));
+        let place = street.t_camera_lidar().transform_point(Point3::new(f64::from(point[0]), f64::from(point[1]), f64::from(point[2])));
         if place.z < 1.0 {
             continue;
         }
@@ -182,14 +182,14 @@ fn lidar_and_depth_agree_where_both_see() {
 fn the_camera_and_every_car_move_smoothly() {
     let street = Street::new(StreetConfig::default()).unwrap();
     let poses: Vec<Transform> = (0..120).map(|index| street.t_world_camera(index)).collect();
-    assert_eq!(poses[0], Transform::identity());
+    assert_eq!(poses[0], Transform::IDENTITY);
     let steps: Vec<Transform> = poses.windows(2).map(|pair| pair[0].inverse() * pair[1]).collect();
     for pair in steps.windows(2) {
-        assert!((pair[0].translation.vector - pair[1].translation.vector).norm() < 0.05);
-        assert!((pair[0].rotation.inverse() * pair[1].rotation).angle() < 0.02);
-        assert!((pair[0].translation.vector.norm() - 0.9).abs() < 0.06);
+        assert!((Vector3::from(pair[0].translation_m) - Vector3::from(pair[1].translation_m)).norm() < 0.05);
+        assert!((pair[0].inverse() * pair[1]).angle_rad() < 0.02);
+        assert!((pair[0].distance_m() - 0.9).abs() < 0.06);
     }
-    let turned = poses[119].rotation.angle();
+    let turned = poses[119].angle_rad();
     assert!(turned > 0.02, "a camera that turns, not {turned}");
 }
 
@@ -202,7 +202,7 @@ fn one_scripted_car_starts_and_one_stops_and_speeds_match_the_way_driven() {
     for id in [1, 2, 3] {
         for index in [20, 60, 90] {
             let (now, next) = (truth(index, id), truth(index + 1, id));
-            let way = (next.t_world_object.translation.vector - now.t_world_object.translation.vector).norm();
+            let way = (Vector3::from(next.t_world_object.translation_m) - Vector3::from(now.t_world_object.translation_m)).norm();
             let speed = 0.5 * (now.speed_m_s + next.speed_m_s);
             assert!((way * 10.0 - speed).abs() < 0.1 + 0.06 * speed, "car {id} at {index}: {way} m in 0.1 s at {speed} m/s");
         }
@@ -218,7 +218,7 @@ fn nobody_moves_on_a_static_street_and_no_two_cars_overlap() {
         let objects = street.frame(index).objects;
         for (k, a) in objects.iter().enumerate() {
             for b in &objects[k + 1..] {
-                let offset = (a.t_world_object.inverse() * b.t_world_object).translation.vector;
+                let offset = Vector3::from((a.t_world_object.inverse() * b.t_world_object).translation_m);
                 let apart = offset.z.abs() > 0.5 * (a.dimensions_m[2] + b.dimensions_m[2])
                     || offset.x.abs() > 0.45 * (a.dimensions_m[0] + b.dimensions_m[0]);
                 assert!(apart, "frame {index}: {} meets {}", a.id, b.id);
@@ -232,7 +232,7 @@ fn the_street_goes_on_after_twenty_thousand_frames() {
     let config = StreetConfig { width: 160, height: 48, curvature: false, ..StreetConfig::default() };
     let street = Street::new(config).unwrap();
     let frame = street.frame(20_000);
-    assert!((frame.t_world_camera.translation.vector.z - 18_000.0).abs() < 1.0);
+    assert!((frame.t_world_camera.translation_m[2] - 18_000.0).abs() < 1.0);
     let near = frame.depth_m.iter().filter(|&&z| z > 0.0 && z < 60.0).count();
     assert!(near > 160 * 48 / 2);
 }
@@ -289,7 +289,7 @@ fn a_written_street_reads_back_as_it_was() {
     let poses = text("poses/00.txt");
     assert_eq!(poses.lines().count(), 3);
     let last: Vec<f64> = poses.lines().last().unwrap().split(' ').map(|value| value.parse().unwrap()).collect();
-    assert!((last[11] - street.t_world_camera(2).translation.vector.z).abs() < 1e-9);
+    assert!((last[11] - street.t_world_camera(2).translation_m[2]).abs() < 1e-9);
     assert_eq!(text("sequences/00/times.txt").lines().count(), 3);
     assert_eq!(text("sequences/00/calib.txt").lines().map(|line| &line[..2]).collect::<Vec<_>>(), ["P0", "P1", "P2", "P3", "Tr"]);
     let objects: usize = (0..3).map(|index| street.frame(index).objects.len()).sum();

@@ -100,9 +100,7 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), SynthError> {
 
 /// The upper three rows of a motion, row by row.
 fn row(motion: &Transform, separator: &str) -> String {
-    let matrix = motion.to_homogeneous();
-    let values = (0..3).flat_map(|row| (0..4).map(move |column| (row, column)));
-    let texts: Vec<String> = values.map(|(row, column)| format!("{:.12e}", matrix[(row, column)])).collect();
+    let texts: Vec<String> = motion.matrix_3x4().as_flattened().iter().map(|value| format!("{value:.12e}")).collect();
     texts.join(separator)
 }
 

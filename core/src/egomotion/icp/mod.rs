@@ -22,7 +22,7 @@ mod tests;
 
 pub use config::{IcpConfig, MAX_LEVELS};
 
-use super::normal::{Normal, moved};
+use super::normal::Normal;
 use crate::{
     geometry::{StereoRig, Transform},
     image::View,
@@ -129,7 +129,7 @@ pub fn track(
     memory: &mut [f32],
 ) -> IcpReport {
     let pyramid = Pyramid::build(rig, limits_m, disparity_q8, config.levels, memory);
-    let mut t_previous_current = Transform::identity();
+    let mut t_previous_current = Transform::IDENTITY;
     let mut report = IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() };
     for (level, disparity_px) in pyramid.coarse_to_fine() {
         let pairing = Pairing::new(config, rig, level);
@@ -137,7 +137,7 @@ pub fn track(
             report.steps += 1;
             let sums = pairing.sums(&t_previous_current, disparity_px, map);
             let Some(step) = sums.normal.solve().filter(|_| sums.pairs >= PAIRS_MIN) else { break };
-            t_previous_current = moved(&t_previous_current, step);
+            t_previous_current = t_previous_current.retract(step);
             if step.iter().all(|part| part.abs() < STEP_MIN) {
                 break;
             }
@@ -157,7 +157,7 @@ pub fn track(
 /// KinectFusion's tests of a motion.
 fn judge(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
     let motion = &report.t_current_previous;
-    let (way_m, turn_rad) = (motion.translation.vector.norm(), 2.0 * motion.rotation.coords.xyz().norm());
+    let (way_m, turn_rad) = (motion.distance_m(), 2.0 * motion.quaternion().coords.xyz().norm());
     if report.pairs < PAIRS_MIN {
         IcpStatus::TooFewPairs
     } else if report.held < f64::from(config.held_min) {
@@ -213,7 +213,7 @@ impl<'c> Pairing<'c> {
             for (u, &disparity) in row.iter().enumerate().filter(|(_, disparity)| **disparity > 0.0) {
                 let depth = rig.focal_baseline_px_m() / f64::from(disparity);
                 let slope_u = (middle(u) - rig.center_u_px) / rig.focal_px;
-                let carried = t_previous_current.transform_point(&Point3::new(slope_u * depth, slope_v * depth, depth));
+                let carried = t_previous_current.transform_point(Point3::new(slope_u * depth, slope_v * depth, depth));
                 let Some((surface, normal)) = self.partner(&carried.coords, map) else { continue };
                 sums.points += 1;
                 let away = carried.coords - surface;

@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     config::Problems,
-    geometry::exp,
+    geometry::Transform,
     image::{DISPARITY_ONE_PX, ViewMut},
 };
 use std::{vec, vec::Vec};
@@ -34,11 +34,11 @@ fn look(planes: &[Plane], t_world_camera: &Transform) -> Seen {
     for at in 0..WIDTH * HEIGHT {
         let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
         let ray = Vector3::new((u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px, 1.0);
-        let (place, turned) = (t_world_camera.translation.vector, t_world_camera.rotation * ray);
+        let (place, turned) = (t_world_camera.translation(), t_world_camera.rotate(ray));
         let hits = planes.iter().filter_map(|(normal, away_m)| {
             let normal = Vector3::from(*normal);
             let depth = -(normal.dot(&place) + away_m) / normal.dot(&turned);
-            (depth > 0.1 && depth < f64::from(LIMITS_M[1])).then_some((depth, t_world_camera.rotation.inverse() * normal))
+            (depth > 0.1 && depth < f64::from(LIMITS_M[1])).then_some((depth, t_world_camera.inverse().rotate(normal)))
         });
         if let Some((depth, normal)) = hits.min_by(|a, b| a.0.total_cmp(&b.0)) {
             seen.depth_m[at] = depth as f32;
@@ -51,7 +51,7 @@ fn look(planes: &[Plane], t_world_camera: &Transform) -> Seen {
 
 /// Tracks the way from the origin to `motion`, which is where the camera is then.
 fn tracked(config: &IcpConfig, planes: &[Plane], motion: &Transform) -> IcpReport {
-    let (before, now) = (look(planes, &Transform::identity()), look(planes, motion));
+    let (before, now) = (look(planes, &Transform::IDENTITY), look(planes, motion));
     let map = MapPicture {
         depth_m: View::new(&before.depth_m, WIDTH, HEIGHT).unwrap(),
         normal: View::new(&before.normal, WIDTH, HEIGHT).unwrap(),
@@ -61,7 +61,7 @@ fn tracked(config: &IcpConfig, planes: &[Plane], motion: &Transform) -> IcpRepor
 }
 
 fn walk(turn: [f64; 3], way_m: [f64; 3]) -> Transform {
-    exp(Vector3::from(turn), Vector3::from(way_m))
+    Transform::new(Vector3::from(turn), Vector3::from(way_m))
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn small_motions_in_a_room_are_found() {
         let report = tracked(&IcpConfig::default(), &ROOM, &motion);
         assert_eq!(report.status, IcpStatus::Tracked, "{report:?}");
         let error = report.t_current_previous * motion;
-        assert!(error.translation.vector.norm() < 0.005 && error.rotation.angle() < 0.001, "{way_m:?}: {error:?}");
+        assert!(error.distance_m() < 0.005 && error.angle_rad() < 0.001, "{way_m:?}: {error:?}");
         assert!(report.pairs > 3_000 && report.residual_rms_m < 0.02 && report.held > 0.001, "{report:?}");
     }
 }
@@ -90,14 +90,14 @@ fn a_road_alone_holds_no_way_along_it_and_nothing_holds_none() {
     assert_eq!(road.status, IcpStatus::NotHeld, "{road:?}");
     let canyon = tracked(&IcpConfig::default(), &ROOM[..3], &walk([0.0; 3], [0.0, 0.0, 0.5]));
     assert_eq!(canyon.status, IcpStatus::NotHeld, "walls to both sides hold no more: {canyon:?}");
-    let empty = tracked(&IcpConfig::default(), &[], &Transform::identity());
+    let empty = tracked(&IcpConfig::default(), &[], &Transform::IDENTITY);
     assert_eq!((empty.status, empty.points), (IcpStatus::TooFewPairs, 0));
 }
 
 #[test]
 fn depth_off_the_map_is_no_estimate() {
     // The same room, with a wall far nearer over two thirds of the picture than the map knows.
-    let (before, mut now) = (look(&ROOM, &Transform::identity()), look(&ROOM, &Transform::identity()));
+    let (before, mut now) = (look(&ROOM, &Transform::IDENTITY), look(&ROOM, &Transform::IDENTITY));
     let mut image = ViewMut::new(&mut now.disparity_q8, WIDTH, HEIGHT).unwrap();
     for row in image.pixels_mut().chunks_mut(WIDTH) {
         row[..2 * WIDTH / 3].fill((RIG.focal_baseline_px_m() / 0.8 * 256.0) as u16);

@@ -187,7 +187,7 @@ impl Window {
         let mut step = |at: usize| {
             let [left, right] = walk.pairs[at].each_ref().map(|pixels| of(pixels));
             let [left, right] = [&left, &right].map(|pixels| View::new(pixels, width, height).unwrap());
-            let pose = exp(Vector3::new(0.0, 0.01 * at as f64, 0.0), Vector3::new(0.02, 0.0, 0.15) * at as f64);
+            let pose = Transform::new(Vector3::new(0.0, 0.01 * at as f64, 0.0), Vector3::new(0.02, 0.0, 0.15) * at as f64);
             let given = walk.with_frame(at, |frame| {
                 mapper.step(&StereoFrame { left, right, t_world_camera: Some(pose), detections: &[seen], ..*frame }, &Serial)
             });

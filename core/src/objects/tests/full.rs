@@ -87,7 +87,7 @@ fn of_volumes_fused_last_in_the_same_frame_that_of_the_older_track_goes() {
         let mut drive = Drive::new(instances, estimator);
         for frame in 0..12 {
             let place = |x: f64, shown: bool| (&board, shown.then(|| shift(x, 0.0, 9.0)));
-            drive.step(Transform::identity(), &[place(-3.5, frame < 8), place(0.0, frame < 8), place(3.5, frame >= 5)]);
+            drive.step(Transform::IDENTITY, &[place(-3.5, frame < 8), place(0.0, frame < 8), place(3.5, frame >= 5)]);
         }
         let gone: Vec<_> = drive.sink.0.iter().map(|taken| (taken.0.id, taken.0.last_frame, taken.1)).collect();
         assert_eq!(gone, [(1, 7, Retirement::Displaced)]);
@@ -105,7 +105,7 @@ fn waited(crop_pixels: usize, small: f64, large: Option<f64>) -> (u32, u32) {
         let (mut dropped, mut caught_up) = (0, 0);
         for _ in 0..4 {
             let seen: Vec<_> = boards.iter().zip([-4.0, 1.0]).map(|(board, x)| (board, Some(shift(x, 0.0, 9.0)))).collect();
-            let report = drive.step(Transform::identity(), &seen).objects;
+            let report = drive.step(Transform::IDENTITY, &seen).objects;
             dropped += report.crops_dropped;
             caught_up += report.caught_up;
         }
@@ -166,14 +166,14 @@ fn a_volume_that_is_full_keeps_what_it_has() {
         };
         // With the fourth fused frame the blocks without a voxel have gone.
         for _ in 0..8 {
-            drive.step(Transform::identity(), &[(&board, Some(shift(0.0, 0.0, 9.0)))]);
+            drive.step(Transform::IDENTITY, &[(&board, Some(shift(0.0, 0.0, 9.0)))]);
         }
         let before = coords(&drive);
         assert!(before.len() > 20 && before.len() < 75, "{} blocks", before.len());
         // What was its right half is now the left one of what is seen of it.
         let mut refused = 0;
         for _ in 0..3 {
-            refused += drive.step(Transform::identity(), &[(&board, None), (&board, Some(shift(0.8, 0.0, 9.0)))]).objects.blocks_refused;
+            refused += drive.step(Transform::IDENTITY, &[(&board, None), (&board, Some(shift(0.8, 0.0, 9.0)))]).objects.blocks_refused;
         }
         let after = coords(&drive);
         assert!(refused > 0 && drive.sink.0.is_empty(), "{refused} refused, {:?}", drive.sink.0);

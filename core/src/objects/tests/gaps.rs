@@ -36,7 +36,7 @@ fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_f
             |_, drive| {
                 let track = drive.track(1).unwrap();
                 states.push(track.state);
-                places.push(track.t_world_object.map(|t_world_object| t_world_object.translation.vector.z));
+                places.push(track.t_world_object.map(|t_world_object| t_world_object.translation().z));
             },
         );
         let lost = 6 + most;
@@ -76,14 +76,14 @@ fn a_car_that_stops_stays_where_it_stopped() {
     // 8 m/s until frame 8, then braking by 8 m/s within ten frames.
     let place = |frame: u32| {
         let speed = |n: u32| if n <= 8 { 8.0 } else { f64::from(18u32.saturating_sub(n)) * 0.8 };
-        [Transform::identity(), shift(0.5, 0.3, 7.0 + (1..=frame).map(|n| 0.1 * speed(n)).sum::<f64>())]
+        [Transform::IDENTITY, shift(0.5, 0.3, 7.0 + (1..=frame).map(|n| 0.1 * speed(n)).sum::<f64>())]
     };
     let mut last = None;
     drive(30, place, |_| true, |_, drive| last = drive.track(1));
     let track = last.unwrap();
     assert_eq!(track.state, State::Static);
-    let came = track.t_world_object.unwrap().translation.vector.z;
-    let drove = place(29)[1].translation.vector.z - place(0)[1].translation.vector.z;
+    let came = track.t_world_object.unwrap().translation().z;
+    let drove = place(29)[1].translation().z - place(0)[1].translation().z;
     assert!((came / drove - 1.0).abs() < 0.1, "{came} of {drove} m");
 }
 

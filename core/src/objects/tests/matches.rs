@@ -78,7 +78,7 @@ fn what_is_seen_for_the_first_time_has_no_matches_whatever_was_there_before() {
 
 /// A car that crosses at 8 m/s before a standing camera.
 fn crossing(frame: u32) -> [Transform; 2] {
-    [Transform::identity(), shift(-2.0 + 0.8 * f64::from(frame), 0.2, 10.0)]
+    [Transform::IDENTITY, shift(-2.0 + 0.8 * f64::from(frame), 0.2, 10.0)]
 }
 
 /// The car's track in the frame after `boards`, each shown in one frame.
@@ -198,7 +198,7 @@ fn a_motion_is_not_made_of_two_points() {
     let taken = |count: usize| {
         let mut filter = Filter::default();
         filter.predict(&config, 0.1);
-        filter.update(&config, &RIG, &Transform::identity(), 0.1, 0.3, [0.0, 1.0, 0.5].into_iter().take(count).map(sighting))
+        filter.update(&config, &RIG, &Transform::IDENTITY, 0.1, 0.3, [0.0, 1.0, 0.5].into_iter().take(count).map(sighting))
     };
     assert_eq!([taken(2), taken(3)], [false, true]);
 }

@@ -17,7 +17,7 @@ use crate::{
     Serial,
     digest::Digest,
     egomotion::Estimator,
-    geometry::{StereoRig, Transform, exp},
+    geometry::{StereoRig, Transform},
     image::{View, ViewMut},
     masks::{MaskStore, PixelBox, ScaledMask},
     memory::SLAB_ALIGN,
@@ -156,7 +156,7 @@ impl Board {
 }
 
 pub(super) fn shift(x: f64, y: f64, z: f64) -> Transform {
-    exp(Vector3::zeros(), Vector3::new(x, y, z))
+    Transform::new(Vector3::zeros(), Vector3::new(x, y, z))
 }
 
 fn project(p: &Point3<f64>) -> [[f32; 2]; 2] {
@@ -183,7 +183,7 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
             instances,
             estimator,
             frame: 0,
-            t_world_camera: Transform::identity(),
+            t_world_camera: Transform::IDENTITY,
             known: true,
             sink: Taken::default(),
             before: Vec::new(),
@@ -211,10 +211,10 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
             let Some(now) = now else { continue };
             let camera_board = t_world_camera.inverse() * now;
             let [half_x, half_y] = board.half_m;
-            let corner = |x: f64, y: f64| project(&(camera_board * Point3::new(x, y, 0.0)))[0];
+            let corner = |x: f64, y: f64| project(&camera_board.transform_point(Point3::new(x, y, 0.0)))[0];
             let ([l, t], [r, b]) = (corner(-half_x, -half_y), corner(half_x, half_y));
             let pixels = PixelBox { left: l as i32, top: t as i32, width: (r - l) as i32, height: (b - t) as i32 };
-            let depth = camera_board.translation.vector.z;
+            let depth = camera_board.translation().z;
             for v in pixels.top.max(0)..(pixels.top + pixels.height).min(HEIGHT as i32) {
                 for u in pixels.left.max(0)..(pixels.left + pixels.width).min(WIDTH as i32) {
                     disparity[v as usize * WIDTH + u as usize] = (RIG.focal_px * RIG.baseline_m / depth * 256.0) as u16;
@@ -229,9 +229,9 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
                 let mut along = |half: f64| (f64::from(random.below(1001)) / 500.0 - 1.0) * half * 0.9;
                 // Not all in one plane.
                 let point = Point3::new(along(half_x), along(half_y), along(0.8));
-                let after = if n < board.background { before * point } else { now * point };
-                let [previous_left, previous_right] = project(&(self.t_world_camera.inverse() * before * point));
-                let [current_left, current_right] = project(&(t_world_camera.inverse() * after));
+                let after = if n < board.background { before.transform_point(point) } else { now.transform_point(point) };
+                let [previous_left, previous_right] = project(&(self.t_world_camera.inverse() * before).transform_point(point));
+                let [current_left, current_right] = project(&t_world_camera.inverse().transform_point(after));
                 matches.push(Match { previous_left, previous_right, current_left, current_right });
             }
         }
@@ -273,8 +273,8 @@ pub(super) fn take_frame(
     [refined, sparse]: [&[Match]; 2],
 ) {
     let camera = CameraMotion {
-        t_world_camera: Transform::identity(),
-        t_current_previous: (frame > 0).then(Transform::identity),
+        t_world_camera: Transform::IDENTITY,
+        t_current_previous: (frame > 0).then_some(Transform::IDENTITY),
     };
     instances.admit(frame, detections, [WIDTH, HEIGHT]);
     instances.claim(refined, sparse);

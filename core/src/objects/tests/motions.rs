@@ -26,15 +26,15 @@ fn a_moving_cars_motion_is_its_own_and_not_the_cameras() {
     let tracks = drive(&Board::CAR, 8, ahead);
     for track in &tracks[1..] {
         assert!(track.measured);
-        let moved = track.motion_world * Point3::from(track.center_world_m);
+        let moved = track.motion_world.transform_point(Point3::from(track.center_world_m));
         let error = moved - Point3::from(track.center_world_m) - Vector3::new(0.0, 0.0, 0.8);
         assert!(error.norm() < 0.02, "{error}");
-        assert!(track.motion_world.rotation.angle().to_degrees() < 0.3);
+        assert!(track.motion_world.angle_rad().to_degrees() < 0.3);
     }
     let states: Vec<State> = tracks.iter().map(|track| track.state).collect();
     assert_eq!(states[..3], [State::Uncertain; 3]);
     assert_eq!(states[3..], [State::Dynamic; 5]);
-    let at = tracks[7].t_world_object.unwrap().translation.vector - tracks[3].t_world_object.unwrap().translation.vector;
+    let at = tracks[7].t_world_object.unwrap().translation() - tracks[3].t_world_object.unwrap().translation();
     assert!((at - Vector3::new(0.0, 0.0, 3.2)).norm() < 0.05, "{at}");
 }
 
@@ -42,7 +42,7 @@ fn a_moving_cars_motion_is_its_own_and_not_the_cameras() {
 fn a_parked_car_follows_the_camera_and_stays_where_it_is_in_the_world() {
     let tracks = drive(&Board::CAR, 8, |frame| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)]);
     assert_eq!(tracks[7].state, State::Static);
-    assert_eq!(tracks[7].motion_world, Transform::identity());
+    assert_eq!(tracks[7].motion_world, Transform::IDENTITY);
     assert_eq!(tracks[7].t_world_object, tracks[0].t_world_object, "seen from the moving camera it moves, in the world it does not");
 }
 

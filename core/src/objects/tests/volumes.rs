@@ -23,7 +23,7 @@ fn parked(frames: u32, z: f64, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize
         let blocks = (0..frames)
             .map(|frame| {
                 let board = if wide(frame) { &WIDE } else { &SMALL };
-                drive.step(Transform::identity(), &[(board, Some(shift(0.0, 0.0, z)))]);
+                drive.step(Transform::IDENTITY, &[(board, Some(shift(0.0, 0.0, z)))]);
                 content(drive.instances).0.len()
             })
             .collect();
@@ -66,7 +66,7 @@ fn each_crop_that_waited_is_fused_once() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         for _ in 0..4 {
-            drive.step(Transform::identity(), &[(&SMALL, Some(shift(0.0, 0.0, 9.0)))]);
+            drive.step(Transform::IDENTITY, &[(&SMALL, Some(shift(0.0, 0.0, 9.0)))]);
         }
         assert_eq!(
             (content(drive.instances).1, drive.instances.objects.crops.len()),
@@ -81,7 +81,7 @@ fn a_volume_lies_where_the_thing_is() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         for _ in 0..4 {
-            drive.step(Transform::identity(), &[(&SMALL, Some(shift(2.0, -0.6, 9.0)))]);
+            drive.step(Transform::IDENTITY, &[(&SMALL, Some(shift(2.0, -0.6, 9.0)))]);
         }
         // 1.2 to 2.8 m to the right, -1.1 to -0.1 m down, 9 m ahead and 30 cm to either side; in blocks of 40 cm, the nearest lattice point's.
         let blocks = content(drive.instances).0;
@@ -97,7 +97,7 @@ fn what_counts_as_standing_is_put_where_it_was_seen_in_the_world() {
     with(&Capacity { object_blocks: 2000, ..CAPACITY }, &InstancesConfig { state, ..any_size() }, |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         for frame in 0..4 {
-            drive.step(Transform::identity(), &[(&SMALL, Some(shift(0.0, 0.0, 8.0 + 0.8 * f64::from(frame))))]);
+            drive.step(Transform::IDENTITY, &[(&SMALL, Some(shift(0.0, 0.0, 8.0 + 0.8 * f64::from(frame))))]);
         }
         assert_eq!(drive.track(1).unwrap().state, State::Static);
         let mut layers: Vec<i16> = content(drive.instances).0.iter().map(|at| at.z).collect();
@@ -113,7 +113,7 @@ fn beyond_twenty_metres_nothing_is_fused() {
         with(&CAPACITY, &any_size(), |instances, estimator| {
             let mut drive = Drive::new(instances, estimator);
             for _ in 0..5 {
-                drive.step(Transform::identity(), &[(&Board::CAR, Some(shift(0.0, 0.0, z)))]);
+                drive.step(Transform::IDENTITY, &[(&Board::CAR, Some(shift(0.0, 0.0, z)))]);
             }
             assert_eq!(drive.instances.objects().count(), 1);
             content(drive.instances).0.len()
@@ -129,7 +129,7 @@ fn a_post_before_a_car_is_no_part_of_it() {
         let mut drive = Drive::new(instances, estimator);
         let post = Board { half_m: [0.05, 0.2], points: 0, ..Board::CAR };
         for _ in 0..5 {
-            drive.step_behind(Transform::identity(), &[(&Board::CAR, Some(shift(0.0, 0.0, 10.0)))], &[(&post, Some(shift(0.0, 0.0, 4.0)))]);
+            drive.step_behind(Transform::IDENTITY, &[(&Board::CAR, Some(shift(0.0, 0.0, 10.0)))], &[(&post, Some(shift(0.0, 0.0, 4.0)))]);
         }
         let nearest = content(drive.instances).0.iter().map(|at| at.z).min();
         assert_eq!(nearest, Some(24), "9.6 m");

@@ -49,14 +49,13 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 impl Eye {
-    /// `None` when the pose is not finite or beyond the map, or the rig is absurd.
+    /// `None` when the pose is no rigid motion or beyond the map, or the rig is absurd.
     pub fn new(view: &Viewpoint, voxel_size_m: f32) -> Option<Self> {
         view.rig.validate().ok()?;
         let voxel_m = f64::from(voxel_size_m);
-        let camera = view.t_world_camera.translation.vector / voxel_m;
+        let camera = view.t_world_camera.translation() / voxel_m;
         let bound = f64::from(i16::MAX) * BLOCK_SIDE as f64;
-        let turned = view.t_world_camera.rotation.coords.iter().all(|c| c.is_finite());
-        if !turned || !camera.iter().all(|c| *c > -bound && *c < bound) {
+        if !view.t_world_camera.is_rotation() || !camera.iter().all(|c| *c > -bound && *c < bound) {
             return None;
         }
         let base = [camera.x, camera.y, camera.z].map(|c| libm::floor(c / BLOCK_SIDE as f64) as i32);

@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
     executor::{Serial, TwoThreads},
-    geometry::{StereoRig, Transform, exp},
+    geometry::{StereoRig, Transform},
     memory::SLAB_ALIGN,
     random::Random,
     volume::{
@@ -34,7 +34,7 @@ fn view(t_world_camera: Transform) -> Viewpoint {
 }
 
 fn at(rotation: [f64; 3], translation: [f64; 3]) -> Viewpoint {
-    view(exp(Vector3::from(rotation), Vector3::from(translation)))
+    view(Transform::new(Vector3::from(rotation), Vector3::from(translation)))
 }
 
 /// Something a ray can meet: the depth along its z at which a camera sees it through a direction (x, y, 1) in world axes.
@@ -123,12 +123,12 @@ fn filled(low: [i32; 3], high: [i32; 3], tell: impl Fn([i32; 3]) -> Told) -> Vol
 /// was met.
 fn errors(caster: &Raycaster<'_>, view: &Viewpoint, scene: &impl Scene, far_m: f64) -> (Vec<f64>, f64) {
     let depth = caster.depth_m().unwrap();
-    let origin = Point3::from(view.t_world_camera.translation.vector);
+    let origin = Point3::from(view.t_world_camera.translation());
     let (mut errors, mut wanted, mut met) = (Vec::new(), 0.0, 0.0);
     for v in 0..view.height {
         for u in 0..view.width {
             let ray = Vector3::new((u as f64 - RIG.center_u_px) / RIG.focal_px, (v as f64 - RIG.center_v_px) / RIG.focal_px, 1.0);
-            let Some(truth) = scene.depth(origin, view.t_world_camera.rotation * ray).filter(|&truth| truth < far_m) else { continue };
+            let Some(truth) = scene.depth(origin, view.t_world_camera.rotate(ray)).filter(|&truth| truth < far_m) else { continue };
             let seen = f64::from(depth.get(u, v).unwrap());
             wanted += 1.0;
             if seen > 0.0 {
@@ -197,7 +197,10 @@ fn normals_face_the_camera_and_colour_and_weight_are_those_of_the_surface() {
         for (u, &depth) in row.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
             hits += 1;
             let ray = Vector3::new((u as f64 - RIG.center_u_px) / RIG.focal_px, (v as f64 - RIG.center_v_px) / RIG.focal_px, 1.0);
-            let truth = view.t_world_camera.rotation.inverse() * ball.normal(view.t_world_camera * Point3::from(ray * f64::from(depth)));
+            let truth = view
+                .t_world_camera
+                .inverse()
+                .rotate(ball.normal(view.t_world_camera.transform_point(Point3::from(ray * f64::from(depth)))));
             let seen = Vector3::from(normal.get(u, v).unwrap().map(|c| f64::from(c) / f64::from(NORMAL_ONE)));
             assert!((seen - truth).norm() < 0.07, "{seen} {truth}");
             assert!(seen.dot(&ray) < 0.05);
@@ -251,7 +254,7 @@ fn a_sheet_one_lattice_point_thick_stops_every_ray_at_every_angle() {
         let depth = caster.depth_m().unwrap();
         for u in (0..160).step_by(3) {
             let ray = Vector3::new((u as f64 - RIG.center_u_px) / RIG.focal_px, 0.0, 1.0);
-            let world = exp(Vector3::new(0.0, turn, 0.0), Vector3::zeros()).rotation * ray;
+            let world = Transform::new(Vector3::new(0.0, turn, 0.0), Vector3::zeros()).rotate(ray);
             let truth = 1.5 / world.z;
             let x = -4.0 * turn + world.x * truth;
             if world.z > 0.1 && x.abs() < 4.5 {
@@ -428,7 +431,7 @@ fn several_maps_in_one_picture_show_what_is_nearest_of_each_alone() {
     let sheet = filled([0, -7, 2], [1, 7, 5], true_distances(&near));
     let camera = at([0.1, -0.4, 0.2], [0.9, -0.3, 0.2]);
     let moved = |rotation: [f64; 3], shift: [f64; 3]| Viewpoint {
-        t_world_camera: exp(Vector3::from(rotation), Vector3::from(shift)) * camera.t_world_camera,
+        t_world_camera: Transform::new(Vector3::from(rotation), Vector3::from(shift)) * camera.t_world_camera,
         ..camera
     };
     // The ball twice: once before, once behind the ground and the other ball in part.
@@ -507,7 +510,7 @@ fn refuses_what_it_cannot_look_at_and_shows_no_picture() {
     }
     for translation in [[f64::NAN, 0.0, 0.0], [f64::INFINITY, 0.0, 0.0], [1e9, 0.0, 0.0]] {
         let lost = Viewpoint {
-            t_world_camera: Transform::from_parts(translation.into(), good.t_world_camera.rotation),
+            t_world_camera: Transform { translation_m: translation, ..good.t_world_camera },
             ..good
         };
         assert_eq!(caster.cast(&volume, &lost, &Serial), Err(RaycastError::Viewpoint));

@@ -38,7 +38,7 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
             let direction = Vector3::new(((i % WIDTH) as f64 - RIG.center_u_px) / 80.0, ((i / WIDTH) as f64 - RIG.center_v_px) / 80.0, 1.0);
             for step in 0..=3_000 {
                 let at = f64::from(depth) - 0.75 + 1.5 * f64::from(step) / 3_000.0;
-                let point = view.t_world_camera.transform_point(&Point3::from(direction * at)).coords / block_m;
+                let point = view.t_world_camera.transform_point(Point3::from(direction * at)).coords / block_m;
                 let block = [point.x, point.y, point.z].map(|c| (c + 1.0 / 16.0).floor() as i32);
                 fine.insert(BlockCoord::new(block[0], block[1], block[2]).unwrap());
             }

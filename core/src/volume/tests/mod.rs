@@ -7,7 +7,7 @@ mod pruning;
 use super::*;
 use crate::{
     executor::{Serial, TwoThreads},
-    geometry::{StereoRig, exp},
+    geometry::{StereoRig, Transform},
     image::View,
 };
 use nalgebra::Vector3;
@@ -34,7 +34,7 @@ fn view(rotation_rad: [f64; 3], translation_m: [f64; 3]) -> Viewpoint {
         rig: RIG,
         width: WIDTH,
         height: HEIGHT,
-        t_world_camera: exp(Vector3::from(rotation_rad), Vector3::from(translation_m)),
+        t_world_camera: Transform::new(Vector3::from(rotation_rad), Vector3::from(translation_m)),
     }
 }
 

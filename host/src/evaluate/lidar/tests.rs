@@ -76,7 +76,7 @@ fn settle(frame: usize, hits: &[Hit], masks: &Masks) -> (Awaited, Vec<f32>) {
             *depth_m = (FOCAL_PX * BASELINE_M) as f32 / shown_px;
         }
     }
-    (Awaited::settle(frame, Transform::identity(), &aim, input, |u, v| masks.layer(u, v)), map_depth_m)
+    (Awaited::settle(frame, Transform::IDENTITY, &aim, input, |u, v| masks.layer(u, v)), map_depth_m)
 }
 
 fn compare(frame: &Awaited, map_depth_m: &[f32]) -> EvaluatedFrame {

@@ -160,7 +160,7 @@ impl ObjectErrors {
                 moving: object.moving,
                 state: track.state,
                 settled: frame - first.max(changed),
-                distance_m: (truth.t_world_camera.inverse() * object.t_world_object).translation.vector.z,
+                distance_m: (truth.t_world_camera.inverse() * object.t_world_object).translation_m[2],
                 view: Showing::of(&object.pixels, size),
                 error,
                 true_speed_m_s: object.speed_m_s,
@@ -199,8 +199,7 @@ fn motion_error(before: &Transform, now: &Transform, motion_world: &Transform) -
     let truth = before.inverse() * now;
     let estimate = before.inverse() * motion_world * before;
     let error = truth.inverse() * estimate;
-    let q = error.rotation.quaternion();
-    [error.translation.vector.norm(), (2.0 * q.imag().norm().atan2(q.w.abs())).to_degrees()]
+    [error.distance_m(), error.angle_rad().to_degrees()]
 }
 
 /// Median of finite values, the higher of the two in the middle; `None` of none.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::input::TrueObject;
-use dynvox_core::geometry::exp;
+use dynvox_core::geometry::Transform;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::Class;
 use nalgebra::Vector3;
@@ -11,17 +11,18 @@ const PIXELS: PixelBox = PixelBox { left: 100, top: 50, width: 80, height: 40 };
 fn truth(frame: u32, moving: bool) -> ObjectsTruth {
     // The camera drives and turns; the car drives 1 m a frame and turns by 0.02 rad.
     let f = f64::from(frame);
-    let along = if moving { exp(Vector3::new(0.0, 0.02, 0.0) * f, Vector3::new(0.0, 0.0, 1.0) * f) } else { Transform::identity() };
+    let along =
+        if moving { Transform::new(Vector3::new(0.0, 0.02, 0.0) * f, Vector3::new(0.0, 0.0, 1.0) * f) } else { Transform::IDENTITY };
     let object = TrueObject {
         id: 7,
         pixels: PIXELS,
-        t_world_object: Transform::translation(3.0, 1.6, 12.0) * along,
+        t_world_object: Transform::from_translation([3.0, 1.6, 12.0]) * along,
         dimensions_m: [1.8, 1.5, 4.0],
         moving,
         speed_m_s: if moving { 10.0 } else { 0.0 },
     };
     ObjectsTruth {
-        t_world_camera: exp(Vector3::new(0.0, 0.01, 0.0) * f, Vector3::new(0.0, 0.0, 0.8) * f),
+        t_world_camera: Transform::new(Vector3::new(0.0, 0.01, 0.0) * f, Vector3::new(0.0, 0.0, 0.8) * f),
         objects: vec![object],
         unlabelled: Vec::new(),
     }
@@ -64,8 +65,8 @@ fn drive(states: &[State], moving: &[bool], drift: &Transform, error: &Transform
 
 #[test]
 fn a_motion_off_by_two_centimetres_has_that_error_wherever_the_camera_believes_to_be() {
-    let drift = exp(Vector3::new(0.1, -0.4, 0.05), Vector3::new(30.0, -2.0, 11.0));
-    let off = exp(Vector3::new(0.0, 0.001, 0.0), Vector3::new(0.02, 0.0, 0.0));
+    let drift = Transform::new(Vector3::new(0.1, -0.4, 0.05), Vector3::new(30.0, -2.0, 11.0));
+    let off = Transform::new(Vector3::new(0.0, 0.001, 0.0), Vector3::new(0.02, 0.0, 0.0));
     let errors = drive(&[State::Dynamic; 8], &[true; 8], &drift, &off).tracks()[&1].clone();
     assert!((errors.me_t_m.unwrap() - 0.02).abs() < 1e-4, "{errors:?}");
     assert!((errors.me_r_deg.unwrap() - 0.001f64.to_degrees()).abs() < 1e-6);
@@ -76,7 +77,7 @@ fn a_motion_off_by_two_centimetres_has_that_error_wherever_the_camera_believes_t
 #[test]
 fn a_state_may_take_five_frames_and_no_more() {
     use State::{Dynamic as D, Static as S, Uncertain as U};
-    let of = |states: &[State], moving: &[bool]| drive(states, moving, &Transform::identity(), &Transform::identity()).tracks()[&1].clone();
+    let of = |states: &[State], moving: &[bool]| drive(states, moving, &Transform::IDENTITY, &Transform::IDENTITY).tracks()[&1].clone();
     let (m, s) = (true, false);
     assert_eq!(of(&[U, U, U, U, U, D, D], &[m; 7]).late_frames, 0);
     assert_eq!(of(&[U, U, U, U, U, U, D], &[m; 7]).late_frames, 1);
@@ -89,9 +90,9 @@ fn a_state_may_take_five_frames_and_no_more() {
 #[test]
 fn what_overlaps_nothing_true_is_not_compared() {
     let mut errors = ObjectErrors::default();
-    let elsewhere = TrackReport { pixels: PIXELS.moved([70, 0]), ..track(State::Dynamic, Transform::identity()) };
-    let unseen = TrackReport { seen: false, ..track(State::Dynamic, Transform::identity()) };
-    errors.add(&[elsewhere, unseen], &Transform::identity(), &truth(0, true), SIZE, |_| true);
+    let elsewhere = TrackReport { pixels: PIXELS.moved([70, 0]), ..track(State::Dynamic, Transform::IDENTITY) };
+    let unseen = TrackReport { seen: false, ..track(State::Dynamic, Transform::IDENTITY) };
+    errors.add(&[elsewhere, unseen], &Transform::IDENTITY, &truth(0, true), SIZE, |_| true);
     assert!(errors.tracks().is_empty() && errors.figures().is_none());
 }
 
@@ -99,20 +100,20 @@ fn what_overlaps_nothing_true_is_not_compared() {
 fn a_turning_car_is_judged_as_a_rigid_body() {
     // Twenty metres ahead a car turns by a degree on the spot. A right motion has no error; the difference of the two places in the camera, taken for a
     // motion with the same turn, would be off by 35 cm.
-    let before = Transform::translation(0.0, 1.6, 20.0);
-    let turn = exp(Vector3::new(0.0, 1f64.to_radians(), 0.0), Vector3::zeros());
+    let before = Transform::from_translation([0.0, 1.6, 20.0]);
+    let turn = Transform::new(Vector3::new(0.0, 1f64.to_radians(), 0.0), Vector3::zeros());
     let now = before * turn;
     let motion_world = now * before.inverse();
     let [metres, degrees] = motion_error(&before, &now, &motion_world);
     assert!(metres < 1e-12 && degrees < 1e-6, "{metres} {degrees}");
-    let places = now.translation.vector - before.translation.vector;
-    let shortcut = Transform::from_parts(places.into(), turn.rotation);
+    let places = Vector3::from(now.translation_m) - Vector3::from(before.translation_m);
+    let shortcut = Transform { translation_m: places.into(), ..turn };
     assert!((motion_error(&before, &now, &shortcut)[0] - 20.0 * 1f64.to_radians()).abs() < 1e-3);
 }
 
 #[test]
 fn every_comparison_is_a_row_in_the_order_of_frames() {
-    let errors = drive(&[State::Uncertain, State::Dynamic, State::Dynamic], &[true; 3], &Transform::identity(), &Transform::identity());
+    let errors = drive(&[State::Uncertain, State::Dynamic, State::Dynamic], &[true; 3], &Transform::IDENTITY, &Transform::IDENTITY);
     let rows = errors.rows();
     assert_eq!(
         rows.iter().map(|(id, one)| (*id, one.at, one.error.is_some())).collect::<Vec<_>>(),

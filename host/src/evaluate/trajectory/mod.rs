@@ -12,6 +12,7 @@ pub use files::{TrajectoryError, read_trajectory, together};
 
 use align::aligned_error_m;
 use dynvox_core::geometry::Transform;
+use nalgebra::Vector3;
 use serde::Serialize;
 
 /// Sub-lengths of the benchmark, m.
@@ -62,7 +63,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
                 let to = travelled.partition_point(|&at| at < travelled[from] + length_m);
                 (to < truth.len()).then(|| {
                     let error = piece(from, to);
-                    (error.translation.vector.norm() / length_m * 100.0, rotation_deg(&error) / length_m)
+                    (error.distance_m() / length_m * 100.0, error.angle_rad().to_degrees() / length_m)
                 })
             })
             .collect();
@@ -76,8 +77,8 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
     Some(TrajectoryErrors {
         t_err_percent: overall.map(|(t, _)| t),
         r_err_deg_per_m: overall.map(|(_, r)| r),
-        rpe_t_m: rms(steps.iter().map(|error| error.translation.vector.norm())),
-        rpe_r_deg: rms(steps.iter().map(rotation_deg)),
+        rpe_t_m: rms(steps.iter().map(|error| error.distance_m())),
+        rpe_r_deg: rms(steps.iter().map(|error| error.angle_rad().to_degrees())),
         ate_m: aligned_error_m(truth, estimate),
         per_length,
     })
@@ -85,7 +86,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
 
 /// Distance travelled up to each frame, m.
 pub fn travelled_m(poses: &[Transform]) -> Vec<f64> {
-    let steps = poses.windows(2).map(|pair| (pair[1].translation.vector - pair[0].translation.vector).norm());
+    let steps = poses.windows(2).map(|pair| (Vector3::from(pair[1].translation_m) - Vector3::from(pair[0].translation_m)).norm());
     std::iter::once(0.0)
         .chain(steps.scan(0.0, |sum, step| {
             *sum += step;
@@ -103,12 +104,6 @@ fn means(pieces: &[(f64, f64)]) -> Option<(f64, f64)> {
 fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len() as f64;
     (values.map(|value| value * value).sum::<f64>() / count).sqrt()
-}
-
-/// Angle of a rotation. By the quaternion's vector part: an arc cosine would lose small angles.
-fn rotation_deg(motion: &Transform) -> f64 {
-    let q = motion.rotation.quaternion();
-    (2.0 * q.imag().norm().atan2(q.w.abs())).to_degrees()
 }
 
 #[cfg(test)]

@@ -1,17 +1,17 @@
 use super::*;
 use crate::formats::{Trajectory, write_kitti, write_tum};
-use dynvox_core::geometry::exp;
+use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 use std::path::Path;
 
 /// A drive along an arc of `count` frames, and the same with a known error in every step.
 fn arc(count: usize, step: Transform) -> Vec<Transform> {
-    std::iter::successors(Some(Transform::identity()), |pose| Some(pose * step)).take(count).collect()
+    std::iter::successors(Some(Transform::IDENTITY), |pose| Some(pose * step)).take(count).collect()
 }
 
 #[test]
 fn a_trajectory_one_percent_too_long_has_one_percent_error() {
-    let step = |length: f64| exp(Vector3::zeros(), Vector3::new(0.0, 0.0, length));
+    let step = |length: f64| Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, length));
     let found = errors(&arc(80, step(1.0)), &arc(80, step(1.01))).unwrap();
     assert!((found.t_err_percent.unwrap() - 1.0).abs() < 1e-9, "{found:?}");
     assert!(found.r_err_deg_per_m.unwrap() < 1e-9 && found.rpe_r_deg < 1e-9);
@@ -27,8 +27,8 @@ fn a_trajectory_one_percent_too_long_has_one_percent_error() {
 
 #[test]
 fn a_trajectory_turned_and_moved_as_a_whole_has_no_error() {
-    let truth = arc(60, exp(Vector3::new(0.0, 0.02, 0.001), Vector3::new(0.0, 0.0, 0.8)));
-    let away = exp(Vector3::new(0.3, -2.0, 0.1), Vector3::new(5.0, -3.0, 9.0));
+    let truth = arc(60, Transform::new(Vector3::new(0.0, 0.02, 0.001), Vector3::new(0.0, 0.0, 0.8)));
+    let away = Transform::new(Vector3::new(0.3, -2.0, 0.1), Vector3::new(5.0, -3.0, 9.0));
     let moved: Vec<Transform> = truth.iter().map(|pose| away * pose).collect();
     let found = errors(&truth, &moved).unwrap();
     assert!(found.ate_m < 1e-9 && found.rpe_t_m < 1e-9 && found.t_err_percent.unwrap() < 1e-9, "{found:?}");
@@ -40,13 +40,13 @@ fn swerving(count: usize, noise: f64) -> Vec<Transform> {
         let turn = [1e-3 * (0.3 * i).sin() + noise * 2e-4 * (1.7 * i).cos(), 0.015 * (0.11 * i).sin() + noise * 3e-4 * (2.3 * i).sin()];
         let ahead = 0.9 + 0.2 * (0.2 * i).sin() + noise * (0.01 * (1.1 * i).cos() + 0.005);
         let sideways = [0.01 * i.cos() + noise * 4e-3 * (1.3 * i).sin(), noise * 3e-3 * (0.7 * i).cos()];
-        exp(Vector3::new(turn[0], turn[1], noise * 1e-4 * (0.9 * i).cos()), Vector3::new(sideways[0], sideways[1], ahead))
+        Transform::new(Vector3::new(turn[0], turn[1], noise * 1e-4 * (0.9 * i).cos()), Vector3::new(sideways[0], sideways[1], ahead))
     };
-    let poses = (1..count).scan(Transform::identity(), |pose, i| {
-        *pose *= step(i as f64);
+    let poses = (1..count).scan(Transform::IDENTITY, |pose, i| {
+        *pose = *pose * step(i as f64);
         Some(*pose)
     });
-    std::iter::once(Transform::identity()).chain(poses).collect()
+    std::iter::once(Transform::IDENTITY).chain(poses).collect()
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn agrees_with_an_evaluation_in_numpy() {
 
 #[test]
 fn too_little_to_compare_is_none() {
-    let truth = arc(3, exp(Vector3::zeros(), Vector3::new(0.0, 0.0, 1.0)));
+    let truth = arc(3, Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 1.0)));
     assert!(errors(&truth[..1], &truth[..1]).is_none() && errors(&truth, &truth[..2]).is_none());
     assert_eq!(errors(&truth, &truth).unwrap().t_err_percent, None, "two metres are shorter than every length");
 }
@@ -102,7 +102,7 @@ fn agrees_with_evo() {
 #[test]
 fn both_formats_are_read_and_poses_are_joined_by_time() {
     let folder = tempfile::TempDir::new().unwrap();
-    let poses = arc(12, exp(Vector3::new(0.01, 0.03, 0.0), Vector3::new(0.1, 0.0, 1.0)));
+    let poses = arc(12, Transform::new(Vector3::new(0.01, 0.03, 0.0), Vector3::new(0.1, 0.0, 1.0)));
     let times: Vec<f64> = (0..12).map(|at| 100.0 + 0.1 * f64::from(at)).collect();
     let write = |name: &str, write: &dyn Fn(&mut Vec<u8>)| {
         let mut text = b"# a comment\n".to_vec();

@@ -7,7 +7,7 @@ use super::sequence::{Parts, Sequence};
 use crate::formats::calibration::KittiCalibration;
 use crate::formats::{read_poses, read_times};
 use crate::input::source::{InputError, read_failed};
-use nalgebra::{Isometry3, Translation3};
+use dynvox_core::geometry::Transform;
 use std::path::{Path, PathBuf};
 
 /// Time between two frames of the tracking benchmark, s.
@@ -46,8 +46,7 @@ pub fn open_odometry(path: &Path, sequence: Option<&str>, images: CameraPair) ->
     let poses = match odometry_poses(&folder, &number) {
         // The benchmark's poses are those of camera 0; the colour camera sees the same motion from its own place.
         Some(path) => {
-            let t_camera_zero =
-                Isometry3::from_parts(Translation3::from(calibration.offset_m(left)?), nalgebra::UnitQuaternion::identity());
+            let t_camera_zero = Transform::from_translation(calibration.offset_m(left)?.into());
             let poses = read_poses(&path)?.poses.iter().map(|pose| t_camera_zero * pose * t_camera_zero.inverse()).collect();
             Some((path, poses))
         }

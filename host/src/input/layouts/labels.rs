@@ -7,7 +7,7 @@ use crate::formats::read_text;
 use crate::input::source::{InputError, ObjectsTruth, TrueObject};
 use dynvox_core::geometry::Transform;
 use dynvox_core::masks::PixelBox;
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -40,7 +40,7 @@ pub fn read_labels(
         let Some(truth) = frames.get_mut(frame) else { continue };
         match object {
             Labelled::Object(object) => {
-                let t_world_object = truth.t_world_camera * Translation3::from(zero_m) * object.t_world_object;
+                let t_world_object = truth.t_world_camera * Transform::from_translation(zero_m.into()) * object.t_world_object;
                 truth.objects.push(TrueObject { t_world_object, ..object });
             }
             Labelled::Nothing(pixels) => truth.unlabelled.push(pixels),
@@ -73,11 +73,10 @@ fn label(line: &str) -> Option<(usize, Labelled)> {
     if kind == "DontCare" {
         return Some((frame, Labelled::Nothing(pixels)));
     }
-    let rotation = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn + std::f64::consts::FRAC_PI_2);
     let object = TrueObject {
         id: words.get(1)?.parse().ok()?,
         pixels,
-        t_world_object: Transform::from_parts(Translation3::new(x, y, z), rotation),
+        t_world_object: Transform::new([0.0, turn + std::f64::consts::FRAC_PI_2, 0.0], [x, y, z]),
         dimensions_m: [width, height, length],
         moving: false,
         speed_m_s: 0.0,
@@ -90,7 +89,7 @@ fn give_speeds(frames: &mut [ObjectsTruth], interval_s: f64) {
     let mut ways = BTreeMap::<u32, Vec<(usize, Vector3<f64>)>>::new();
     for (frame, truth) in frames.iter().enumerate() {
         for object in &truth.objects {
-            ways.entry(object.id).or_default().push((frame, object.t_world_object.translation.vector));
+            ways.entry(object.id).or_default().push((frame, Vector3::from(object.t_world_object.translation_m)));
         }
     }
     for (frame, truth) in frames.iter_mut().enumerate() {
@@ -119,13 +118,13 @@ mod tests {
         let text: String =
             (0..5).map(|frame| row(frame) + &format!("{frame} -1 DontCare -1 -1 -10 0 0 9 9 -1 -1 -1 -1000 -1000 -1000 -10\n")).collect();
         std::fs::write(&path, text).unwrap();
-        let poses: Vec<Transform> = (0..5).map(|frame| Transform::translation(0.0, 0.0, f64::from(frame))).collect();
+        let poses: Vec<Transform> = (0..5).map(|frame| Transform::from_translation([0.0, 0.0, f64::from(frame)])).collect();
         let truth = read_labels(&path, &poses, Vector3::new(0.06, 0.0, 0.003), 0.1).unwrap();
         assert_eq!(truth.len(), 5);
         let car = &truth[2].objects[..];
         assert!(car.len() == 1 && car[0].id == 7 && car[0].moving && (car[0].speed_m_s - 12.0).abs() < 1e-9, "{car:?}");
-        assert!((car[0].t_world_object * Vector3::z() - Vector3::z()).norm() < 1e-3, "its z points forward");
-        let place = car[0].t_world_object.translation.vector - poses[2].translation.vector;
+        assert!((car[0].t_world_object.rotate(Vector3::z()) - Vector3::z()).norm() < 1e-3, "its z points forward");
+        let place = Vector3::from(car[0].t_world_object.translation_m) - Vector3::from(poses[2].translation_m);
         assert!((place - Vector3::new(2.06, 1.6, 20.403)).norm() < 1e-9, "seen from the left camera, not from camera 0: {place}");
         assert_eq!(truth[2].unlabelled, [PixelBox { left: 0, top: 0, width: 10, height: 10 }]);
         std::fs::write(&path, "0 7 Car 0 0\n").unwrap();

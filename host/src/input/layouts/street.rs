@@ -7,7 +7,6 @@ use crate::input::source::{
 use crate::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::masks::PixelBox;
-use nalgebra::Point3;
 
 /// Frames of a street.
 pub struct StreetFrames {
@@ -85,7 +84,7 @@ impl FrameSource for StreetFrames {
 
     fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError> {
         let t_camera_lidar = self.street.t_camera_lidar();
-        let point = |&[x, y, z, _]: &[f32; 4]| (t_camera_lidar * Point3::new(x, y, z).cast::<f64>()).coords.into();
+        let point = |&[x, y, z, _]: &[f32; 4]| t_camera_lidar.transform_point([x, y, z].map(f64::from));
         let points_m = self.street.lidar(index as u32).iter().map(point).collect();
         Ok((index < self.frames).then(|| LidarScan::of_rig(points_m, &self.street.rig())))
     }

@@ -47,7 +47,7 @@ fn odometry_is_found_from_its_root_its_sequences_folder_and_the_sequence_itself(
         let dataset = open(&root.path().join(path), None, None, CameraPair::Auto).unwrap();
         assert_eq!((dataset.name(), dataset.len(), dataset.size()), ("kitti-odometry-06", 3, (40, 32)));
         assert_eq!((dataset.rig().baseline_m, dataset.time_s(2)), (0.5, 0.25));
-        assert_eq!(dataset.truth().unwrap()[2].translation.z, 2.0);
+        assert_eq!(dataset.truth().unwrap()[2].translation_m[2], 2.0);
         assert!(dataset.notes().is_empty());
         let frame = dataset.frame(1).unwrap();
         assert_eq!(frame.left.get(2, 1), Some((2 * 3 + 5) ^ 1), "pixels arrive as they were stored");
@@ -82,9 +82,9 @@ fn the_colour_pair_has_its_own_calibration_and_the_truth_moves_to_its_camera() {
     let frame = dataset.frame(0).unwrap();
     assert_eq!(frame.left.get(7, 9), Some(luma([7, 9, 200])));
     assert_eq!(frame.colour.unwrap().get(7, 9), Some([7, 9, 200]));
-    let moved = dataset.truth().unwrap()[1].translation.vector;
+    let moved = dataset.truth().unwrap()[1].translation_m;
     // Camera 2 stands at x = -t = -0.06 of camera 0, so it goes from there to (0, 0, 0.06): by (0.06, 0, 0.06).
-    assert!((moved - nalgebra::Vector3::new(0.06, 0.0, 0.06)).norm() < 1e-12, "{moved}");
+    assert!((nalgebra::Vector3::from(moved) - nalgebra::Vector3::new(0.06, 0.0, 0.06)).norm() < 1e-12, "{moved:?}");
 }
 
 #[test]

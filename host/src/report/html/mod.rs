@@ -81,7 +81,8 @@ fn cards(run: &RunRecord) -> String {
 }
 
 fn trajectory(run: &RunRecord) -> String {
-    let above = |poses: &[dynvox_core::geometry::Transform]| poses.iter().map(|pose| (pose.translation.x, pose.translation.z)).collect();
+    let above =
+        |poses: &[dynvox_core::geometry::Transform]| poses.iter().map(|pose| (pose.translation_m[0], pose.translation_m[2])).collect();
     let poses = run.poses();
     let mut paths = vec![Path { name: "estimated", colour: "var(--accent)", dashed: false, points: above(&poses) }];
     if let Some(truth) = &run.truth {

@@ -79,7 +79,7 @@ fn likeness(plan: &Plan) -> BTreeMap<String, String> {
         values.for_each(|value| digest.f64(value));
         format!("{:016x}", digest.finish())
     };
-    let poses = plan.poses.iter().flatten().flat_map(|pose| pose.rotation.coords.iter().chain(pose.translation.vector.iter()).copied());
+    let poses = plan.poses.iter().flatten().flat_map(|pose| pose.rotation.into_iter().chain(pose.translation_m));
     let (width, height) = dataset.size();
     let rows = [
         ("name", dataset.name().to_owned()),

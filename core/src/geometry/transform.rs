@@ -1,0 +1,274 @@
+//! Rigid motion.
+
+use bytemuck::{Pod, Zeroable};
+use core::ops::Mul;
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+
+/// Largest deviation of a quaternion's squared length from 1 at which it still is a rotation: more than
+/// three printed digits lose, less than any mistake makes.
+const UNIT_TOLERANCE: f64 = 1e-2;
+/// Angle below which the sine is its argument to the last bit, rad.
+const SMALL_ANGLE_RAD: f64 = 1e-9;
+
+/// A rigid transformation: first rotates, then moves. `t_world_camera` maps camera coordinates to world coordinates.
+///
+/// 56 bytes without padding, so that tables, snapshots and other languages can hold it as it is.
+///
+/// ```
+/// use dynvox_core::geometry::Transform;
+///
+/// let quarter_turn = Transform::new([0.0, core::f64::consts::FRAC_PI_2, 0.0], [0.0, 0.0, 1.0]);
+/// let [x, _, z] = quarter_turn.transform_point([0.0, 0.0, 2.0]);
+/// assert!((x - 2.0).abs() < 1e-12 && (z - 1.0).abs() < 1e-12);
+/// let round_trip = quarter_turn.inverse() * quarter_turn;
+/// assert!(round_trip.distance_m() < 1e-12 && round_trip.angle_rad() < 1e-7);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(C)]
+pub struct Transform {
+    /// The rotation as a unit quaternion: x, y, z, w.
+    pub rotation: [f64; 4],
+    /// The translation, m.
+    pub translation_m: [f64; 3],
+}
+
+impl Default for Transform {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+impl Transform {
+    /// Leaves every point where it is.
+    pub const IDENTITY: Self = Self::from_translation([0.0; 3]);
+
+    /// Moves without rotating.
+    pub const fn from_translation(translation_m: [f64; 3]) -> Self {
+        Self { rotation: [0.0, 0.0, 0.0, 1.0], translation_m }
+    }
+
+    /// Rotates by a rotation vector (axis times angle, rad), then moves. Arrays and the vectors of most libraries are taken.
+    pub fn new(rotation_rad: impl Into<[f64; 3]>, translation_m: impl Into<[f64; 3]>) -> Self {
+        let [a, b, c] = rotation_rad.into();
+        let angle = libm::sqrt(a * a + b * b + c * c);
+        let (real, scale) = if angle > SMALL_ANGLE_RAD { (libm::cos(0.5 * angle), libm::sin(0.5 * angle) / angle) } else { (1.0, 0.5) };
+        let rotation = [a * scale, b * scale, c * scale, real];
+        Self { rotation, translation_m: translation_m.into() }.normalized()
+    }
+
+    /// The rotation of a matrix, given row by row, then a translation.
+    pub fn from_rotation_matrix(rows: &[[f64; 3]; 3], translation_m: [f64; 3]) -> Self {
+        let matrix = Rotation3::from_matrix_unchecked(Matrix3::from(*rows).transpose());
+        Self {
+            rotation: UnitQuaternion::from_rotation_matrix(&matrix).coords.into(),
+            translation_m,
+        }
+    }
+
+    /// The motion after a small step: a rotation vector, rad, and a translation, m, applied after it (a retraction of SE(3) to second order,
+    /// whose derivative at 0 is that of the exponential).
+    #[must_use]
+    pub fn retract(&self, [a, b, c, x, y, z]: [f64; 6]) -> Self {
+        (Self::new([a, b, c], [x, y, z]) * *self).normalized()
+    }
+
+    /// The same motion with its quaternion brought back to length 1: long products drift.
+    #[must_use]
+    pub fn normalized(&self) -> Self {
+        let [x, y, z, w] = self.rotation;
+        let length = libm::sqrt(x * x + y * y + z * z + w * w);
+        Self { rotation: [x / length, y / length, z / length, w / length], ..*self }
+    }
+
+    /// Undoes the motion.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let ([x, y, z, w], [tx, ty, tz]) = (self.rotation, self.translation_m);
+        let rotation = [-x, -y, -z, w];
+        Self { rotation, translation_m: rotate(rotation, [-tx, -ty, -tz]) }
+    }
+
+    /// Where a point goes, m.
+    pub fn transform_point<P: Into<[f64; 3]> + From<[f64; 3]>>(&self, point_m: P) -> P {
+        let ([x, y, z], [tx, ty, tz]) = (rotate(self.rotation, point_m.into()), self.translation_m);
+        P::from([x + tx, y + ty, z + tz])
+    }
+
+    /// Where a direction goes: rotated, not moved.
+    pub fn rotate<V: Into<[f64; 3]> + From<[f64; 3]>>(&self, direction: V) -> V {
+        V::from(rotate(self.rotation, direction.into()))
+    }
+
+    /// The rotation as a matrix, row by row.
+    pub fn rotation_matrix(&self) -> [[f64; 3]; 3] {
+        let [i, j, k, w] = self.rotation;
+        let (ww, ii, jj, kk) = (w * w, i * i, j * j, k * k);
+        let (ij, wk, wj) = (i * j * 2.0, w * k * 2.0, w * j * 2.0);
+        let (ik, jk, wi) = (i * k * 2.0, j * k * 2.0, w * i * 2.0);
+        [[ww + ii - jj - kk, ij - wk, wj + ik], [wk + ij, ww - ii + jj - kk, jk - wi], [ik - wj, wi + jk, ww - ii - jj + kk]]
+    }
+
+    /// The upper three rows of the homogeneous matrix: rotation, and translation in the last column, m.
+    pub fn matrix_3x4(&self) -> [[f64; 4]; 3] {
+        let ([[a, b, c], [d, e, f], [g, h, i]], [x, y, z]) = (self.rotation_matrix(), self.translation_m);
+        [[a, b, c, x], [d, e, f, y], [g, h, i, z]]
+    }
+
+    /// How far the motion moves the origin, m.
+    pub fn distance_m(&self) -> f64 {
+        let [x, y, z] = self.translation_m;
+        libm::sqrt(x * x + y * y + z * z)
+    }
+
+    /// The angle of the rotation, 0 to pi rad.
+    pub fn angle_rad(&self) -> f64 {
+        let [x, y, z, w] = self.rotation;
+        2.0 * libm::atan2(libm::sqrt(x * x + y * y + z * z), libm::fabs(w))
+    }
+
+    /// Whether all seven numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        self.rotation.iter().chain(&self.translation_m).all(|value| value.is_finite())
+    }
+
+    /// Whether the quaternion has length 1, but for what rounding takes from it; `false` where it is not finite.
+    pub fn is_rotation(&self) -> bool {
+        let [x, y, z, w] = self.rotation;
+        // False for NaN as well.
+        libm::fabs(x * x + y * y + z * z + w * w - 1.0) < UNIT_TOLERANCE
+    }
+
+    /// The rotation, for arithmetic inside the core.
+    pub(crate) fn quaternion(&self) -> UnitQuaternion<f64> {
+        UnitQuaternion::new_unchecked(Quaternion::from(self.rotation))
+    }
+
+    /// The translation, m, for arithmetic inside the core.
+    pub(crate) fn translation(&self) -> Vector3<f64> {
+        Vector3::from(self.translation_m)
+    }
+}
+
+/// Rotates by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v).
+fn rotate([i, j, k, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
+    let cross = |[x, y, z]: [f64; 3]| [j * z - k * y, k * x - i * z, i * y - j * x];
+    let once = cross(v).map(|part| part * 2.0);
+    let ([ax, ay, az], [bx, by, bz], [x, y, z]) = (once, cross(once), v);
+    [ax * w + bx + x, ay * w + by + y, az * w + bz + z]
+}
+
+impl Mul for Transform {
+    type Output = Self;
+
+    /// First `other`, then `self`. Rounding takes a product's quaternion off length 1: see
+    /// [`Transform::normalized`].
+    fn mul(self, other: Self) -> Self {
+        let ([a, b, c, w], [x, y, z, v]) = (self.rotation, other.rotation);
+        Self {
+            rotation: [
+                w * x + a * v + b * z - c * y,
+                w * y - a * z + b * v + c * x,
+                w * z + a * y - b * x + c * v,
+                w * v - a * x - b * y - c * z,
+            ],
+            translation_m: self.transform_point(other.translation_m),
+        }
+    }
+}
+
+impl Mul<&Transform> for Transform {
+    type Output = Transform;
+
+    fn mul(self, other: &Transform) -> Transform {
+        self * *other
+    }
+}
+
+impl Mul<Transform> for &Transform {
+    type Output = Transform;
+
+    fn mul(self, other: Transform) -> Transform {
+        *self * other
+    }
+}
+
+impl Mul<&Transform> for &Transform {
+    type Output = Transform;
+
+    fn mul(self, other: &Transform) -> Transform {
+        *self * *other
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use nalgebra::{Isometry3, Point3, Translation3};
+
+    fn isometry(motion: &Transform) -> Isometry3<f64> {
+        Isometry3::from_parts(Translation3::from(motion.translation()), motion.quaternion())
+    }
+
+    fn bits(motion: &Transform) -> [u64; 7] {
+        let [x, y, z, w] = motion.rotation;
+        let [a, b, c] = motion.translation_m;
+        [x, y, z, w, a, b, c].map(f64::to_bits)
+    }
+
+    fn bits_of(motion: &Isometry3<f64>) -> [u64; 7] {
+        let (q, t) = (motion.rotation.coords, motion.translation.vector);
+        [q.x, q.y, q.z, q.w, t.x, t.y, t.z].map(f64::to_bits)
+    }
+
+    #[test]
+    fn every_operation_gives_the_bits_of_nalgebra() {
+        let mut random = Random::new(5);
+        let mut number = |scale: f64| scale * (f64::from(random.next_u32()) / 2_147_483_648.0 - 1.0);
+        for round in 0..2_000 {
+            let angle = if round % 3 == 0 { 1e-10 } else { 3.0 };
+            let mut motion = || Transform::new([number(angle), number(angle), number(angle)], [number(50.0), number(2.0), number(900.0)]);
+            let (a, b) = (motion(), motion());
+            assert_eq!(bits(&(a * b)), bits_of(&(isometry(&a) * isometry(&b))));
+            assert_eq!(bits(&a.inverse()), bits_of(&isometry(&a).inverse()));
+            let point = Point3::new(number(9.0), number(9.0), number(9.0));
+            assert_eq!(a.transform_point(point).coords.map(f64::to_bits), (isometry(&a) * point).coords.map(f64::to_bits));
+            assert_eq!(a.rotate(point.coords).map(f64::to_bits), (a.quaternion() * point.coords).map(f64::to_bits));
+            let matrix = a.quaternion().to_rotation_matrix();
+            for (r, row) in a.rotation_matrix().iter().enumerate() {
+                for (c, entry) in row.iter().enumerate() {
+                    assert_eq!(entry.to_bits(), matrix[(r, c)].to_bits());
+                }
+            }
+            assert!((a.angle_rad() - a.quaternion().angle()).abs() < 1e-7 && a.is_rotation());
+        }
+    }
+
+    #[test]
+    fn a_quarter_turn_about_y_carries_z_to_x() {
+        let turn = Transform::new([0.0, core::f64::consts::FRAC_PI_2, 0.0], [0.0, 0.0, 1.0]);
+        let [x, y, z] = turn.transform_point([0.0, 0.0, 2.0]);
+        assert!((x - 2.0).abs() < 1e-12 && y.abs() < 1e-12 && (z - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_step_is_taken_after_the_motion() {
+        let motion = Transform::new([0.0, 0.3, 0.0], [1.0, 0.0, 2.0]);
+        let step = motion.retract([0.1, 0.0, 0.0, 0.0, 0.0, 0.5]);
+        assert_eq!(step, (Transform::new([0.1, 0.0, 0.0], [0.0, 0.0, 0.5]) * motion).normalized());
+        assert_eq!(motion.retract([0.0; 6]).translation_m, motion.translation_m);
+    }
+
+    #[test]
+    fn only_unit_quaternions_are_rotations() {
+        let of_length = |length: f64| Transform { rotation: [0.0, 0.0, 0.0, length], ..Transform::IDENTITY };
+        assert!([1.0, 1.0 + 1e-6, -1.0].into_iter().all(|length| of_length(length).is_rotation()));
+        for length in [0.0, 1e-200, 1e200, 0.99, 1.01, f64::NAN, f64::INFINITY] {
+            assert!(!of_length(length).is_rotation(), "{length}");
+        }
+        assert!(of_length(1e200).is_finite() && !of_length(f64::NAN).is_finite());
+        let lost = Transform::from_translation([0.0, f64::INFINITY, 0.0]);
+        assert!(lost.is_rotation() && !lost.is_finite());
+    }
+}
