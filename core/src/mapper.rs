@@ -10,7 +10,6 @@ pub use config::{MapperConfig, MotionSource};
 use crate::{
     Capacity, Executor, Footprint, Stage,
     config::{Config, Problem},
-    digest::Digest,
     egomotion::{Egomotion, Estimator, MotionEstimate},
     frame::StereoFrame,
     geometry::{StereoRig, Transform, depth_from_disparity},
@@ -19,6 +18,7 @@ use crate::{
     objects::{NoSink, Object, ObjectFrame, ObjectSink, ObjectSummary, Objects, Picture},
     report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
+    snapshot::Hasher,
     stage_digests::StageDigests,
     stereo::StereoMatcher,
     tracking::{CameraMotion, Seen, ThingAt, TrackReport, Tracker},
@@ -351,7 +351,7 @@ impl<'s> Mapper<'s> {
     }
 
     /// Digests of a frame and of what each stage made of it.
-    fn digests(&self, frame: &StereoFrame<'_>, egomotion: Option<&MotionEstimate>) -> StageDigests {
+    fn digests(&mut self, frame: &StereoFrame<'_>, egomotion: Option<&MotionEstimate>) -> StageDigests {
         StageDigests {
             input: frame.digest(),
             disparity: self.stereo.digest(),
@@ -363,12 +363,12 @@ impl<'s> Mapper<'s> {
         }
     }
 
-    /// Digest of the tracks by age, their masks, and what of them waits to be fused.
-    fn tracks_digest(&self) -> u64 {
-        let mut digest = Digest::default();
-        self.tracker.enter(&mut digest);
-        self.objects.enter(&mut digest);
-        digest.finish()
+    /// Digest of the tracks by age, their masks, and the crops that wait to be fused.
+    fn tracks_digest(&mut self) -> u64 {
+        let mut hasher = Hasher::default();
+        self.tracker.archive(&mut hasher);
+        self.objects.archive_crops(&mut hasher);
+        hasher.0.finish()
     }
 
     /// The static map's triangles, one after the other, in world coordinates. How many there were.

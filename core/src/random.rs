@@ -15,9 +15,10 @@ impl Random {
         Self { state: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0xD1B5_4A32_D192_ED03 }
     }
 
-    /// Writes or reads the state.
+    /// Visits every field.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
-        archive.u64(&mut self.state);
+        let Self { state } = self;
+        archive.u64(state);
     }
 
     /// 32 uniform bits.

@@ -28,7 +28,7 @@ use core::fmt::{self, Write};
 /// What a snapshot begins with.
 pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 /// Version of the layout. Another one is refused: there is no conversion.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// Why a mapper cannot be restored. There is no mapper then; the slab may be used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ pub enum RestoreError<E> {
     Damaged,
 }
 
-/// A walk over values that writes them or reads them.
+/// A walk over values that writes them, reads them or hashes them.
 ///
 /// A walk that failed goes on without effect; whoever began it asks in the end.
 pub(crate) trait Archive {
@@ -58,6 +58,11 @@ pub(crate) trait Archive {
 
     /// Notes that what was read cannot be.
     fn refuse(&mut self);
+
+    /// Visits values whose digest is kept up to date: hashing takes the digest and need not visit them.
+    fn content(&mut self, _digest: u64, visit: impl FnOnce(&mut Self)) {
+        visit(self);
+    }
 
     fn u8(&mut self, value: &mut u8) {
         let mut bytes = [*value];
@@ -239,6 +244,47 @@ impl<F: FnMut(&mut [u8]) -> Result<(), E>, E> Archive for Reader<'_, F, E> {
         if self.failure.is_none() {
             self.failure = Some(RestoreError::Damaged);
         }
+    }
+}
+
+/// Hashes.
+#[derive(Default)]
+pub(crate) struct Hasher(pub Digest);
+
+impl Archive for Hasher {
+    fn raw(&mut self, bytes: &mut [u8]) {
+        self.0.bytes(bytes);
+    }
+
+    /// What is hashed is what there is.
+    fn refuse(&mut self) {}
+
+    fn content(&mut self, digest: u64, _visit: impl FnOnce(&mut Self)) {
+        self.0.u64(digest);
+    }
+
+    fn u8(&mut self, value: &mut u8) {
+        self.0.u64(u64::from(*value));
+    }
+
+    fn u32(&mut self, value: &mut u32) {
+        self.0.u64(u64::from(*value));
+    }
+
+    fn u64(&mut self, value: &mut u64) {
+        self.0.u64(*value);
+    }
+
+    fn f32(&mut self, value: &mut f32) {
+        self.0.f64(f64::from(*value));
+    }
+
+    fn f64(&mut self, value: &mut f64) {
+        self.0.f64(*value);
+    }
+
+    fn i16s(&mut self, values: &mut [i16]) {
+        self.0.i16s(values);
     }
 }
 

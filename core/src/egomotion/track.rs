@@ -2,11 +2,10 @@
 
 use super::{EgomotionConfig, Estimator, MotionEstimate};
 use crate::{
-    digest::Digest,
     geometry::{StereoRig, Transform},
     random::Random,
     scene_flow::Match,
-    snapshot::Archive,
+    snapshot::{Archive, Hasher},
 };
 
 /// Seed of the camera's own draws.
@@ -68,13 +67,11 @@ impl Egomotion {
         &mut self.t_world_camera
     }
 
-    /// Digest of the pose, of the motion that will be gone by, and of this frame's estimate, where there is one.
-    pub fn digest(&self, estimate: Option<&MotionEstimate>) -> u64 {
-        let mut digest = Digest::default();
-        for transform in [&self.t_world_camera, &self.t_current_previous] {
-            transform.rotation.iter().chain(&transform.translation_m).for_each(|&value| digest.f64(value));
-        }
-        digest.u64(u64::from(self.held));
+    /// Digest of the pose, of the motion that will be gone by, of the draws to come, and of this frame's estimate, where there is one.
+    pub fn digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
+        let mut hasher = Hasher::default();
+        self.archive(&mut hasher);
+        let mut digest = hasher.0;
         if let Some(estimate) = estimate {
             let counts = [estimate.status as u32, estimate.matches, estimate.inliers, estimate.samples, estimate.steps];
             counts.iter().for_each(|&count| digest.u64(u64::from(count)));
@@ -83,14 +80,15 @@ impl Egomotion {
         digest.finish()
     }
 
-    /// Writes or reads all of it.
+    /// Visits every field.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
-        for transform in [&mut self.t_world_camera, &mut self.t_current_previous] {
+        let Self { t_world_camera, t_current_previous, held, random } = self;
+        for transform in [t_world_camera, t_current_previous] {
             archive.f64s(&mut transform.rotation);
             archive.f64s(&mut transform.translation_m);
         }
-        archive.u32(&mut self.held);
-        self.random.archive(archive);
+        archive.u32(held);
+        random.archive(archive);
     }
 
     /// Maps camera coordinates to world coordinates, which are the first camera's.

@@ -3,7 +3,6 @@
 //!
 //! Memory: 8 bytes for each 64 columns a row of a box touches, out of one bounded buffer.
 
-use crate::digest::Digest;
 use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
 
@@ -26,7 +25,7 @@ pub struct PixelBox {
 }
 
 impl PixelBox {
-    /// Writes or reads the box.
+    /// Visits every field.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
         let Self { left, top, width, height } = self;
         [left, top, width, height].into_iter().for_each(|side| archive.i32(side));
@@ -98,11 +97,12 @@ impl MaskPlace {
         Self { pixels, start: 0, stride: 0 }
     }
 
-    /// Writes or reads the place.
+    /// Visits every field.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
-        self.pixels.archive(archive);
-        archive.u32(&mut self.start);
-        archive.u32(&mut self.stride);
+        let Self { pixels, start, stride } = self;
+        pixels.archive(archive);
+        archive.u32(start);
+        archive.u32(stride);
     }
 
     /// Column at which the words begin.
@@ -124,11 +124,11 @@ impl<'s> MaskStore<'s> {
         Self { words, used: 0 }
     }
 
-    /// Writes or reads all masks.
+    /// Visits all masks.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
-        let most = self.words.len();
-        archive.count(&mut self.used, most);
-        archive.u64s(self.words.get_mut(..self.used).unwrap_or(&mut []));
+        let Self { words, used } = self;
+        archive.count(used, words.len());
+        archive.u64s(words.get_mut(..*used).unwrap_or(&mut []));
     }
 
     /// Forgets all masks.
@@ -222,13 +222,6 @@ impl<'s> MaskStore<'s> {
         let (word, shift) = (from.div_euclid(WORD), from.rem_euclid(WORD) as u32);
         let at = |word: i32| usize::try_from(word).ok().and_then(|word| row.get(word)).copied().unwrap_or(0);
         if shift == 0 { at(word) } else { at(word) >> shift | at(word + 1) << (64 - shift) }
-    }
-
-    /// Takes a mask, its box and its bits, into a digest.
-    pub fn enter(&self, place: &MaskPlace, digest: &mut Digest) {
-        let PixelBox { left, top, width, height } = place.pixels;
-        [left, top, width, height].iter().for_each(|&side| digest.u64(side as u64));
-        (top..top + height).flat_map(|v| self.row(place, v)).for_each(|&word| digest.u64(word));
     }
 
     /// Pixels in the mask.

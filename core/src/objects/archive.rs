@@ -11,10 +11,11 @@ use crate::{
 };
 
 impl Objects<'_> {
-    /// Writes or reads all that outlives a frame; [`Objects::remake`] must follow a reading.
+    /// Visits all that outlives a frame; [`Objects::remake`] must follow a reading.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
-        self.crops.archive(archive);
-        self.volumes.objects.iter_mut().for_each(|object| object.archive(archive));
+        let Self { crops, volumes, config: _, report: _ } = self;
+        crops.archive(archive);
+        volumes.objects.iter_mut().for_each(|object| object.archive(archive));
     }
 
     /// Makes anew what was not stored. Whether what was read can be.
@@ -24,11 +25,13 @@ impl Objects<'_> {
 }
 
 impl Object<'_> {
-    fn archive(&mut self, archive: &mut impl Archive) {
-        let mut there = u8::from(self.summary.is_some());
+    /// Visits the object: the digest of its volume stands for that.
+    pub(super) fn archive(&mut self, archive: &mut impl Archive) {
+        let Self { volume, summary } = self;
+        let mut there = u8::from(summary.is_some());
         archive.u8(&mut there);
         if there > 0 {
-            let mut summary = self.summary.unwrap_or(ObjectSummary {
+            let summary = summary.get_or_insert(ObjectSummary {
                 id: 0,
                 chain: 0,
                 class: Class::Other,
@@ -39,18 +42,20 @@ impl Object<'_> {
                 t_world_object: Transform::IDENTITY,
             });
             summary.archive(archive);
-            self.summary = Some(summary);
+        } else {
+            *summary = None;
         }
-        self.volume.archive(archive);
+        archive.content(volume.digest(), |archive| volume.archive(archive));
     }
 }
 
 impl ObjectSummary {
+    /// Visits every field.
     fn archive(&mut self, archive: &mut impl Archive) {
-        let (mut class, mut state, mut pose) = (self.class.code(), self.state.code(), numbers(&self.t_world_object));
-        let Self { id, chain, first_frame, last_frame, frames, .. } = self;
-        [id, chain, first_frame, last_frame, frames, &mut class, &mut state].into_iter().for_each(|number| archive.u32(number));
+        let Self { id, chain, class, state, first_frame, last_frame, frames, t_world_object } = self;
+        let (mut class_code, mut state_code, mut pose) = (class.code(), state.code(), numbers(t_world_object));
+        [id, chain, first_frame, last_frame, frames, &mut class_code, &mut state_code].into_iter().for_each(|number| archive.u32(number));
         archive.f64s(&mut pose);
-        (self.class, self.state, self.t_world_object) = (Class::from_code(class), State::from_code(state), transform(&pose));
+        (*class, *state, *t_world_object) = (Class::from_code(class_code), State::from_code(state_code), transform(&pose));
     }
 }

@@ -5,7 +5,7 @@
 //! Crops of objects whose motion is not known yet wait
 //! in a ring until it is; when the ring is full the oldest crop goes, and is counted.
 //!
-//! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of 144 bytes.
+//! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of 152 bytes.
 
 use crate::{
     digest::Digest,
@@ -99,6 +99,20 @@ pub(super) struct Crop {
     pub len: u32,
     /// Whether it has colour, 0 or 1.
     pub coloured: u32,
+    /// Digest of its pixels, which stay as they are while it waits.
+    pub digest: u64,
+}
+
+impl Crop {
+    /// Visits every field; the pixels are [`Crops`]'.
+    fn archive(&mut self, archive: &mut impl Archive) {
+        let Self { t_world_camera, t_world_object, pixels, id, start, len, coloured, digest } = self;
+        archive.f64s(t_world_camera);
+        archive.f64s(t_world_object);
+        pixels.archive(archive);
+        [id, start, len, coloured].into_iter().for_each(|number| archive.u32(number));
+        archive.u64(digest);
+    }
 }
 
 /// The left picture a crop is cut from.
@@ -179,12 +193,14 @@ impl<'s> Crops<'s> {
                 to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
             }
         }
-        *self.entries.get_mut(self.len)? = Crop {
+        let mut kept = Crop {
             start: room.start as u32,
             len: len as u32,
             coloured: u32::from(coloured.is_some()),
             ..crop
         };
+        kept.digest = self.digest(&kept);
+        *self.entries.get_mut(self.len)? = kept;
         self.len += 1;
         self.next = room.end;
         Some(waiting)
@@ -221,6 +237,17 @@ impl<'s> Crops<'s> {
         })
     }
 
+    /// Digest of a crop's pixels.
+    fn digest(&self, crop: &Crop) -> u64 {
+        let mut digest = Digest::default();
+        if let Some((disparity_q8, picture)) = self.picture(crop) {
+            digest.u16s(disparity_q8);
+            picture.grey.rows().for_each(|row| digest.bytes(row));
+            picture.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
+        }
+        digest.finish()
+    }
+
     fn picture(&self, crop: &Crop) -> Option<(&[u16], Picture<'_>)> {
         let room = crop.start as usize..(crop.start + crop.len) as usize;
         let (width, height) = (crop.pixels.width as usize, crop.pixels.height as usize);
@@ -232,35 +259,25 @@ impl<'s> Crops<'s> {
         Some((self.disparity_q8.get(room)?, Picture { grey, colour }))
     }
 
-    /// Writes or reads the crops that wait, with their pixels.
+    /// Visits the crops that wait, with their pixels.
     pub fn archive(&mut self, archive: &mut impl Archive) {
-        let (most, pixels) = (self.entries.len(), self.disparity_q8.len());
-        archive.count(&mut self.len, most);
-        archive.count(&mut self.next, pixels);
-        for crop in self.entries.iter_mut().take(self.len) {
-            archive.f64s(&mut crop.t_world_camera);
-            archive.f64s(&mut crop.t_world_object);
-            crop.pixels.archive(archive);
-            [&mut crop.id, &mut crop.start, &mut crop.len, &mut crop.coloured].into_iter().for_each(|number| archive.u32(number));
-            let end = crop.start as usize + crop.len as usize;
-            let room = crop.start as usize..end;
-            if end > pixels || i64::from(crop.len) != crop.pixels.area() {
+        let Self { disparity_q8, grey, colour, entries, len, next } = self;
+        archive.count(len, entries.len());
+        archive.count(next, disparity_q8.len());
+        for crop in entries.iter_mut().take(*len) {
+            crop.archive(archive);
+            let room = crop.start as usize..crop.start as usize + crop.len as usize;
+            if room.end > disparity_q8.len() || i64::from(crop.len) != crop.pixels.area() {
                 archive.refuse();
                 return;
             }
-            archive.u16s(self.disparity_q8.get_mut(room.clone()).unwrap_or(&mut []));
-            archive.raw(self.grey.get_mut(room.clone()).unwrap_or(&mut []));
-            if crop.coloured > 0 {
-                archive.raw(self.colour.get_mut(room).unwrap_or(&mut []).as_flattened_mut());
-            }
-        }
-    }
-
-    /// Takes which crops wait, and from where they were taken, into a digest.
-    pub fn enter(&self, digest: &mut Digest) {
-        for crop in self.entries.iter().take(self.len) {
-            crop.t_world_camera.iter().chain(&crop.t_world_object).for_each(|&number| digest.f64(number));
-            digest.u64(u64::from(crop.id) << 32 | u64::from(crop.len));
+            archive.content(crop.digest, |archive| {
+                archive.u16s(disparity_q8.get_mut(room.clone()).unwrap_or(&mut []));
+                archive.raw(grey.get_mut(room.clone()).unwrap_or(&mut []));
+                if crop.coloured > 0 {
+                    archive.raw(colour.get_mut(room).unwrap_or(&mut []).as_flattened_mut());
+                }
+            });
         }
     }
 

@@ -18,8 +18,8 @@ pub use reconstruct::ObjectFrame;
 pub use report::{InstancesReport, ObjectCount};
 
 use crate::{
-    digest::Digest,
     memory::{Capacity, Carver, Footprint},
+    snapshot::Archive,
     stage_digests::ObjectDigests,
     tracking::ObjectVolumeConfig,
 };
@@ -51,14 +51,14 @@ impl<'s> Objects<'s> {
         }
     }
 
-    /// Takes what waits to be fused into a digest.
-    pub fn enter(&self, digest: &mut Digest) {
-        self.crops.enter(digest);
+    /// Visits the crops that wait to be fused.
+    pub(crate) fn archive_crops(&mut self, archive: &mut impl Archive) {
+        self.crops.archive(archive);
     }
 
     /// Digests of the objects.
-    pub fn digests(&self) -> ObjectDigests {
-        ObjectDigests::of(self.volumes.objects.iter().filter_map(|object| object.digest()))
+    pub fn digests(&mut self) -> ObjectDigests {
+        ObjectDigests::of(self.volumes.objects.iter_mut().filter_map(|object| object.digest()))
     }
 
     /// Enters what is in use into a footprint.

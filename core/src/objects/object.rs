@@ -18,9 +18,9 @@
 //! Memory: `capacity.objects` times a [`Volume`] of `capacity.object_blocks` blocks and 640 bytes, and 6 bytes a pixel of the largest image.
 
 use crate::{
-    digest::Digest,
     geometry::Transform,
     memory::{Capacity, Carver, region_bytes},
+    snapshot::Hasher,
     stage_digests::ObjectDigest,
     tracking::{Class, ObjectVolumeConfig, State},
     volume::Volume,
@@ -109,15 +109,11 @@ impl<'s> Object<'s> {
     }
 
     /// Digest of what is known of it and of its map; `None` while the volume waits for an object.
-    pub fn digest(&self) -> Option<ObjectDigest> {
-        let summary = self.summary.as_ref()?;
-        let mut digest = Digest::default();
-        let numbers = [summary.chain, summary.class.code(), summary.state as u32, summary.first_frame, summary.last_frame, summary.frames];
-        numbers.iter().for_each(|&number| digest.u64(u64::from(number)));
-        let pose = &summary.t_world_object;
-        pose.rotation.iter().chain(&pose.translation_m).for_each(|&value| digest.f64(value));
-        digest.u64(self.volume.digest());
-        Some(ObjectDigest { id: summary.id, digest: digest.finish() })
+    pub fn digest(&mut self) -> Option<ObjectDigest> {
+        let id = self.summary.as_ref()?.id;
+        let mut hasher = Hasher::default();
+        self.archive(&mut hasher);
+        Some(ObjectDigest { id, digest: hasher.0.finish() })
     }
 
     pub(super) fn retire(&mut self, config: &ObjectVolumeConfig, reason: Retirement, sink: &mut impl ObjectSink) -> bool {

@@ -11,7 +11,6 @@
 //! `independent_matches` count.
 
 use super::config::MotionConfig;
-use crate::digest::Digest;
 use crate::geometry::{StereoRig, Transform};
 use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
@@ -47,19 +46,14 @@ pub(crate) struct Filter {
 }
 
 impl Filter {
-    /// Writes or reads all of it.
+    /// Visits every field.
     pub fn archive(&mut self, archive: &mut impl Archive) {
-        archive.f64s(&mut self.rate);
-        archive.f64s(self.covariance.as_flattened_mut());
-        archive.f64s(&mut self.center_world);
-        archive.u32(&mut self.frames);
-        archive.u32(&mut self.contradictions);
-    }
-
-    /// Takes all of it into a digest.
-    pub fn enter(&self, digest: &mut Digest) {
-        self.rate.iter().chain(self.covariance.as_flattened()).chain(&self.center_world).for_each(|&number| digest.f64(number));
-        digest.u64(u64::from(self.frames) << 32 | u64::from(self.contradictions));
+        let Self { rate, covariance, center_world, frames, contradictions } = self;
+        archive.f64s(rate);
+        archive.f64s(covariance.as_flattened_mut());
+        archive.f64s(center_world);
+        archive.u32(frames);
+        archive.u32(contradictions);
     }
 
     /// Whether a motion has ever been seen.

@@ -48,7 +48,6 @@ mod claim;
 mod class;
 mod config;
 mod detection;
-mod digest;
 mod filter;
 mod follow;
 mod look;

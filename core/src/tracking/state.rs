@@ -18,7 +18,6 @@
 //! still counts until the state is lost, or for as long with none.
 
 use super::config::StateConfig;
-use crate::digest::Digest;
 use crate::snapshot::Archive;
 use bytemuck::{Pod, Zeroable};
 
@@ -107,15 +106,10 @@ impl Judgement {
         State::from_code(self.state)
     }
 
-    /// Writes or reads all of it.
+    /// Visits every field.
     pub fn archive(&mut self, archive: &mut impl Archive) {
         let Self { state, vote, streak, since_motion } = self;
         [state, vote, streak, since_motion].into_iter().for_each(|number| archive.u32(number));
-    }
-
-    /// Takes all of it into a digest.
-    pub fn enter(&self, digest: &mut Digest) {
-        [self.state, self.vote, self.streak, self.since_motion].iter().for_each(|&number| digest.u64(u64::from(number)));
     }
 
     /// Takes in a frame, seen or not, with a motion or without. Returns the new state.

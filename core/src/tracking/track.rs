@@ -11,7 +11,6 @@
 //! Memory: [`Track`] a track and 4 bytes for each pair.
 
 use super::{Class, InstancesConfig, State, config::Overlap, detection::Taken, filter::Filter, state::Judgement};
-use crate::digest::Digest;
 use crate::masks::{MaskPlace, MaskStore};
 use crate::memory::{Capacity, Carver, region_bytes};
 use crate::snapshot::Archive;
@@ -66,7 +65,7 @@ impl Track {
         Class::from_code(self.class)
     }
 
-    /// Writes or reads all of it.
+    /// Visits every field.
     fn archive(&mut self, archive: &mut impl Archive) {
         let Self {
             filter,
@@ -75,9 +74,22 @@ impl Track {
             place,
             drift,
             judgement,
+            id,
+            class,
+            class_lead,
             score,
+            first_frame,
+            last_frame,
+            sightings,
+            detection,
+            chain,
+            chains,
+            matches,
+            inliers,
+            measured,
             sigma_m_s,
-            ..
+            small,
+            padding: _,
         } = self;
         filter.archive(archive);
         archive.f64s(t_world_object);
@@ -87,21 +99,8 @@ impl Track {
         judgement.archive(archive);
         archive.f32(score);
         archive.f32(sigma_m_s);
-        let Self { id, class, class_lead, first_frame, last_frame, sightings, .. } = self;
         [id, class, class_lead, first_frame, last_frame, sightings].into_iter().for_each(|number| archive.u32(number));
-        let Self { detection, chain, chains, matches, inliers, measured, .. } = self;
-        [detection, chain, chains, matches, inliers, measured].into_iter().for_each(|number| archive.u32(number));
-    }
-
-    /// Takes all of it but the place of its mask into a digest.
-    pub fn enter(&self, digest: &mut Digest) {
-        self.filter.enter(digest);
-        self.t_world_object.iter().chain(&self.t_world_origin).for_each(|&number| digest.f64(number));
-        self.drift.iter().for_each(|&px| digest.u64(px as u64));
-        self.judgement.enter(digest);
-        let numbers = [self.id, self.class, self.class_lead, self.score.to_bits(), self.first_frame, self.last_frame, self.sightings];
-        let counts = [self.detection, self.chain, self.chains, self.matches, self.inliers, self.measured, self.sigma_m_s.to_bits()];
-        numbers.iter().chain(&counts).for_each(|&number| digest.u64(u64::from(number)));
+        [detection, chain, chains, matches, inliers, measured, small].into_iter().for_each(|number| archive.u32(number));
     }
 
     /// Whether it is nothing yet: too small to be reconstructed, and no motion was ever measured.
@@ -181,11 +180,11 @@ impl<'s> Tracks<'s> {
         }
     }
 
-    /// Writes or reads all tracks.
+    /// Visits all tracks. The scores are those of one frame.
     pub fn archive(&mut self, archive: &mut impl Archive) {
-        let most = self.tracks.len();
-        archive.count(&mut self.len, most);
-        archive.u32(&mut self.next_id);
+        let Self { tracks, len, next_id, scores: _ } = self;
+        archive.count(len, tracks.len());
+        archive.u32(next_id);
         self.all_mut().iter_mut().for_each(|track| track.archive(archive));
     }
 

@@ -79,6 +79,29 @@ fn a_drive_resumed_anywhere_gives_the_digests_of_the_one_that_never_stopped() {
 }
 
 #[test]
+fn a_track_too_small_to_be_reconstructed_stays_so_when_a_run_is_resumed_and_the_detector_misses_it() {
+    const SEEN: usize = 3;
+    let walk = Walk::new(SEEN + 2);
+    let small = Detection { left: 250, top: 60, width: 10, height: 10, mask: &[1; 100], ..walk.detection() };
+    let step = |at: usize, mapper: &mut Mapper<'_>| {
+        let detections: &[Detection<'_>] = if at < SEEN { &[small] } else { &[] };
+        walk.with_frame(at, |frame| mapper.step(&StereoFrame { detections, ..*frame }, &Serial).unwrap())
+    };
+    let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
+    let start = slab.as_ptr().align_offset(SLAB_ALIGN);
+    let mut mapper = Mapper::new(&CAPACITY, &Walk::config(), &mut slab[start..]).unwrap();
+    let seen: Vec<Report> = (0..SEEN).map(|at| step(at, &mut mapper)).collect();
+    assert_eq!(seen[SEEN - 1].instances.detections.tracked_only, 1);
+    let bytes = saved(&mut mapper);
+    let missed = |mapper: &mut Mapper<'_>| -> Vec<Report> { (SEEN..SEEN + 2).map(|at| step(at, mapper)).collect() };
+    let (went_on, resumed) = (missed(&mut mapper), restored(&CAPACITY, &Walk::config(), &bytes, missed).unwrap());
+    for (report, expected) in resumed.iter().zip(&went_on) {
+        assert_eq!(report.instances.pixels_cleared, expected.instances.pixels_cleared, "frame {}", report.frame);
+        assert_eq!(report.digests.first_difference(&expected.digests), None, "frame {}", report.frame);
+    }
+}
+
+#[test]
 fn a_restored_mapper_saves_the_bytes_it_was_restored_from_and_saving_changes_nothing() {
     let walk = Walk::new(FRAMES);
     let (reports, snapshots) = uninterrupted(&walk, &CAPACITY, |at| at == 6);
@@ -121,7 +144,8 @@ fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
         refusal(&CAPACITY, &Walk::config(), &changed)
     };
     assert_eq!(with(0, b'x'), RestoreError::Foreign);
-    assert_eq!(with(8, 1), RestoreError::Version(1), "an older one");
+    let previous = crate::snapshot::VERSION - 1;
+    assert_eq!(with(8, previous as u8), RestoreError::Version(previous));
     assert_eq!(refusal(&Capacity { tracks: 15, ..CAPACITY }, &Walk::config(), &bytes), RestoreError::Capacity);
     let mut other = Walk::config();
     other.egomotion.confidence = f64::from_bits(other.egomotion.confidence.to_bits() + 1);

@@ -15,7 +15,6 @@ mod volumes;
 use super::*;
 use crate::{
     Serial,
-    digest::Digest,
     egomotion::Estimator,
     geometry::{StereoRig, Transform},
     image::{View, ViewMut},
@@ -120,11 +119,11 @@ impl<'s> Instances<'s> {
         self.tracker.at(u, v)
     }
 
-    fn digest(&self) -> u64 {
-        let mut digest = Digest::default();
-        self.tracker.enter(&mut digest);
-        self.objects.enter(&mut digest);
-        digest.finish()
+    fn digest(&mut self) -> u64 {
+        let mut hasher = crate::snapshot::Hasher::default();
+        self.tracker.archive(&mut hasher);
+        self.objects.archive_crops(&mut hasher);
+        hasher.0.finish()
     }
 }
 
