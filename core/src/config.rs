@@ -4,35 +4,13 @@ use crate::{
     egomotion::{EgomotionConfig, icp::IcpConfig},
     geometry::{RigProblem, StereoRig},
     mapper::MapperConfig,
+    problem::{Problems, require},
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
     tracking::InstancesConfig,
     view::{MeshConfig, RaycastConfig},
     volume::VolumeConfig,
 };
-use heapless::Vec;
-
-/// Most problems `validate` reports at once.
-pub const MAX_PROBLEMS: usize = 32;
-
-/// One thing wrong with a configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Problem {
-    /// The key as it stands in a configuration file: `volume.voxel_size_m`.
-    pub key: &'static str,
-    /// What the value must be: "must be above 0".
-    pub rule: &'static str,
-}
-
-/// All problems found, in the order of the keys.
-pub type Problems = Vec<Problem, MAX_PROBLEMS>;
-
-/// Notes a problem unless `holds`. Beyond [`MAX_PROBLEMS`] the first ones are enough to refuse the configuration.
-pub fn require(problems: &mut Problems, holds: bool, key: &'static str, rule: &'static str) {
-    if !holds && !problems.is_full() {
-        let _ = problems.push(Problem { key, rule });
-    }
-}
 
 /// Everything a mapper can be told, beside its bounds. Every default stands with its field, in the struct of the stage it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,13 +9,14 @@ pub use config::{MapperConfig, MotionSource};
 
 use crate::{
     Capacity, Executor, Footprint, Stage,
-    config::{Config, Problem},
+    config::Config,
     egomotion::{Egomotion, Estimator, MotionEstimate},
     frame::StereoFrame,
     geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
     memory::{Carver, SlabError, region_bytes},
     objects::{NoSink, Object, ObjectFrame, ObjectSink, ObjectSummary, Objects, Picture},
+    problem::Problem,
     report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
     snapshot::Hasher,

@@ -1,6 +1,6 @@
 //! Settings of the motion estimate.
 
-use crate::config::{Problems, require};
+use crate::problem::{Problems, require};
 
 /// What the motion estimate can be told. One set serves the camera; objects use another copy.
 #[derive(Clone, Copy, Debug, PartialEq)]

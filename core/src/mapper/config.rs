@@ -1,6 +1,6 @@
 //! Settings of the loop.
 
-use crate::config::{Problems, require};
+use crate::problem::{Problems, require};
 
 /// Where the camera's motion comes from, unless a frame brings its pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

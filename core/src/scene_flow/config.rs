@@ -1,6 +1,6 @@
 //! Settings of the scene flow.
 
-use crate::config::{Problems, require};
+use crate::problem::{Problems, require};
 
 /// What the scene flow can be told. Defaults are DynSLAM's, with sub-pixel refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Every parameter of the stereo matcher, with the values of the published presets.
 
-use crate::config::{Problems, require};
+use crate::problem::{Problems, require};
 
 /// Largest disparity the matcher can represent, px.
 pub const DISPARITY_LIMIT: u16 = 255;

@@ -17,11 +17,11 @@ use super::{
     support::{NO_MATCH, SupportMatching},
 };
 use crate::{
-    config::Problems,
     digest::Digest,
     executor::Executor,
     image::{DISPARITY_ONE_PX, View},
     memory::{Capacity, Carver, region_bytes},
+    problem::Problems,
 };
 
 /// Descriptor rows per band: support points need two of each image.

@@ -1,8 +1,8 @@
 //! Settings of the instances. Speeds are in metres per second of real time: other frame rates need no other thresholds.
 
 use crate::{
-    config::{Problems, require},
     egomotion::EgomotionConfig,
+    problem::{Problems, require},
     volume::{ObservationWeight, VolumeConfig, WhenFull},
 };
 

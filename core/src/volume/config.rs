@@ -1,6 +1,6 @@
 //! How depth becomes a map.
 
-use crate::config::{Problems, require};
+use crate::problem::{Problems, require};
 
 /// Semantic classes that can carry a weight of their own.
 pub const CLASS_COUNT: usize = 32;

@@ -1,6 +1,6 @@
 //! Settings of the depth tracker.
 
-use crate::config::{Problems, require};
+use crate::problem::{Problems, require};
 
 /// Most levels of the pyramid.
 pub const MAX_LEVELS: u8 = 4;

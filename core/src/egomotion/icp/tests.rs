@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::{
-    config::Problems,
     geometry::Transform,
     image::{DISPARITY_ONE_PX, ViewMut},
+    problem::Problems,
 };
 use std::{vec, vec::Vec};
 

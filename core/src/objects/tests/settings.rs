@@ -1,7 +1,7 @@
 //! Settings that make no sense are named.
 
 use super::*;
-use crate::config::Problems;
+use crate::problem::Problems;
 
 type Spoil = fn(&mut InstancesConfig);
 

@@ -1,6 +1,6 @@
 //! How a map becomes triangles.
 
-use crate::config::{Problems, require};
+use crate::problem::{Problems, require};
 
 /// Parameters of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! How the map is looked at.
 
-use crate::config::{Problems, require};
+use crate::problem::{Problems, require};
 
 /// Parameters of the raycast.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,37 @@
+//! What can be wrong with a configuration. A leaf: every stage's settings use it, and it knows none of them.
+
+use core::fmt;
+use heapless::Vec;
+
+/// Most problems a validation reports at once.
+pub const MAX_PROBLEMS: usize = 32;
+
+/// One thing wrong with a configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Problem {
+    /// The key as it stands in a configuration file: `volume.voxel_size_m`.
+    pub key: &'static str,
+    /// What the value must be: "must be above 0".
+    pub rule: &'static str,
+}
+
+/// `volume.voxel_size_m must be above 0`.
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.key, self.rule)
+    }
+}
+
+impl core::error::Error for Problem {}
+
+/// All problems found, in the order of the keys.
+pub type Problems = Vec<Problem, MAX_PROBLEMS>;
+
+/// Notes a problem unless `holds`. Beyond [`MAX_PROBLEMS`] the first ones are enough to refuse the
+/// configuration.
+pub fn require(problems: &mut Problems, holds: bool, key: &'static str, rule: &'static str) {
+    if !holds && !problems.is_full() {
+        let _ = problems.push(Problem { key, rule });
+    }
+}
