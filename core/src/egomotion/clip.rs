@@ -4,10 +4,10 @@
 
 use super::{Egomotion, EgomotionConfig, Estimator, MotionStatus};
 use crate::{
-    executor::Serial,
     geometry::StereoRig,
     image::View,
     memory::{Capacity, Carver},
+    parallel::Serial,
     scene_flow::{FlowMatcher, SceneFlowConfig},
 };
 use nalgebra::Matrix4;

@@ -1,9 +1,9 @@
 use super::{Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus};
 use crate::{
-    executor::Serial,
     geometry::{StereoRig, Transform},
     image::View,
     memory::{Carver, Slab},
+    parallel::Serial,
     random::Random,
     scene_flow::{
         FlowMatcher, Match, SceneFlowConfig,

@@ -6,8 +6,8 @@ use crate::{
         MotionEstimate,
         icp::{self, IcpReport, IcpStatus, MapPicture},
     },
-    executor::Executor,
     frame::StereoFrame,
+    parallel::Executor,
     report::PoseOrigin,
     volume::Viewpoint,
 };

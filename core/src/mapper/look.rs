@@ -3,9 +3,9 @@
 use super::Mapper;
 use crate::{
     Stage,
-    executor::Executor,
     geometry::Transform,
     objects::PlacedObject,
+    parallel::Executor,
     view::{RaycastError, Raycaster},
     volume::Viewpoint,
 };

@@ -6,9 +6,9 @@ use super::{
     object::{Object, ObjectVolumes},
 };
 use crate::{
-    executor::Executor,
     geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
+    parallel::Executor,
     tracking::{
         State, Track, Tracker, Treatment,
         pose::{numbers, transform},

@@ -3,10 +3,10 @@
 use super::{MAX_RAW_SIDE, Rectification, RectifyReport, map};
 use crate::{
     digest::Digest,
-    executor::{Executor, join4},
     geometry::StereoRig,
     image::{InvalidPair, InvalidPixels, View},
     memory::{Capacity, Carver, region_bytes},
+    parallel::{Executor, each},
 };
 
 /// Why a rectification does not fit a capacity.
@@ -174,13 +174,13 @@ impl<'s> Rectifier<'s> {
         let [left_map, right_map] = [&self.left, &self.right].map(|camera| camera.map.get(..pixels).unwrap_or(&[]).split_at(middle));
         let [left_out, right_out] =
             [&mut *images.left, &mut *images.right].map(|grey| grey.get_mut(..pixels).unwrap_or_default().split_at_mut(middle));
-        join4(
-            executor,
-            || map::remap(left_map.0, &left.raw, &raw.left, left_out.0),
-            || map::remap(left_map.1, &left.raw, &raw.left, left_out.1),
-            || map::remap(right_map.0, &right.raw, &raw.right, right_out.0),
-            || map::remap(right_map.1, &right.raw, &raw.right, right_out.1),
-        );
+        let bands = [
+            (left_map.0, &left.raw, &raw.left, left_out.0),
+            (left_map.1, &left.raw, &raw.left, left_out.1),
+            (right_map.0, &right.raw, &raw.right, right_out.0),
+            (right_map.1, &right.raw, &raw.right, right_out.1),
+        ];
+        each(executor, bands, |(map, camera, raw, rectified)| map::remap(map, camera, raw, rectified));
         let colour = raw.colour.and_then(|raw| {
             let (upper, lower) = images.colour.get_mut(..pixels)?.split_at_mut(middle);
             executor.join(|| map::remap(left_map.0, &left.raw, &raw, upper), || map::remap(left_map.1, &left.raw, &raw, lower));

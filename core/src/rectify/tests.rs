@@ -3,10 +3,10 @@
 use super::*;
 use crate::{
     Capacity, Serial,
-    executor::TwoThreads,
     geometry::StereoRig,
     image::View,
     memory::{Carver, SLAB_ALIGN},
+    parallel::TwoThreads,
 };
 use nalgebra::{Matrix3, Vector3};
 use std::{vec, vec::Vec};

@@ -6,7 +6,7 @@ use super::{
     features::{Features, Window},
     matches::Match,
 };
-use crate::executor::{Executor, join4};
+use crate::parallel::{Bands, Executor, each, zip2};
 use bytemuck::{Pod, Zeroable};
 
 /// One side of the circle has no partner.
@@ -45,20 +45,16 @@ pub(super) struct Corners<'a, 's> {
 }
 
 impl Corners<'_, '_> {
-    /// Traces every circle. `traced[i]` becomes the partners of previous-left feature i, in the circle's order. Four fixed bands.
+    /// Traces every circle. `traced[i]` becomes the partners of previous-left feature i, in the circle's order.
     pub(super) fn trace<E: Executor>(&self, reach: impl Fn([u16; 2]) -> Reach + Sync, traced: &mut [[u32; 3]], executor: &E) {
         let len = self.previous_left.len();
         let Some(traced) = traced.get_mut(..len) else { return };
-        let quarter = len / 4;
-        let (a, rest) = traced.split_at_mut_checked(quarter).unwrap_or_default();
-        let (b, rest) = rest.split_at_mut_checked(quarter).unwrap_or_default();
-        let (c, d) = rest.split_at_mut_checked(quarter).unwrap_or_default();
-        let band = |first: usize, traced: &mut [[u32; 3]]| {
+        let bands = Bands::of(len);
+        each(executor, zip2(bands.first(), bands.split_mut(traced, 1)), |(first, traced)| {
             for (index, partners) in (first..).zip(traced) {
                 *partners = self.circle(index, &reach).unwrap_or(NONE);
             }
-        };
-        join4(executor, || band(0, a), || band(quarter, b), || band(2 * quarter, c), || band(3 * quarter, d));
+        });
     }
 
     /// The circle that begins with one feature, if it closes.

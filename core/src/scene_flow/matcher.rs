@@ -14,9 +14,9 @@ use super::{
 };
 use crate::{
     digest::Digest,
-    executor::{Executor, join4},
     image::View,
     memory::{Capacity, Carver, region_bytes},
+    parallel::{Bands, Executor, each, zip3},
     snapshot::Archive,
 };
 
@@ -278,11 +278,11 @@ impl<'s> FlowMatcher<'s> {
         (count, kept)
     }
 
-    /// Refines the supported among the first `closed` matches, in four fixed bands, and closes the gaps the others leave.
+    /// Refines the supported among the first `closed` matches and closes the gaps the others leave.
     fn refine_supported<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], closed: usize, executor: &E) {
         let images = images(&self.left, &self.right, [width, height]);
-        let band = |band: (&mut [Match], &mut [u8], &mut [f32])| {
-            for ((m, keep), score) in band.0.iter_mut().zip(band.1).zip(band.2).filter(|((_, keep), _)| **keep == 1) {
+        let band = |(matches, keep, score): (&mut [Match], &mut [u8], &mut [f32])| {
+            for ((m, keep), score) in matches.iter_mut().zip(keep).zip(score).filter(|((_, keep), _)| **keep == 1) {
                 *score = 0.0;
                 match refine(m, images) {
                     Some(better) => (*m, *score) = better,
@@ -291,12 +291,9 @@ impl<'s> FlowMatcher<'s> {
             }
         };
         if config.refine {
-            let quarter = closed.div_ceil(4);
-            let mut matches = self.refined.get_mut(..closed).unwrap_or_default();
-            let mut keep = self.keep.get_mut(..closed).unwrap_or_default();
-            let mut score = self.score.get_mut(..closed).unwrap_or_default();
-            let [a, b, c, d] = [(); 4].map(|()| (part(&mut matches, quarter), part(&mut keep, quarter), part(&mut score, quarter)));
-            join4(executor, || band(a), || band(b), || band(c), || band(d));
+            let bands = Bands::of(closed);
+            let (matches, keep) = (bands.split_mut(self.refined, 1), bands.split_mut(self.keep, 1));
+            each(executor, zip3(matches, keep, bands.split_mut(self.score, 1)), band);
         } else {
             self.score.fill(0.0);
         }
@@ -330,10 +327,4 @@ fn keep<T: Copy>(items: &mut [T], from: usize, to: usize) {
     if let (Some(item), Some(place)) = (item, items.get_mut(to)) {
         *place = item;
     }
-}
-
-/// Cuts the first `count` items off `rest`, or as many as there are.
-fn part<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
-    let count = count.min(rest.len());
-    rest.split_off_mut(..count).unwrap_or_default()
 }

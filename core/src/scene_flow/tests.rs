@@ -11,10 +11,10 @@ use super::{
     suppression::{CLASSES, Candidate},
 };
 use crate::{
-    executor::{Serial, TwoThreads},
     geometry::Transform,
     image::View,
     memory::{Capacity, Carver, Slab},
+    parallel::{Serial, TwoThreads},
     random::Random,
 };
 use nalgebra::Vector3;

@@ -1,8 +1,7 @@
 //! The matcher: its rooms in the slab, and the steps from two images to disparities.
 
 use super::{
-    MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, StereoConfig, StereoReport, StereoStatus, StereoStep, bands,
-    bands::Bands,
+    MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, StereoConfig, StereoReport, StereoStatus, StereoStep,
     config::{DISPARITY_LIMIT, MIN_CANDIDATE_STEP, MIN_GRID_SIZE},
     delaunay::{SupportPoint, Triangulation},
     dense::{DenseBand, DenseMatching, NONE, WORKING_ONE_PX},
@@ -18,16 +17,14 @@ use super::{
 };
 use crate::{
     digest::Digest,
-    executor::Executor,
     image::{DISPARITY_ONE_PX, View},
     memory::{Capacity, Carver, region_bytes},
+    parallel::{BANDS, Bands, Executor, each, zip3},
     problem::Problems,
 };
 
 /// Descriptor rows per band: support points need two of each image.
 const ROWS: usize = 4;
-/// Bands work is split into.
-const BANDS: usize = 4;
 
 /// The matcher: its rooms in the slab and the disparities of the last pair.
 pub struct StereoMatcher<'s> {
@@ -223,8 +220,8 @@ impl<'s> StereoMatcher<'s> {
         let (width, bands) = (self.width, Bands::of(self.height));
         let [left_du, left_dv, right_du, right_dv] = split_planes(self.gradients, width * self.height);
         for (image, du, dv) in [(left, left_du, left_dv), (right, right_du, right_dv)] {
-            let jobs = zip3(bands.first(), bands.split(du, width), bands.split(dv, width));
-            bands::each(executor, jobs, |(first, du, dv)| gradient::gradients(image, first, du, dv));
+            let jobs = zip3(bands.first(), bands.split_mut(du, width), bands.split_mut(dv, width));
+            each(executor, jobs, |(first, du, dv)| gradient::gradients(image, first, du, dv));
         }
     }
 
@@ -234,8 +231,8 @@ impl<'s> StereoMatcher<'s> {
             (support::candidates(self.width, config.candidate_step), support::candidates(self.height, config.candidate_step));
         let bands = Bands::of(rows);
         let matching = SupportMatching { config, left, right };
-        let jobs = zip3(bands.first(), bands.split(self.support, columns), Bands::of(BANDS).split(self.rows, ROWS * self.width));
-        bands::each(executor, jobs, |(first, grid, scratch)| matching.match_rows(first, grid, scratch));
+        let jobs = zip3(bands.first(), bands.split_mut(self.support, columns), Bands::of(BANDS).split_mut(self.rows, ROWS * self.width));
+        each(executor, jobs, |(first, grid, scratch)| matching.match_rows(first, grid, scratch));
         let grid = self.support.get(..columns * rows).unwrap_or(&[]);
         report.candidates = grid.len() as u32;
         report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
@@ -281,14 +278,14 @@ impl<'s> StereoMatcher<'s> {
             cost: PlaneCost::new(config),
         };
         let disparity: &mut [i16] = bytemuck::cast_slice_mut(self.disparity);
-        let images = zip3(bands.first(), bands.split(disparity, width), bands.split(self.other, width));
-        let scratch = Bands::of(BANDS).split(self.rows, ROWS * width);
+        let images = zip3(bands.first(), bands.split_mut(disparity, width), bands.split_mut(self.other, width));
+        let scratch = Bands::of(BANDS).split_mut(self.rows, ROWS * width);
         let mut jobs = [(); BANDS].map(|()| None);
         for ((job, (first, left, right)), scratch) in jobs.iter_mut().zip(images).zip(scratch) {
             *job = Some(DenseBand { first, left, right, scratch, counts: [0; 2] });
         }
         let (left_mesh, right_mesh) = (&self.left_mesh, &self.right_mesh);
-        bands::each(executor, jobs.each_mut(), |band| {
+        each(executor, jobs.each_mut(), |band| {
             if let Some(band) = band {
                 prior::draw_planes(left_mesh, config.plane_slope_max, band.first, width, band.left);
                 prior::draw_planes(right_mesh, config.plane_slope_max, band.first, width, band.right);
@@ -323,15 +320,15 @@ impl<'s> StereoMatcher<'s> {
         let image = image_of(self.disparity, pixels);
         let other = self.other.get_mut(..pixels).unwrap_or(&mut []);
         if config.adaptive_mean {
-            let rows = zip3(bands.first(), bands.split(image, width), bands.split(other, width));
-            bands::each(executor, rows, |(_, from, to)| smooth::mean_along_rows(from, width, to));
-            let columns = zip3(bands.first(), bands.split(image, width), [(); BANDS]);
-            bands::each(executor, columns, |(first, to, ())| smooth::mean_along_columns(other, width, first, to));
+            let rows = zip3(bands.first(), bands.split_mut(image, width), bands.split_mut(other, width));
+            each(executor, rows, |(_, from, to)| smooth::mean_along_rows(from, width, to));
+            let columns = zip3(bands.first(), bands.split_mut(image, width), [(); BANDS]);
+            each(executor, columns, |(first, to, ())| smooth::mean_along_columns(other, width, first, to));
         }
         if config.median {
             other.iter_mut().zip(&*image).for_each(|(to, from)| *to = *from);
-            let rows = zip3(bands.first(), bands.split(image, width), [(); BANDS]);
-            bands::each(executor, rows, |(first, to, ())| median::median(other, width, first, to));
+            let rows = zip3(bands.first(), bands.split_mut(image, width), [(); BANDS]);
+            each(executor, rows, |(first, to, ())| median::median(other, width, first, to));
         }
     }
 
@@ -371,9 +368,4 @@ fn gradients(region: &[u32], width: usize, height: usize) -> [Gradients<'_>; 2] 
         width,
         height,
     })
-}
-
-/// Three arrays as one of triples.
-fn zip3<A, B, C>([a, b, c, d]: [A; 4], [e, f, g, h]: [B; 4], [i, j, k, l]: [C; 4]) -> [(A, B, C); 4] {
-    [(a, e, i), (b, f, j), (c, g, k), (d, h, l)]
 }

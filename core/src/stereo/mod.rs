@@ -49,7 +49,6 @@
 //! assert_eq!(matcher.disparity_q8().get(40, 20), Some(6 * 256));
 //! ```
 
-mod bands;
 mod config;
 mod delaunay;
 mod dense;

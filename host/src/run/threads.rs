@@ -146,7 +146,7 @@ mod tests {
                 burn(5);
                 threads.join(
                     || {
-                        let four = || dynvox_core::executor::join4(&threads, || burn(10), || burn(10), || burn(10), || burn(10));
+                        let four = || dynvox_core::parallel::each(&threads, [10; 4], burn);
                         threads.stage(Stage::Stereo, four)
                     },
                     || threads.stage(Stage::SceneFlow, || threads.join(|| burn(15), || burn(15))),

@@ -1,7 +1,7 @@
 //! Input without an answer, input that fits nothing, and configurations at their limits: values, never panics.
 
 use super::{scenes::surface, *};
-use crate::{executor::TwoThreads, problem::Problems, random::Random};
+use crate::{parallel::TwoThreads, problem::Problems, random::Random};
 
 fn noise(width: usize, height: usize, seed: u64) -> Grey {
     let mut random = Random::new(seed);

@@ -32,10 +32,10 @@ mod tests;
 pub use config::RaycastConfig;
 
 use crate::{
-    executor::{Executor, join4},
     geometry::scalar::min_f32,
     image::View,
     memory::{Capacity, Carver, Footprint, region_bytes},
+    parallel::{Executor, each},
     volume::{Viewpoint, Volume},
 };
 use eye::Eye;
@@ -213,16 +213,8 @@ impl<'s> Raycaster<'s> {
         let rows = view.height.div_ceil(4);
         let (high, low) = whole.split(2 * rows, view.width);
         let ((a, b), (c, d)) = (high.split(rows, view.width), low.split(rows, view.width));
-        let mut hits = [0u32; 4];
-        let [hits_a, hits_b, hits_c, hits_d] = &mut hits;
         // Sky and road go together, so that two threads have about the same to do.
-        join4(
-            executor,
-            || *hits_a = band(&marcher, ranges, layer, a),
-            || *hits_d = band(&marcher, ranges, layer, d),
-            || *hits_b = band(&marcher, ranges, layer, b),
-            || *hits_c = band(&marcher, ranges, layer, c),
-        );
+        let hits = each(executor, [a, d, b, c], |rows| band(&marcher, ranges, layer, rows));
         Ok(RaycastReport {
             pixels: hits.iter().sum(),
             blocks_in_view: in_view.blocks,

@@ -8,8 +8,8 @@ use super::{
     signs::{self, Cells},
 };
 use crate::{
-    executor::{Executor, join4},
     memory::{Capacity, Carver, region_bytes},
+    parallel::{Bands, Executor, each, zip2},
     volume::{BLOCK_SIDE, Volume},
 };
 
@@ -158,7 +158,7 @@ impl<'s> Surface<'s> {
     }
 
     fn read_signs<E: Executor>(&mut self, volume: &Volume<'_>, min_weight: u8, executor: &E) {
-        let read = |signs: &mut [[signs::Layers; 2]], slots: &[[u32; 8]]| {
+        let read = |(signs, slots): (&mut [[signs::Layers; 2]], &[[u32; 8]])| {
             for (signs, [slot, ..]) in signs.iter_mut().zip(slots) {
                 if let (Some(sdf), Some(weight)) = (volume.blocks().sdf(*slot), volume.blocks().weight(*slot)) {
                     *signs = signs::of_block(sdf, weight, min_weight);
@@ -166,14 +166,8 @@ impl<'s> Surface<'s> {
             }
         };
         let (Some(signs), Some(slots)) = (self.signs.get_mut(..self.len), self.slots.get(..self.len)) else { return };
-        let quarter = self.len.div_ceil(4);
-        let (signs_low, signs_high) = signs.split_at_mut((2 * quarter).min(signs.len()));
-        let (slots_low, slots_high) = slots.split_at((2 * quarter).min(slots.len()));
-        let (signs_a, signs_b) = signs_low.split_at_mut(quarter.min(signs_low.len()));
-        let (slots_a, slots_b) = slots_low.split_at(quarter.min(slots_low.len()));
-        let (signs_c, signs_d) = signs_high.split_at_mut(quarter.min(signs_high.len()));
-        let (slots_c, slots_d) = slots_high.split_at(quarter.min(slots_high.len()));
-        join4(executor, || read(signs_a, slots_a), || read(signs_b, slots_b), || read(signs_c, slots_c), || read(signs_d, slots_d));
+        let bands = Bands::of(self.len);
+        each(executor, zip2(bands.split_mut(signs, 1), bands.split(slots, 1)), read);
     }
 
     /// Finds each block's neighbours and the cells it shares with them.

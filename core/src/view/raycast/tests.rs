@@ -1,8 +1,8 @@
 use super::*;
 use crate::{
-    executor::{Serial, TwoThreads},
     geometry::{StereoRig, Transform},
     memory::SLAB_ALIGN,
+    parallel::{Serial, TwoThreads},
     random::Random,
     volume::{
         BlockCoord, VolumeConfig,

@@ -19,8 +19,8 @@ use super::block::faintest_weight;
 use super::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, CLASS_COUNT, ObservationWeight, Viewpoint, Volume, VolumeConfig};
 use crate::{
     digest::Digest,
-    executor::{Executor, join4},
     image::View,
+    parallel::{Executor, each},
 };
 use nalgebra::{Point3, Rotation3, Vector3};
 
@@ -129,15 +129,7 @@ impl Volume<'_> {
         let fusion = Fusion::new(&self.config, view, seen);
         let (low, high) = Band::whole(self.visible.slots(), &mut self.blocks).halves();
         let ((a, b), (c, d)) = (low.halves(), high.halves());
-        let mut changes = [0u64; 4];
-        let [change_a, change_b, change_c, change_d] = &mut changes;
-        join4(
-            executor,
-            || *change_a = fusion.band(a),
-            || *change_b = fusion.band(b),
-            || *change_c = fusion.band(c),
-            || *change_d = fusion.band(d),
-        );
+        let changes = each(executor, [a, b, c, d], |band| fusion.band(band));
         self.digest = changes.iter().fold(self.digest, |sum, change| sum.wrapping_add(*change));
     }
 }

@@ -6,9 +6,9 @@ mod pruning;
 
 use super::*;
 use crate::{
-    executor::{Serial, TwoThreads},
     geometry::{StereoRig, Transform},
     image::View,
+    parallel::{Serial, TwoThreads},
 };
 use nalgebra::Vector3;
 use std::{vec, vec::Vec};

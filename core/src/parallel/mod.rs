@@ -1,0 +1,56 @@
+//! How work is split and where it runs: the only place that knows.
+//!
+//! The core splits work into four bands at boundaries that depend on its amount alone, and asks an
+//! [`Executor`] to do them. Whether they run one after the other or at once is the caller's business
+//! and can never change a result: no band reads what another one writes.
+
+mod bands;
+mod stage;
+
+pub use bands::{BANDS, Bands, each, zip2, zip3};
+pub use stage::Stage;
+
+/// Runs work for the core.
+pub trait Executor: Sync {
+    /// Does both and returns both results, in any order or at once; one after the other unless an executor knows better.
+    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
+    where
+        A: FnOnce() -> RA + Send,
+        B: FnOnce() -> RB + Send,
+        RA: Send,
+        RB: Send,
+    {
+        (a(), b())
+    }
+
+    /// Runs one stage. A host overrides this to take its time; no clock enters the core.
+    fn stage<R>(&self, _stage: Stage, work: impl FnOnce() -> R) -> R {
+        work()
+    }
+}
+
+/// One thing after the other, on the caller's thread.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Serial;
+
+impl Executor for Serial {}
+
+/// Two threads, to show that they make no difference.
+#[cfg(test)]
+pub(crate) struct TwoThreads;
+
+#[cfg(test)]
+impl Executor for TwoThreads {
+    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
+    where
+        A: FnOnce() -> RA + Send,
+        B: FnOnce() -> RB + Send,
+        RA: Send,
+        RB: Send,
+    {
+        std::thread::scope(|scope| {
+            let b = scope.spawn(b);
+            (a(), b.join().unwrap())
+        })
+    }
+}

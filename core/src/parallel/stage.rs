@@ -1,0 +1,42 @@
+//! Names of the stages.
+
+/// A stage of the pipeline, as a name for measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Disparity from the stereo pair.
+    Stereo,
+    /// Features and matches over four images.
+    SceneFlow,
+    /// Camera motion from the matches.
+    Egomotion,
+    /// What moves or could: detections, tracks, motions, volumes of objects.
+    Instances,
+    /// Blocks made and marked visible.
+    Allocate,
+    /// Depth and colour averaged into voxels.
+    Fuse,
+    /// Noise taken out of blocks that leave the window.
+    Prune,
+    /// The map seen from a pose.
+    Raycast,
+}
+
+impl Stage {
+    /// All stages, in pipeline order.
+    pub const ALL: [Self; 8] =
+        [Self::Stereo, Self::SceneFlow, Self::Egomotion, Self::Instances, Self::Allocate, Self::Fuse, Self::Prune, Self::Raycast];
+
+    /// Name in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stereo => "stereo",
+            Self::SceneFlow => "scene_flow",
+            Self::Egomotion => "egomotion",
+            Self::Instances => "instances",
+            Self::Allocate => "allocate",
+            Self::Fuse => "fuse",
+            Self::Prune => "prune",
+            Self::Raycast => "raycast",
+        }
+    }
+}
