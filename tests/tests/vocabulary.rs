@@ -28,8 +28,11 @@ struct Rule {
 }
 
 impl Rule {
+    /// A folder with `-` before it is left out.
     fn covers(&self, path: &Path) -> bool {
-        self.folders.iter().any(|folder| folder == "*" || path.starts_with(folder))
+        let within = |folder: &str| folder == "*" || path.starts_with(folder);
+        let excluded = self.folders.iter().filter_map(|folder| folder.strip_prefix('-')).any(within);
+        !excluded && self.folders.iter().any(|folder| within(folder))
     }
 }
 

@@ -4,8 +4,8 @@ use dynvox_core::geometry::{StereoRig, Transform};
 use nalgebra::Vector3;
 
 use super::config::StreetConfig;
-use super::draws::Dice;
-use super::path::Stretch;
+use super::path::RoadSpan;
+use super::random::Rng;
 use super::raster::Pinhole;
 
 /// Amplitude and frequency of each small motion, two waves each.
@@ -21,15 +21,15 @@ pub fn along_m(config: &StreetConfig, time_s: f64) -> f64 {
 }
 
 /// Where the camera is at a time.
-pub fn t_street_camera(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64) -> Transform {
-    let mut dice = Dice::new(config.seed, 0x00CA_3E2A, 0);
+pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) -> Transform {
+    let mut rng = Rng::new(config.seed, 0x00CA_3E2A, 0);
     let mut wave = |parts: [(f64, f64); 2]| {
-        let turn = 2.0 * core::f64::consts::PI;
-        let sum: f64 = parts.iter().map(|&(size, rate)| size * libm::sin(turn * (rate * time_s + dice.unit()))).sum();
+        let full_circle_rad = 2.0 * core::f64::consts::PI;
+        let sum: f64 = parts.iter().map(|&(size, rate)| size * libm::sin(full_circle_rad * (rate * time_s + rng.unit()))).sum();
         sum * config.shake
     };
     let (pitch, roll, yaw, bounce, drift) = (wave(PITCH), wave(ROLL), wave(YAW), wave(BOUNCE_M), wave(DRIFT_M));
-    let on_road = stretch.t_street_local(along_m(config, time_s), drift, yaw);
+    let on_road = span.t_street_local(along_m(config, time_s), drift, yaw);
     let height = Vector3::new(0.0, bounce - config.camera_height_m, 0.0);
     on_road
         * Transform::new(Vector3::zeros(), height)

@@ -5,7 +5,7 @@ use super::config::CarKind;
 use super::mesh::{Mesh, Point, Triangle, Vertex};
 use super::surface::{Kind, Surface, tone};
 
-/// Cross-section: place along the car, height of the roof or bonnet, of the belt line, half widths there, height of the sill; m.
+/// Cross-section: position along the car, height of the roof or bonnet, of the belt line, half widths there, height of the sill; m.
 type Section = (f64, f64, f64, f64, f64, f64);
 
 /// What the painter of a body needs: where glass, lamps and wheels are, m in the car's frame, heights upwards.
@@ -25,81 +25,87 @@ pub struct Shape {
     pub pillars_m: [f32; 2],
     /// Windscreen: bottom and top height, half widths there.
     pub windscreen_m: [f32; 4],
-    /// Rear window: the same; zero where there is none.
+    /// Rear window: the same; zero without one.
     pub rear_glass_m: [f32; 4],
     /// Middle height of head lamps and tail lamps.
     pub lamps_m: [f32; 2],
 }
 
+const HATCHBACK: &[Section] = &[
+    (1.98, 0.58, 0.50, 0.70, 0.62, 0.26),
+    (1.93, 0.72, 0.62, 0.78, 0.68, 0.22),
+    (1.70, 0.83, 0.70, 0.84, 0.70, 0.20),
+    (1.20, 0.93, 0.80, 0.86, 0.72, 0.20),
+    (0.88, 1.00, 0.88, 0.87, 0.72, 0.20),
+    (0.15, 1.42, 0.93, 0.87, 0.58, 0.20),
+    (-0.50, 1.49, 0.95, 0.87, 0.58, 0.20),
+    (-1.25, 1.44, 0.98, 0.87, 0.56, 0.20),
+    (-1.72, 1.05, 0.98, 0.84, 0.66, 0.22),
+    (-1.90, 0.94, 0.86, 0.80, 0.68, 0.24),
+    (-1.98, 0.62, 0.54, 0.74, 0.66, 0.28),
+];
+const SALOON: &[Section] = &[
+    (2.28, 0.58, 0.50, 0.72, 0.64, 0.26),
+    (2.22, 0.70, 0.60, 0.81, 0.70, 0.22),
+    (1.95, 0.79, 0.67, 0.87, 0.72, 0.19),
+    (1.40, 0.88, 0.76, 0.90, 0.74, 0.18),
+    (0.90, 0.96, 0.86, 0.91, 0.74, 0.18),
+    (0.18, 1.36, 0.90, 0.91, 0.59, 0.18),
+    (-0.45, 1.43, 0.92, 0.91, 0.59, 0.18),
+    (-1.00, 1.38, 0.94, 0.91, 0.57, 0.18),
+    (-1.60, 1.06, 0.96, 0.90, 0.70, 0.18),
+    (-2.10, 1.00, 0.93, 0.86, 0.70, 0.21),
+    (-2.24, 0.90, 0.82, 0.82, 0.68, 0.24),
+    (-2.28, 0.60, 0.52, 0.76, 0.66, 0.28),
+];
+const ESTATE: &[Section] = &[
+    (2.32, 0.58, 0.50, 0.72, 0.64, 0.26),
+    (2.26, 0.71, 0.61, 0.81, 0.70, 0.22),
+    (1.95, 0.81, 0.69, 0.87, 0.72, 0.20),
+    (1.40, 0.90, 0.78, 0.90, 0.74, 0.19),
+    (0.92, 0.98, 0.88, 0.91, 0.74, 0.19),
+    (0.20, 1.40, 0.92, 0.91, 0.60, 0.19),
+    (-0.45, 1.47, 0.94, 0.91, 0.60, 0.19),
+    (-1.20, 1.46, 0.95, 0.91, 0.59, 0.19),
+    (-1.78, 1.40, 0.97, 0.90, 0.57, 0.20),
+    (-2.18, 1.02, 0.96, 0.87, 0.68, 0.22),
+    (-2.28, 0.90, 0.82, 0.83, 0.68, 0.24),
+    (-2.32, 0.60, 0.52, 0.76, 0.66, 0.28),
+];
+const OFFROAD: &[Section] = &[
+    (2.20, 0.70, 0.60, 0.76, 0.68, 0.32),
+    (2.14, 0.88, 0.76, 0.86, 0.76, 0.28),
+    (1.85, 0.98, 0.86, 0.92, 0.78, 0.26),
+    (1.30, 1.06, 0.94, 0.94, 0.79, 0.25),
+    (0.95, 1.12, 1.02, 0.94, 0.79, 0.25),
+    (0.30, 1.62, 1.06, 0.94, 0.66, 0.25),
+    (-0.40, 1.69, 1.07, 0.94, 0.66, 0.25),
+    (-1.30, 1.68, 1.09, 0.94, 0.65, 0.25),
+    (-1.80, 1.60, 1.10, 0.93, 0.64, 0.26),
+    (-2.06, 1.12, 1.06, 0.91, 0.74, 0.28),
+    (-2.16, 1.00, 0.92, 0.87, 0.74, 0.30),
+    (-2.20, 0.70, 0.62, 0.82, 0.72, 0.34),
+];
+const VAN: &[Section] = &[
+    (2.55, 0.70, 0.60, 0.80, 0.72, 0.28),
+    (2.48, 0.98, 0.84, 0.90, 0.80, 0.24),
+    (2.15, 1.14, 1.00, 0.96, 0.82, 0.22),
+    (1.80, 1.24, 1.10, 0.98, 0.82, 0.22),
+    (1.10, 2.02, 1.16, 0.98, 0.80, 0.22),
+    (0.60, 2.14, 1.20, 0.98, 0.84, 0.22),
+    (-0.80, 2.16, 1.20, 0.98, 0.84, 0.22),
+    (-2.30, 2.14, 1.20, 0.98, 0.84, 0.24),
+    (-2.50, 2.06, 1.20, 0.96, 0.82, 0.26),
+    (-2.55, 0.80, 0.66, 0.92, 0.84, 0.30),
+];
+
 fn sections(kind: CarKind) -> &'static [Section] {
     match kind {
-        CarKind::Hatchback => &[
-            (1.98, 0.58, 0.50, 0.70, 0.62, 0.26),
-            (1.93, 0.72, 0.62, 0.78, 0.68, 0.22),
-            (1.70, 0.83, 0.70, 0.84, 0.70, 0.20),
-            (1.20, 0.93, 0.80, 0.86, 0.72, 0.20),
-            (0.88, 1.00, 0.88, 0.87, 0.72, 0.20),
-            (0.15, 1.42, 0.93, 0.87, 0.58, 0.20),
-            (-0.50, 1.49, 0.95, 0.87, 0.58, 0.20),
-            (-1.25, 1.44, 0.98, 0.87, 0.56, 0.20),
-            (-1.72, 1.05, 0.98, 0.84, 0.66, 0.22),
-            (-1.90, 0.94, 0.86, 0.80, 0.68, 0.24),
-            (-1.98, 0.62, 0.54, 0.74, 0.66, 0.28),
-        ],
-        CarKind::Saloon => &[
-            (2.28, 0.58, 0.50, 0.72, 0.64, 0.26),
-            (2.22, 0.70, 0.60, 0.81, 0.70, 0.22),
-            (1.95, 0.79, 0.67, 0.87, 0.72, 0.19),
-            (1.40, 0.88, 0.76, 0.90, 0.74, 0.18),
-            (0.90, 0.96, 0.86, 0.91, 0.74, 0.18),
-            (0.18, 1.36, 0.90, 0.91, 0.59, 0.18),
-            (-0.45, 1.43, 0.92, 0.91, 0.59, 0.18),
-            (-1.00, 1.38, 0.94, 0.91, 0.57, 0.18),
-            (-1.60, 1.06, 0.96, 0.90, 0.70, 0.18),
-            (-2.10, 1.00, 0.93, 0.86, 0.70, 0.21),
-            (-2.24, 0.90, 0.82, 0.82, 0.68, 0.24),
-            (-2.28, 0.60, 0.52, 0.76, 0.66, 0.28),
-        ],
-        CarKind::Estate => &[
-            (2.32, 0.58, 0.50, 0.72, 0.64, 0.26),
-            (2.26, 0.71, 0.61, 0.81, 0.70, 0.22),
-            (1.95, 0.81, 0.69, 0.87, 0.72, 0.20),
-            (1.40, 0.90, 0.78, 0.90, 0.74, 0.19),
-            (0.92, 0.98, 0.88, 0.91, 0.74, 0.19),
-            (0.20, 1.40, 0.92, 0.91, 0.60, 0.19),
-            (-0.45, 1.47, 0.94, 0.91, 0.60, 0.19),
-            (-1.20, 1.46, 0.95, 0.91, 0.59, 0.19),
-            (-1.78, 1.40, 0.97, 0.90, 0.57, 0.20),
-            (-2.18, 1.02, 0.96, 0.87, 0.68, 0.22),
-            (-2.28, 0.90, 0.82, 0.83, 0.68, 0.24),
-            (-2.32, 0.60, 0.52, 0.76, 0.66, 0.28),
-        ],
-        CarKind::Offroad => &[
-            (2.20, 0.70, 0.60, 0.76, 0.68, 0.32),
-            (2.14, 0.88, 0.76, 0.86, 0.76, 0.28),
-            (1.85, 0.98, 0.86, 0.92, 0.78, 0.26),
-            (1.30, 1.06, 0.94, 0.94, 0.79, 0.25),
-            (0.95, 1.12, 1.02, 0.94, 0.79, 0.25),
-            (0.30, 1.62, 1.06, 0.94, 0.66, 0.25),
-            (-0.40, 1.69, 1.07, 0.94, 0.66, 0.25),
-            (-1.30, 1.68, 1.09, 0.94, 0.65, 0.25),
-            (-1.80, 1.60, 1.10, 0.93, 0.64, 0.26),
-            (-2.06, 1.12, 1.06, 0.91, 0.74, 0.28),
-            (-2.16, 1.00, 0.92, 0.87, 0.74, 0.30),
-            (-2.20, 0.70, 0.62, 0.82, 0.72, 0.34),
-        ],
-        CarKind::Van => &[
-            (2.55, 0.70, 0.60, 0.80, 0.72, 0.28),
-            (2.48, 0.98, 0.84, 0.90, 0.80, 0.24),
-            (2.15, 1.14, 1.00, 0.96, 0.82, 0.22),
-            (1.80, 1.24, 1.10, 0.98, 0.82, 0.22),
-            (1.10, 2.02, 1.16, 0.98, 0.80, 0.22),
-            (0.60, 2.14, 1.20, 0.98, 0.84, 0.22),
-            (-0.80, 2.16, 1.20, 0.98, 0.84, 0.22),
-            (-2.30, 2.14, 1.20, 0.98, 0.84, 0.24),
-            (-2.50, 2.06, 1.20, 0.96, 0.82, 0.26),
-            (-2.55, 0.80, 0.66, 0.92, 0.84, 0.30),
-        ],
+        CarKind::Hatchback => HATCHBACK,
+        CarKind::Saloon => SALOON,
+        CarKind::Estate => ESTATE,
+        CarKind::Offroad => OFFROAD,
+        CarKind::Van => VAN,
     }
 }
 
@@ -209,8 +215,8 @@ pub fn body(kind: CarKind) -> Mesh {
 
 fn disc(mesh: &mut Mesh, surface: u16, middle: Point, side: f64, radius: f64) {
     let rim = |angle: f64| {
-        let place = middle + Point::new(0.0, libm::sin(angle), libm::cos(angle)) * radius;
-        (place, [libm::cos(angle) as f32, libm::sin(angle) as f32, 0.0])
+        let point = middle + Point::new(0.0, libm::sin(angle), libm::cos(angle)) * radius;
+        (point, [libm::cos(angle) as f32, libm::sin(angle) as f32, 0.0])
     };
     let step = 2.0 * core::f64::consts::PI / 18.0;
     let corners: Vec<_> = (0..18).map(|k| rim(step * f64::from(k))).collect();
@@ -233,12 +239,12 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
     let first = mesh.vertices.len() as u32;
     for row in 0..rows {
         for column in 0..columns {
-            let place = at(row, column);
+            let point = at(row, column);
             let along = at((row + 1).min(rows - 1), column) - at(row.saturating_sub(1), column);
             let around = at(row, (column + 1).min(columns - 1)) - at(row, column.saturating_sub(1));
             // Rings run from the right sill over the roof, rows from front to rear.
             let normal = around.cross(&along).normalize();
-            mesh.vertices.push(vertex(place, normal));
+            mesh.vertices.push(vertex(point, normal));
         }
     }
     let index = |row: usize, column: usize| first + (row * columns + column) as u32;
@@ -250,15 +256,15 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
         }
     }
     for (row, direction) in [(0, 1.0), (rows - 1, -1.0)] {
-        let corners: Vec<_> = rings[row].iter().map(|&place| (place, as_surface(place))).collect();
+        let corners: Vec<_> = rings[row].iter().map(|&point| (point, as_surface(point))).collect();
         mesh.polygon(surface, Point::new(0.0, 0.0, direction), &corners);
     }
 }
 
-fn as_surface(place: Point) -> [f32; 3] {
-    [place.x as f32, place.y as f32, place.z as f32]
+fn as_surface(point: Point) -> [f32; 3] {
+    [point.x as f32, point.y as f32, point.z as f32]
 }
 
-fn vertex(place_m: Point, normal: Point) -> Vertex {
-    Vertex { place_m, surface_m: as_surface(place_m), normal: as_surface(normal) }
+fn vertex(position_m: Point, normal: Point) -> Vertex {
+    Vertex { position_m, surface_m: as_surface(position_m), normal: as_surface(normal) }
 }

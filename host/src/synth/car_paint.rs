@@ -1,16 +1,16 @@
-//! A car's shell, painted by place: glass, lamps, grille, plates, joints.
+//! A car's shell, painted by position: glass, lamps, grille, plates, joints.
 
 use super::car::Shape;
-use super::draws::cell;
-use super::paint::{Painted, Painter, Spot, above, blend, stripes, times, within};
+use super::paint::{Painted, Painter, SurfacePoint, above, blend, stripes, times, within};
+use super::random::cell;
 use super::surface::{Surface, Tone};
 use super::texture::floor;
 
 const GLASS: Tone = [0.022, 0.028, 0.034];
 const BLACK: Tone = [0.018, 0.018, 0.02];
 
-/// A place on the shell: right, up, forward, and the footprint there.
-struct Place {
+/// A point on the shell: right, up, forward, and the footprint there.
+struct BodyPoint {
     x: f32,
     up: f32,
     z: f32,
@@ -18,34 +18,34 @@ struct Place {
 }
 
 /// The shell.
-pub fn shell(painter: &Painter, shape: &Shape, spot: &Spot, coat: Tone) -> Painted {
-    let [x, y, z] = spot.surface_m;
-    let [fx, fy, fz] = spot.footprint_m;
-    let place = Place { x, up: -y, z, f: fx.max(fy).max(fz).max(0.002) };
-    let [nx, ny, nz] = spot.own_normal;
+pub fn shell(painter: &Painter, shape: &Shape, surface_point: &SurfacePoint, coat: Tone) -> Painted {
+    let [x, y, z] = surface_point.surface_m;
+    let [fx, fy, fz] = surface_point.footprint_m;
+    let point = BodyPoint { x, up: -y, z, f: fx.max(fy).max(fz).max(0.002) };
+    let [nx, ny, nz] = surface_point.own_normal;
     let side = above(0.55, nx.abs(), 0.1);
-    let speck = painter.textures.fine.at(z * 0.7 + x, y * 0.7 + x, 0.7 * place.f, 0.7 * place.f);
-    let dirt = 0.25 * (1.0 - above(0.45, place.up, 0.4));
+    let speck = painter.textures.fine.at(z * 0.7 + x, y * 0.7 + x, 0.7 * point.f, 0.7 * point.f);
+    let dirt = 0.25 * (1.0 - above(0.45, point.up, 0.4));
     let mut tone = blend(times(coat, 1.0 + 0.06 * speck), [0.10, 0.09, 0.08], dirt);
     let mut gloss = 0.30;
     if side > 0.0 {
-        tone = blend(tone, times(coat, 0.22), joints(shape, &place) * side);
+        tone = blend(tone, times(coat, 0.22), joints(shape, &point) * side);
     }
     // The strip below the doors and the bumpers' lower edge are black.
-    tone = blend(tone, BLACK, 1.0 - above(0.30, place.up, place.f));
+    tone = blend(tone, BLACK, 1.0 - above(0.30, point.up, point.f));
     for axle in shape.axles_m {
-        let radius = ((z - axle) * (z - axle) + (place.up - shape.wheel_m) * (place.up - shape.wheel_m)).sqrt();
-        let arch = (1.0 - above(shape.wheel_m + 0.055, radius, place.f)) * above(0.6, x.abs() / shape.half_m[1], 0.1);
+        let radius = ((z - axle) * (z - axle) + (point.up - shape.wheel_m) * (point.up - shape.wheel_m)).sqrt();
+        let arch = (1.0 - above(shape.wheel_m + 0.055, radius, point.f)) * above(0.6, x.abs() / shape.half_m[1], 0.1);
         tone = blend(tone, BLACK, arch);
     }
-    let glass = glass(shape, &place, side, nz);
+    let glass = glass(shape, &point, side, nz);
     if glass > 0.0 {
-        let sky = 0.06 * (0.5 - 0.5 * ny).max(0.0) + 0.05 * above(shape.side_height_m[0] + 0.2, place.up, 0.2);
+        let sky = 0.06 * (0.5 - 0.5 * ny).max(0.0) + 0.05 * above(shape.side_height_m[0] + 0.2, point.up, 0.2);
         tone = blend(tone, blend(GLASS, [0.45, 0.52, 0.62], sky), glass);
         gloss += 0.20 * glass;
     }
     if z.abs() > shape.half_m[0] - 0.6 {
-        let ends = if z > 0.0 { front(shape, &place) } else { rear(shape, &place) };
+        let ends = if z > 0.0 { front(shape, &point) } else { rear(shape, &point) };
         for (share, paint) in ends {
             tone = blend(tone, paint, share);
         }
@@ -54,7 +54,7 @@ pub fn shell(painter: &Painter, shape: &Shape, spot: &Spot, coat: Tone) -> Paint
 }
 
 /// Edges of doors, handles.
-fn joints(shape: &Shape, p: &Place) -> f32 {
+fn joints(shape: &Shape, p: &BodyPoint) -> f32 {
     let [front, rear, ..] = shape.side_glass_m;
     let low = above(0.32, p.up, p.f) * (1.0 - above(shape.side_height_m[0] + 0.02, p.up, p.f));
     let line = |at: f32| within(at - 0.008, at + 0.008, p.z, p.f);
@@ -65,7 +65,7 @@ fn joints(shape: &Shape, p: &Place) -> f32 {
     (doors * low).max(handle(middle + 0.05)).max(handle((rear + 0.25).max(middle - 0.8))).max(crease)
 }
 
-fn glass(shape: &Shape, p: &Place, side: f32, nz: f32) -> f32 {
+fn glass(shape: &Shape, p: &BodyPoint, side: f32, nz: f32) -> f32 {
     let [belt, roof] = shape.side_height_m;
     let along = |low: f32, high: f32, at: f32, from: f32, to: f32| low + (high - low) * (at - from) / (to - from);
     let mut share: f32 = 0.0;
@@ -88,7 +88,7 @@ fn glass(shape: &Shape, p: &Place, side: f32, nz: f32) -> f32 {
     share
 }
 
-fn front(shape: &Shape, p: &Place) -> [(f32, Tone); 5] {
+fn front(shape: &Shape, p: &BodyPoint) -> [(f32, Tone); 5] {
     let depth = above(shape.half_m[0] - 0.45, p.z, 0.05);
     let nose = above(shape.half_m[0] - 0.14, p.z, 0.05);
     let (half, lamp) = (shape.half_m[1], shape.lamps_m[0]);
@@ -102,7 +102,7 @@ fn front(shape: &Shape, p: &Place) -> [(f32, Tone); 5] {
     [(lamps, [0.10, 0.10, 0.11]), (core, [0.75, 0.77, 0.80]), (grille * ribs, BLACK), (intake, BLACK), (plate, plate_tone(p))]
 }
 
-fn rear(shape: &Shape, p: &Place) -> [(f32, Tone); 5] {
+fn rear(shape: &Shape, p: &BodyPoint) -> [(f32, Tone); 5] {
     let depth = 1.0 - above(-shape.half_m[0] + 0.30, p.z, 0.05);
     let tail = 1.0 - above(-shape.half_m[0] + 0.14, p.z, 0.05);
     let (half, lamp) = (shape.half_m[1], shape.lamps_m[1]);
@@ -115,7 +115,7 @@ fn rear(shape: &Shape, p: &Place) -> [(f32, Tone); 5] {
     [(lamps, [0.42, 0.015, 0.015]), (reverse, [0.6, 0.55, 0.55]), (lid, [0.03; 3]), (plate, plate_tone(p)), (skirt, BLACK)]
 }
 
-fn plate_tone(p: &Place) -> Tone {
+fn plate_tone(p: &BodyPoint) -> Tone {
     // Glyphs of their own width each, a gap after the third.
     let number = floor((p.x + 0.26) / 0.065);
     let h = cell(0xCA2, number, 0);
@@ -126,9 +126,9 @@ fn plate_tone(p: &Place) -> Tone {
 }
 
 /// A wheel's side in coordinates -1..1: tyre, spokes, hub.
-pub fn wheel(surface: &Surface, spot: &Spot) -> Painted {
-    let [x, y, _] = spot.surface_m;
-    let f = spot.footprint_m[0].max(spot.footprint_m[1]);
+pub fn wheel(surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+    let [x, y, _] = surface_point.surface_m;
+    let f = surface_point.footprint_m[0].max(surface_point.footprint_m[1]);
     let radius = (x * x + y * y).sqrt();
     // Five spokes: the largest of five projections.
     let spoke = [(1.0, 0.0), (0.309, 0.951), (-0.809, 0.588), (-0.809, -0.588), (0.309, -0.951)]

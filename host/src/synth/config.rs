@@ -1,8 +1,8 @@
-//! The one place where the street's figures and their defaults stand.
+//! The street's parameters and all their defaults.
 
 use serde::{Deserialize, Serialize};
 
-/// What the synthetic street looks like, who drives on it, and how its cameras see.
+/// The synthetic street's appearance, its traffic and its cameras.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StreetConfig {
@@ -34,7 +34,7 @@ pub struct StreetConfig {
     pub gain_difference: f64,
     /// Noise of a LiDAR range, m (1 sigma).
     pub lidar_noise_m: f64,
-    /// Share of parking places that are taken, 0 to 1.
+    /// Share of parking spaces that are taken, 0 to 1.
     pub parked_density: f64,
     /// Who drives.
     pub traffic: Traffic,
@@ -64,7 +64,7 @@ impl Default for StreetConfig {
 }
 
 impl StreetConfig {
-    /// The same street with nobody driving: parked cars only.
+    /// The same street without traffic: parked cars only.
     pub fn static_street() -> Self {
         Self { traffic: Traffic::None, ..Self::default() }
     }

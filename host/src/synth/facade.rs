@@ -1,7 +1,7 @@
 //! Houses. In a house's frame x runs along the street front from its left corner, y down from the pavement, z towards the street.
 
-use super::draws::Dice;
 use super::mesh::{Mesh, Point};
+use super::random::Rng;
 use super::surface::{Kind, Surface, Tone, scaled, tone};
 
 const WALLS: [(u8, u8, u8); 12] = [
@@ -52,67 +52,75 @@ struct House {
 }
 
 /// Builds a house `width` m wide with its front in the plane z = 0.
-pub fn house(mesh: &mut Mesh, dice: &mut Dice, width: f64) {
-    let seed = dice.seed();
-    let style = dice.unit();
-    let wall_tone = of(dice.pick(&WALLS));
-    let brick_tone = of(dice.pick(&BRICKS));
+pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
+    let seed = rng.seed();
+    let style = rng.unit();
+    let wall_tone = of(rng.pick(&WALLS));
+    let brick_tone = of(rng.pick(&BRICKS));
     let wall = match style {
         s if s < 0.55 => Surface::new(Kind::Plaster, wall_tone, seed),
-        s if s < 0.87 => Surface::new(Kind::Brick, brick_tone, seed).with(scaled(tone(176, 168, 156), dice.between(0.6, 1.0))),
+        s if s < 0.87 => Surface::new(Kind::Brick, brick_tone, seed).with(scaled(tone(176, 168, 156), rng.between(0.6, 1.0))),
         _ => Surface::new(Kind::Stone, scaled(wall_tone, 0.75), seed).with(tone(120, 112, 102)),
     };
-    let trim_tone = of(dice.pick(&TRIMS));
-    let shop = width > 6.5 && dice.chance(0.3);
-    let base_surface = if dice.chance(0.5) {
-        Surface::new(Kind::Stone, scaled(tone(150, 144, 134), dice.between(0.7, 1.1)), seed ^ 7).with(tone(96, 92, 86))
+    let trim_tone = of(rng.pick(&TRIMS));
+    let shop = width > 6.5 && rng.chance(0.3);
+    let base_surface = if rng.chance(0.5) {
+        Surface::new(Kind::Stone, scaled(tone(150, 144, 134), rng.between(0.7, 1.1)), seed ^ 7).with(tone(96, 92, 86))
     } else {
         Surface::new(Kind::Plaster, scaled(wall_tone, 0.5), seed ^ 7)
     };
-    let shutter_tone = of(dice.pick(&DOORS));
-    let shuttered = !shop && dice.chance(0.25);
+    let shutter_tone = of(rng.pick(&DOORS));
+    let shuttered = !shop && rng.chance(0.25);
     let house = House {
         width,
-        depth: dice.between(9.0, 12.0),
+        depth: rng.between(9.0, 12.0),
         wall: mesh.surface(wall),
         base: mesh.surface(base_surface),
         trim: mesh.surface(Surface::new(Kind::Plain, trim_tone, seed ^ 1)),
-        reveal_m: dice.between(0.10, 0.24),
-        surrounds: dice.chance(0.55),
+        reveal_m: rng.between(0.10, 0.24),
+        surrounds: rng.chance(0.55),
         shutters: shuttered.then(|| mesh.surface(Surface::new(Kind::Fence, shutter_tone, seed ^ 2))),
     };
-    let floors = [2, 3, 3, 4, 4, 5][dice.below(6)];
-    let ground_height = dice.between(3.3, 3.9);
-    let floor_height = dice.between(2.9, 3.3);
-    let frame_tone = of(dice.pick(&FRAMES));
+    let floors = [2, 3, 3, 4, 4, 5][rng.below(6)];
+    let ground_height = rng.between(3.3, 3.9);
+    let floor_height = rng.between(2.9, 3.3);
+    let frame_tone = of(rng.pick(&FRAMES));
     if shop {
-        shop_floor(mesh, dice, &house, ground_height, frame_tone);
+        shop_floor(mesh, rng, &house, ground_height, frame_tone);
     } else {
-        home_floor(mesh, dice, &house, ground_height, frame_tone);
+        home_floor(mesh, rng, &house, ground_height, frame_tone);
     }
     let mut roofline = -ground_height;
-    let window = (dice.between(0.95, 1.4), dice.between(1.45, 1.9));
-    let columns = libm::floor(width / dice.between(2.3, 3.1)).max(1.0) as usize;
-    let balcony_mask = if dice.chance(0.45) { dice.seed() } else { 0 };
-    let cornices = dice.chance(0.5);
+    let window = (rng.between(0.95, 1.4), rng.between(1.45, 1.9));
+    let columns = libm::floor(width / rng.between(2.3, 3.1)).max(1.0) as usize;
+    let balcony_mask = if rng.chance(0.45) { rng.seed() } else { 0 };
+    let cornices = rng.chance(0.5);
     for floor in 1..floors {
         let bottom = roofline;
         roofline -= floor_height;
-        upper_floor(mesh, dice, &house, (roofline, bottom), (columns, window, frame_tone), balcony_mask >> (floor % 2));
+        upper_floor(mesh, rng, &house, (roofline, bottom), (columns, window, frame_tone), balcony_mask >> (floor % 2));
         if cornices || floor == 1 {
             ledge(mesh, &house, bottom, 0.07, 0.16);
         }
     }
-    for x in [0.0, width] {
-        let outward = Point::new(x - 0.5 * width, 0.0, 0.0);
+    side_and_back_walls(mesh, &house, roofline);
+    roof(mesh, rng, &house, roofline, frame_tone);
+    rain_pipe(mesh, rng, width, roofline, seed ^ 3);
+}
+
+fn side_and_back_walls(mesh: &mut Mesh, house: &House, roofline: f64) {
+    for x in [0.0, house.width] {
+        let outward = Point::new(x - 0.5 * house.width, 0.0, 0.0);
         let down = Point::new(0.0, -roofline, 0.0);
         mesh.sheet(house.wall, outward, Point::new(x, roofline, 0.0), Point::new(0.0, 0.0, -house.depth), down, [0.0, roofline, 0.0]);
     }
     let back = Point::new(0.0, roofline, -house.depth);
-    mesh.sheet(house.wall, -Point::z(), back, Point::new(width, 0.0, 0.0), Point::new(0.0, -roofline, 0.0), [0.0, roofline, 0.0]);
-    roof(mesh, dice, &house, roofline, frame_tone);
-    let pipe = mesh.surface(Surface::new(Kind::Plain, scaled(tone(120, 120, 118), dice.between(0.5, 1.4)), seed ^ 3));
-    let x = if dice.chance(0.5) { 0.18 } else { width - 0.18 };
+    mesh.sheet(house.wall, -Point::z(), back, Point::new(house.width, 0.0, 0.0), Point::new(0.0, -roofline, 0.0), [0.0, roofline, 0.0]);
+}
+
+fn rain_pipe(mesh: &mut Mesh, rng: &mut Rng, width: f64, roofline: f64, seed: u32) {
+    let pipe = mesh.surface(Surface::new(Kind::Plain, scaled(tone(120, 120, 118), rng.between(0.5, 1.4)), seed));
+    let x = if rng.chance(0.5) { 0.18 } else { width - 0.18 };
     mesh.slight = true;
     mesh.bar(pipe, (Point::new(x, roofline, 0.09), 0.05), (Point::new(x, -0.05, 0.09), 0.05), 6);
     mesh.slight = false;
@@ -120,7 +128,7 @@ pub fn house(mesh: &mut Mesh, dice: &mut Dice, width: f64) {
 
 /// One floor's front: wall around the openings, then each opening with reveals, pane and sill.
 fn floor_front(mesh: &mut Mesh, house: &House, wall: u16, (top, bottom): (f64, f64), openings: &[Opening]) {
-    let mut piece = |left: f64, right: f64, top: f64, bottom: f64| {
+    let mut panel = |left: f64, right: f64, top: f64, bottom: f64| {
         if right - left > 1e-6 && bottom - top > 1e-6 {
             let (u, v) = (Point::new(right - left, 0.0, 0.0), Point::new(0.0, bottom - top, 0.0));
             mesh.sheet(wall, Point::z(), Point::new(left, top, 0.0), u, v, [left, top, 0.0]);
@@ -128,12 +136,12 @@ fn floor_front(mesh: &mut Mesh, house: &House, wall: u16, (top, bottom): (f64, f
     };
     let mut left = 0.0;
     for opening in openings {
-        piece(left, opening.left, top, bottom);
-        piece(opening.left, opening.right, top, opening.top);
-        piece(opening.left, opening.right, opening.bottom, bottom);
+        panel(left, opening.left, top, bottom);
+        panel(opening.left, opening.right, top, opening.top);
+        panel(opening.left, opening.right, opening.bottom, bottom);
         left = opening.right;
     }
-    piece(left, house.width, top, bottom);
+    panel(left, house.width, top, bottom);
     for opening in openings {
         recess(mesh, house, wall, opening);
     }
@@ -176,13 +184,13 @@ fn sill_and_surround(mesh: &mut Mesh, house: &House, opening: &Opening) {
     mesh.slight = false;
 }
 
-fn window(mesh: &mut Mesh, dice: &mut Dice, frame: Tone, width: f64, height: f64) -> u16 {
-    mesh.surface(Surface::new(Kind::Window, tone(34, 40, 46), dice.seed()).with(frame).sized(width, height))
+fn window(mesh: &mut Mesh, rng: &mut Rng, frame: Tone, width: f64, height: f64) -> u16 {
+    mesh.surface(Surface::new(Kind::Window, tone(34, 40, 46), rng.seed()).with(frame).sized(width, height))
 }
 
 fn upper_floor(
     mesh: &mut Mesh,
-    dice: &mut Dice,
+    rng: &mut Rng,
     house: &House,
     (top, bottom): (f64, f64),
     (columns, (width, height), frame): (usize, (f64, f64), Tone),
@@ -196,7 +204,7 @@ fn upper_floor(
         let balcony = balconies >> (column % 16) & 5 == 5 && spacing > 2.2;
         let sill = if balcony { bottom - 0.12 } else { bottom - 0.85 };
         let head = (bottom - 0.85 - height).max(top + 0.3);
-        let pane = window(mesh, dice, frame, width, sill - head);
+        let pane = window(mesh, rng, frame, width, sill - head);
         let opening = Opening {
             left: middle - 0.5 * width,
             right: middle + 0.5 * width,
@@ -206,7 +214,7 @@ fn upper_floor(
         };
         openings.push(opening);
         if balcony {
-            self::balcony(mesh, dice, house, middle, bottom);
+            self::balcony(mesh, rng, house, middle, bottom);
         } else {
             sill_and_surround(mesh, house, &opening);
         }
@@ -214,13 +222,13 @@ fn upper_floor(
     floor_front(mesh, house, house.wall, (top, bottom), &openings);
 }
 
-fn balcony(mesh: &mut Mesh, dice: &mut Dice, house: &House, middle: f64, floor: f64) {
+fn balcony(mesh: &mut Mesh, rng: &mut Rng, house: &House, middle: f64, floor: f64) {
     let (half, out) = (1.05, 1.0);
     let slab = (Point::new(middle - half, floor - 0.12, 0.0), Point::new(middle + half, floor + 0.06, out));
     mesh.cuboid(house.trim, slab.0, slab.1, &[4]);
-    let rail = mesh.surface(Surface::new(Kind::Plain, scaled(tone(70, 72, 76), dice.between(0.5, 1.5)), dice.seed()));
+    let rail = mesh.surface(Surface::new(Kind::Plain, scaled(tone(70, 72, 76), rng.between(0.5, 1.5)), rng.seed()));
     let top = floor - 1.1;
-    if dice.chance(0.35) {
+    if rng.chance(0.35) {
         let edges = [
             (Point::new(middle - half, top, out - 0.05), Point::new(middle + half, floor - 0.12, out)),
             (Point::new(middle - half, top, 0.0), Point::new(middle - half + 0.05, floor - 0.12, out - 0.05)),
@@ -253,26 +261,26 @@ fn ledge(mesh: &mut Mesh, house: &House, y: f64, out: f64, height: f64) {
     mesh.cuboid(house.trim, Point::new(0.0, y - 0.5 * height, 0.0), Point::new(house.width, y + 0.5 * height, out), &[4]);
 }
 
-fn home_floor(mesh: &mut Mesh, dice: &mut Dice, house: &House, height: f64, frame: Tone) {
-    let columns = libm::floor(house.width / dice.between(2.4, 3.0)).max(1.0) as usize;
+fn home_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, frame: Tone) {
+    let columns = libm::floor(house.width / rng.between(2.4, 3.0)).max(1.0) as usize;
     let spacing = house.width / columns as f64;
-    let door_at = dice.below(columns);
-    let (width, window_height) = ((spacing - 0.9).min(dice.between(1.0, 1.5)).max(0.7), dice.between(1.4, 1.7));
+    let door_at = rng.below(columns);
+    let (width, window_height) = ((spacing - 0.9).min(rng.between(1.0, 1.5)).max(0.7), rng.between(1.4, 1.7));
     let mut openings = Vec::new();
     for column in 0..columns {
         let middle = (column as f64 + 0.5) * spacing;
         if column == door_at {
             let (half, head) = (0.55, -2.45);
-            let door = Surface::new(Kind::Door, of(dice.pick(&DOORS)), dice.seed()).with(frame).sized(2.0 * half, 2.35);
+            let door = Surface::new(Kind::Door, of(rng.pick(&DOORS)), rng.seed()).with(frame).sized(2.0 * half, 2.35);
             let pane = mesh.surface(door);
             openings.push(Opening { left: middle - half, right: middle + half, top: head, bottom: -0.1, pane });
-            let step = mesh.surface(Surface::new(Kind::Plain, tone(140, 138, 132), dice.seed()));
+            let step = mesh.surface(Surface::new(Kind::Plain, tone(140, 138, 132), rng.seed()));
             mesh.cuboid(step, Point::new(middle - 0.8, -0.1, 0.0), Point::new(middle + 0.8, 0.1, 0.35), &[4]);
-            if dice.chance(0.5) {
+            if rng.chance(0.5) {
                 mesh.cuboid(house.trim, Point::new(middle - 0.85, -2.75, 0.0), Point::new(middle + 0.85, -2.62, 0.7), &[4]);
             }
         } else {
-            let pane = window(mesh, dice, frame, width, window_height);
+            let pane = window(mesh, rng, frame, width, window_height);
             let (left, right) = (middle - 0.5 * width, middle + 0.5 * width);
             let opening = Opening { left, right, top: -1.0 - window_height, bottom: -1.0, pane };
             sill_and_surround(mesh, house, &opening);
@@ -289,20 +297,20 @@ fn home_floor(mesh: &mut Mesh, dice: &mut Dice, house: &House, height: f64, fram
     }
 }
 
-fn shop_floor(mesh: &mut Mesh, dice: &mut Dice, house: &House, height: f64, frame: Tone) {
+fn shop_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, frame: Tone) {
     let bays = libm::floor(house.width / 3.6).max(1.0) as usize;
     let spacing = house.width / bays as f64;
-    let door_at = dice.below(bays);
+    let door_at = rng.below(bays);
     let head = -(height - 0.95);
     let mut openings = Vec::new();
     for bay in 0..bays {
         let (left, right) = (bay as f64 * spacing + 0.3, (bay + 1) as f64 * spacing - 0.3);
-        let shop = Surface::new(Kind::Shop, tone(44, 44, 44), dice.seed()).with(frame);
+        let shop = Surface::new(Kind::Shop, tone(44, 44, 44), rng.seed()).with(frame);
         if bay == door_at {
             let split = right - 1.1;
             let pane = mesh.surface(shop.sized(split - left - 0.1, -0.5 - head));
             openings.push(Opening { left, right: split - 0.1, top: head, bottom: -0.5, pane });
-            let pane = mesh.surface(Surface { seed: dice.seed(), ..shop }.sized(right - split, -0.06 - head));
+            let pane = mesh.surface(Surface { seed: rng.seed(), ..shop }.sized(right - split, -0.06 - head));
             openings.push(Opening { left: split, right, top: head, bottom: -0.06, pane });
         } else {
             let pane = mesh.surface(shop.sized(right - left, -0.5 - head));
@@ -310,20 +318,20 @@ fn shop_floor(mesh: &mut Mesh, dice: &mut Dice, house: &House, height: f64, fram
         }
     }
     floor_front(mesh, house, house.base, (-height, 0.1), &openings);
-    let letters = if dice.chance(0.6) { tone(238, 234, 220) } else { tone(236, 200, 84) };
-    let sign = Surface::new(Kind::Board, of(dice.pick(&BOARDS)), dice.seed()).with(letters);
+    let letters = if rng.chance(0.6) { tone(238, 234, 220) } else { tone(236, 200, 84) };
+    let sign = Surface::new(Kind::Board, of(rng.pick(&BOARDS)), rng.seed()).with(letters);
     let board = mesh.surface(sign.sized(house.width - 0.6, 0.62));
     let (low, high) = (Point::new(0.3, -height + 0.14, 0.0), Point::new(house.width - 0.3, -height + 0.76, 0.12));
     mesh.cuboid(house.trim, low, high, &[4, 5]);
     let (across, down) = (Point::new(high.x - low.x, 0.0, 0.0), Point::new(0.0, 0.62, 0.0));
     mesh.sheet(board, Point::z(), Point::new(low.x, low.y, 0.12), across, down, [0.0; 3]);
-    if dice.chance(0.5) {
-        awning(mesh, dice, house, head - 0.02);
+    if rng.chance(0.5) {
+        awning(mesh, rng, house, head - 0.02);
     }
 }
 
-fn awning(mesh: &mut Mesh, dice: &mut Dice, house: &House, y: f64) {
-    let mut cloth = Surface::new(Kind::Fence, of(dice.pick(&BOARDS)), dice.seed()).with(tone(230, 226, 216));
+fn awning(mesh: &mut Mesh, rng: &mut Rng, house: &House, y: f64) {
+    let mut cloth = Surface::new(Kind::Fence, of(rng.pick(&BOARDS)), rng.seed()).with(tone(230, 226, 216));
     cloth.two_sided = true;
     let cloth = mesh.surface(cloth);
     let (origin, across) = (Point::new(0.4, y, 0.02), Point::new(house.width - 0.8, 0.0, 0.0));
@@ -331,19 +339,19 @@ fn awning(mesh: &mut Mesh, dice: &mut Dice, house: &House, y: f64) {
     mesh.sheet(cloth, Point::z(), origin + Point::new(0.0, 0.5, 1.15), across, Point::new(0.0, 0.2, 0.0), [0.0; 3]);
 }
 
-fn roof(mesh: &mut Mesh, dice: &mut Dice, house: &House, top: f64, frame: Tone) {
+fn roof(mesh: &mut Mesh, rng: &mut Rng, house: &House, top: f64, frame: Tone) {
     ledge(mesh, house, top + 0.12, 0.18, 0.3);
     let (width, depth) = (house.width, house.depth);
-    if dice.chance(0.3) {
-        let parapet = dice.between(0.4, 0.9);
+    if rng.chance(0.3) {
+        let parapet = rng.between(0.4, 0.9);
         mesh.cuboid(house.wall, Point::new(0.0, top - parapet, -0.25), Point::new(width, top, 0.0), &[3]);
         mesh.cuboid(house.trim, Point::new(0.0, top - parapet - 0.1, -0.3), Point::new(width, top - parapet, 0.06), &[]);
-        let deck = mesh.surface(Surface::new(Kind::Plain, tone(90, 90, 90), dice.seed()));
+        let deck = mesh.surface(Surface::new(Kind::Plain, tone(90, 90, 90), rng.seed()));
         mesh.sheet(deck, -Point::y(), Point::new(0.0, top, 0.0), Point::new(width, 0.0, 0.0), Point::new(0.0, 0.0, -depth), [0.0; 3]);
         return;
     }
-    let tiles = mesh.surface(Surface::new(Kind::Tiles, scaled(of(dice.pick(&ROOFS)), dice.between(0.7, 1.2)), dice.seed()));
-    let rise = 0.5 * depth * dice.between(0.6, 0.95);
+    let tiles = mesh.surface(Surface::new(Kind::Tiles, scaled(of(rng.pick(&ROOFS)), rng.between(0.7, 1.2)), rng.seed()));
+    let rise = 0.5 * depth * rng.between(0.6, 0.95);
     let over = 0.45;
     let slope = rise / (0.5 * depth);
     let eave = Point::new(0.0, top + over * slope, over);
@@ -359,18 +367,18 @@ fn roof(mesh: &mut Mesh, dice: &mut Dice, house: &House, top: f64, frame: Tone) 
         let gable = [corner(top, 0.0), corner(top, -depth), corner(top - rise, -0.5 * depth)];
         mesh.polygon(house.wall, Point::new(x - 0.5 * width, 0.0, 0.0), &gable);
     }
-    if dice.chance(0.7) {
-        let x = dice.between(0.5, width - 1.3);
-        let brick = mesh.surface(Surface::new(Kind::Brick, tone(134, 84, 70), dice.seed()).with(tone(150, 146, 138)));
+    if rng.chance(0.7) {
+        let x = rng.between(0.5, width - 1.3);
+        let brick = mesh.surface(Surface::new(Kind::Brick, tone(134, 84, 70), rng.seed()).with(tone(150, 146, 138)));
         let (low, high) = (Point::new(x, top - rise - 1.0, -0.5 * depth - 0.3), Point::new(x + 0.8, top - rise + 0.8, -0.5 * depth + 0.3));
         mesh.cuboid(brick, low, high, &[3]);
     }
-    let dormers = if dice.chance(0.5) { libm::floor(width / 4.5) as usize } else { 0 };
+    let dormers = if rng.chance(0.5) { libm::floor(width / 4.5) as usize } else { 0 };
     for k in 0..dormers {
         let middle = (k as f64 + 0.5) * width / dormers as f64;
         let (front, base) = (-0.5, top - 0.5 * slope);
         let head = base - 1.5;
-        let pane = window(mesh, dice, frame, 0.9, 1.1);
+        let pane = window(mesh, rng, frame, 0.9, 1.1);
         let (low, high) = (Point::new(middle - 0.65, head, front - 2.2), Point::new(middle + 0.65, base + 0.1, front));
         mesh.cuboid(house.wall, low, high, &[3, 4]);
         let (across, down) = (Point::new(0.9, 0.0, 0.0), Point::new(0.0, 1.1, 0.0));

@@ -1,7 +1,7 @@
-//! Where things are across the street: lateral places in metres to the right of the camera's lane's middle, and numbers of cars.
+//! Where objects are across the street: lateral positions in metres to the right of the camera's lane's middle, and numbers of cars.
 
 use super::config::{Lane, StreetConfig, Traffic};
-use super::draws::hash;
+use super::random::hash;
 
 /// Width of a driving lane, m.
 pub const LANE_M: f64 = 3.2;
@@ -17,7 +17,7 @@ pub const KERB_WIDTH_M: f64 = 0.16;
 pub const FRONT_LEFT_M: f64 = -13.3;
 /// House fronts on the right.
 pub const FRONT_RIGHT_M: f64 = 6.9;
-/// Middle of a pedestrian crossing within its piece, m.
+/// Middle of a pedestrian crossing within its segment, m.
 pub const CROSSING_M: f64 = 12.0;
 
 /// Numbers of oncoming cars start here; scripted cars are numbered from 1.
@@ -48,10 +48,10 @@ pub const fn is_oncoming(lane: Lane) -> bool {
     matches!(lane, Lane::Oncoming | Lane::ParkedLeft)
 }
 
-/// Whether a piece has a pedestrian crossing.
-pub fn crossing(seed: u64, piece: i64) -> bool {
-    let drawn = |piece: i64| hash(seed ^ 0xC055, piece, 0).is_multiple_of(5);
-    piece > 0 && drawn(piece) && !drawn(piece - 1)
+/// Whether a segment has a pedestrian crossing.
+pub fn crossing(seed: u64, segment: i64) -> bool {
+    let candidate = |segment: i64| hash(seed ^ 0xC055, segment, 0).is_multiple_of(5);
+    segment > 0 && candidate(segment) && !candidate(segment - 1)
 }
 
 /// Stretches of parking strip kept free for scripted cars: right side or not, from, to.
@@ -60,10 +60,10 @@ pub fn cleared_m(config: &StreetConfig) -> Vec<(bool, f64, f64)> {
     let mut cleared = Vec::new();
     for car in &moving.cars {
         let (at, stop) = super::traffic::ends_m(car, config.rate_hz);
-        for (lane, place) in [(Some(car.lane), at), (car.to_lane, stop)] {
+        for (lane, at_m) in [(Some(car.lane), at), (car.to_lane, stop)] {
             match lane {
-                Some(Lane::ParkedRight) => cleared.push((true, place - 18.0, place + 18.0)),
-                Some(Lane::ParkedLeft) => cleared.push((false, place - 18.0, place + 18.0)),
+                Some(Lane::ParkedRight) => cleared.push((true, at_m - 18.0, at_m + 18.0)),
+                Some(Lane::ParkedLeft) => cleared.push((false, at_m - 18.0, at_m + 18.0)),
                 _ => {}
             }
         }

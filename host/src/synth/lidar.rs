@@ -7,9 +7,9 @@ use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::draws::{hash, unit};
 use super::mesh::Point;
-use super::paint::Spot;
+use super::paint::SurfacePoint;
+use super::random::{hash, unit};
 use super::scene::Scene;
 use super::street::Street;
 
@@ -21,14 +21,14 @@ const TOP_DEG: f64 = 2.0;
 const BOTTOM_DEG: f64 = -24.8;
 const RANGE_M: (f64, f64) = (1.0, 80.0);
 /// Place of the sensor in the left camera, m.
-const PLACE_M: [f64; 3] = [0.0, -0.08, -0.27];
+const POSITION_M: [f64; 3] = [0.0, -0.08, -0.27];
 const TURN: f64 = 2.0 * core::f64::consts::PI;
 
 /// A triangle as the beams see it.
 struct Face {
     /// Barycentric weight of each corner over range, as a plane through the sensor.
     planes: [Point; 3],
-    thing: u32,
+    object: u32,
     triangle: u32,
     /// First direction and how many.
     directions: (i64, i64),
@@ -38,7 +38,7 @@ struct Face {
 impl Street {
     /// Sensor to left camera.
     pub fn t_camera_lidar(&self) -> Transform {
-        Transform::from_rotation_matrix(&[[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], PLACE_M)
+        Transform::from_rotation_matrix(&[[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], POSITION_M)
     }
 
     /// One scan at frame `index`: x forward, y left, z up in metres, and reflectance 0 to 1; beam by beam from the top, each from behind
@@ -46,7 +46,7 @@ impl Street {
     pub fn lidar(&self, index: u32) -> Vec<[f32; 4]> {
         let around = self.surroundings(index);
         let scene = &around.scene;
-        let faces: Vec<Face> = (0..scene.things.len()).into_par_iter().flat_map_iter(|number| self.faces(scene, number)).collect();
+        let faces: Vec<Face> = (0..scene.objects.len()).into_par_iter().flat_map_iter(|number| self.faces(scene, number)).collect();
         let sectors: Vec<Vec<(f64, u32)>> = (0..SECTORS).into_par_iter().map(|sector| scan(&faces, sector)).collect();
         let width = DIRECTIONS / SECTORS;
         let mut points = Vec::new();
@@ -62,18 +62,18 @@ impl Street {
     }
 
     fn faces(&self, scene: &Scene, number: usize) -> Vec<Face> {
-        let thing = &scene.things[number];
-        let mesh = thing.mesh(self.bodies());
-        let to_sensor = |place: Point| {
-            let camera = thing.to_camera.point(place) - Vector3::from(PLACE_M);
+        let object = &scene.objects[number];
+        let mesh = object.mesh(self.bodies());
+        let to_sensor = |point: Point| {
+            let camera = object.to_camera.point(point) - Vector3::from(POSITION_M);
             Point::new(camera.z, -camera.x, -camera.y)
         };
         if to_sensor(mesh.middle_m).norm() > RANGE_M.1 + mesh.radius_m {
             return Vec::new();
         }
-        let places: Vec<Point> = mesh.vertices.iter().map(|vertex| to_sensor(vertex.place_m)).collect();
+        let positions: Vec<Point> = mesh.vertices.iter().map(|vertex| to_sensor(vertex.position_m)).collect();
         let face = |(triangle, face): (usize, &super::mesh::Triangle)| {
-            let corners = face.corners.map(|corner| places[corner as usize]);
+            let corners = face.corners.map(|corner| positions[corner as usize]);
             let [a, b, c] = corners;
             let planes = [b.cross(&c), c.cross(&a), a.cross(&b)];
             let volume = a.dot(&planes[0]);
@@ -84,7 +84,7 @@ impl Street {
             let (directions, beams) = reach(corners)?;
             Some(Face {
                 planes: planes.map(|plane| plane / volume),
-                thing: number as u32,
+                object: number as u32,
                 triangle: triangle as u32,
                 directions,
                 beams,
@@ -95,8 +95,8 @@ impl Street {
 
     fn echo(&self, scene: &Scene, face: &Face, index: u32, (beam, direction): (usize, usize), range_m: f64) -> [f32; 4] {
         let ray = ray(beam, direction);
-        let thing = &scene.things[face.thing as usize];
-        let mesh = thing.mesh(self.bodies());
+        let object = &scene.objects[face.object as usize];
+        let mesh = object.mesh(self.bodies());
         let triangle = &mesh.triangles[face.triangle as usize];
         let shares = face.planes.map(|plane| (plane.dot(&ray) * range_m) as f32);
         let mix = |value: fn(&super::mesh::Vertex) -> [f32; 3]| {
@@ -104,17 +104,17 @@ impl Street {
             [0, 1, 2].map(|k| shares[0] * a[k] + shares[1] * b[k] + shares[2] * c[k])
         };
         let spread = (0.003 * range_m) as f32;
-        let spot = Spot {
+        let surface_point = SurfacePoint {
             surface_m: mix(|vertex| vertex.surface_m),
             footprint_m: [spread; 3],
             own_normal: mix(|vertex| vertex.normal),
         };
-        let painted = self.painter().paint(&mesh.surfaces[triangle.surface as usize], &spot, thing.coat);
+        let painted = self.painter().paint(&mesh.surfaces[triangle.surface as usize], &surface_point, object.coat);
         let [red, green, blue] = painted.tone;
         let noise_m = self.config().lidar_noise_m;
         let range_m = if noise_m > 0.0 { range_m + noise_m * normal(self.config().seed, index, (beam, direction)) } else { range_m };
-        let place = ray * range_m;
-        [place.x as f32, place.y as f32, place.z as f32, (0.4 * red + 0.4 * green + 0.2 * blue).clamp(0.0, 1.0)]
+        let point = ray * range_m;
+        [point.x as f32, point.y as f32, point.z as f32, (0.4 * red + 0.4 * green + 0.2 * blue).clamp(0.0, 1.0)]
     }
 }
 
@@ -142,11 +142,11 @@ fn ray(beam: usize, direction: usize) -> Point {
 /// Directions and beams a triangle may meet, a little more rather than less.
 fn reach(corners: [Point; 3]) -> Option<((i64, i64), (usize, usize))> {
     let angles = corners.map(|corner| libm::atan2(corner.y, corner.x));
-    let turns = angles.map(|angle| {
-        let turn = angle - angles[0];
-        turn - TURN * libm::round(turn / TURN)
+    let deltas_rad = angles.map(|angle| {
+        let delta_rad = angle - angles[0];
+        delta_rad - TURN * libm::round(delta_rad / TURN)
     });
-    let (low, high) = turns.iter().fold((0.0_f64, 0.0_f64), |(low, high), &turn| (low.min(turn), high.max(turn)));
+    let (low, high) = deltas_rad.iter().fold((0.0_f64, 0.0_f64), |(low, high), &delta_rad| (low.min(delta_rad), high.max(delta_rad)));
     let around = high - low >= 0.5 * TURN;
     let per_rad = DIRECTIONS as f64 / TURN;
     let directions = if around {
@@ -187,7 +187,7 @@ fn scan(faces: &[Face], sector: usize) -> Vec<(f64, u32)> {
     let mut nearest = vec![(0.0, u32::MAX); BEAMS * width];
     for (number, face) in faces.iter().enumerate() {
         let (first, count) = face.directions;
-        // The face's directions may pass the seam at the back: look one turn to either side.
+        // The face's directions may pass the seam at the back: look one full turn to either side.
         for shift in [-(DIRECTIONS as i64), 0, DIRECTIONS as i64] {
             let from = (first + shift - start).max(0);
             let to = (first + shift + count - start).min(width as i64);

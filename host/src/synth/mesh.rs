@@ -8,11 +8,11 @@ use super::surface::Surface;
 /// A point in space, m.
 pub type Point = Vector3<f64>;
 
-/// A corner: place, texture coordinates in metres, normal.
+/// A corner: position, texture coordinates in metres, normal.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertex {
     /// Place in the mesh's frame, m.
-    pub place_m: Point,
+    pub position_m: Point,
     /// Surface coordinates, m: along, across or down, and a third the surface may use.
     pub surface_m: [f32; 3],
     /// Outward normal.
@@ -30,7 +30,7 @@ pub struct Triangle {
     pub slight: bool,
 }
 
-/// A rigid thing.
+/// A rigid mesh.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Corners.
@@ -64,7 +64,7 @@ impl Mesh {
         let scale = if flipped { -1.0 } else { 1.0 } / (raw.norm() + 1e-12);
         let normal = [0, 1, 2].map(|k| (raw[k] * scale) as f32);
         let first = self.vertices.len() as u32;
-        self.vertices.extend(corners.iter().map(|&(place_m, surface_m)| Vertex { place_m, surface_m, normal }));
+        self.vertices.extend(corners.iter().map(|&(position_m, surface_m)| Vertex { position_m, surface_m, normal }));
         for k in 1..corners.len() as u32 - 1 {
             let (a, b) = if flipped { (k + 1, k) } else { (k, k + 1) };
             self.triangles.push(Triangle { corners: [first, first + a, first + b], surface, slight: self.slight });
@@ -115,7 +115,7 @@ impl Mesh {
             let round = 2.0 * core::f64::consts::PI * from.1 * f64::from(k) / f64::from(sides);
             for (end, down) in [(from, 0.0), (to, length)] {
                 self.vertices.push(Vertex {
-                    place_m: end.0 + out * end.1,
+                    position_m: end.0 + out * end.1,
                     surface_m: [round as f32, down as f32, 0.0],
                     normal: [out.x as f32, out.y as f32, out.z as f32],
                 });
@@ -129,21 +129,21 @@ impl Mesh {
         }
     }
 
-    /// Adds a triangle, turned so that it faces the way its first corner's normal does.
+    /// Adds a triangle, wound so that it faces the way its first corner's normal does.
     pub fn facing(&mut self, corners: [u32; 3], surface: u16) {
         let [a, b, c] = corners.map(|k| self.vertices[k as usize]);
-        let raw = (b.place_m - a.place_m).cross(&(c.place_m - a.place_m));
+        let raw = (b.position_m - a.position_m).cross(&(c.position_m - a.position_m));
         let normal = [0, 1, 2].map(|k| f64::from(a.normal[k]) + f64::from(b.normal[k]) + f64::from(c.normal[k]));
         let corners = if raw.dot(&Point::from(normal)) < 0.0 { [corners[0], corners[2], corners[1]] } else { corners };
         self.triangles.push(Triangle { corners, surface, slight: self.slight });
     }
 
     /// Moves everything from vertex `first` on into another frame.
-    pub fn place(&mut self, first: usize, t_mesh_part: &Transform) {
-        let turn = Matrix3::from(t_mesh_part.rotation_matrix()).transpose();
+    pub fn move_by(&mut self, first: usize, t_mesh_part: &Transform) {
+        let rotation = Matrix3::from(t_mesh_part.rotation_matrix()).transpose();
         for vertex in &mut self.vertices[first..] {
-            vertex.place_m = turn * vertex.place_m + Vector3::from(t_mesh_part.translation_m);
-            let normal = turn * Point::from(vertex.normal.map(f64::from));
+            vertex.position_m = rotation * vertex.position_m + Vector3::from(t_mesh_part.translation_m);
+            let normal = rotation * Point::from(vertex.normal.map(f64::from));
             vertex.normal = [normal.x as f32, normal.y as f32, normal.z as f32];
         }
     }
@@ -154,21 +154,21 @@ impl Mesh {
             if self.surfaces[triangle.surface as usize].two_sided {
                 return [f64::INFINITY; 4];
             }
-            let [a, b, c] = triangle.corners.map(|corner| self.vertices[corner as usize].place_m);
+            let [a, b, c] = triangle.corners.map(|corner| self.vertices[corner as usize].position_m);
             let normal = (b - a).cross(&(c - a));
             [normal.x, normal.y, normal.z, normal.dot(&a)]
         };
         self.planes = self.triangles.iter().map(plane).collect();
         let (low, high) = self.bounds_m();
         self.middle_m = (low + high) * 0.5;
-        self.radius_m = self.vertices.iter().map(|vertex| (vertex.place_m - self.middle_m).norm()).fold(0.0, f64::max);
+        self.radius_m = self.vertices.iter().map(|vertex| (vertex.position_m - self.middle_m).norm()).fold(0.0, f64::max);
         self
     }
 
     /// Smallest upright box around the mesh.
     pub fn bounds_m(&self) -> (Point, Point) {
-        self.vertices
-            .iter()
-            .fold((Point::repeat(1e9), Point::repeat(-1e9)), |(low, high), vertex| (low.inf(&vertex.place_m), high.sup(&vertex.place_m)))
+        self.vertices.iter().fold((Point::repeat(1e9), Point::repeat(-1e9)), |(low, high), vertex| {
+            (low.inf(&vertex.position_m), high.sup(&vertex.position_m))
+        })
     }
 }

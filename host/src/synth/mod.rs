@@ -4,8 +4,8 @@
 //! of every car, and simulated LiDAR. Frame `i` depends on the configuration and `i` alone: frames may be asked for in any order, on any
 //! number of threads. Only plain arithmetic, the root and `libm` are used, so that the pictures are the same bits on every machine.
 //!
-//! Memory: about a dozen [`PIECE_M`]-metre pieces of street near the camera and one frame's buffers, however far the camera drives.
-//! Time: about 40,000 triangles a view are set up whatever the size, the rest is linear in pixels. What can go wrong: a configuration
+//! Memory: about a dozen [`SEGMENT_M`]-metre segments of street near the camera and one frame's buffers, however far the camera drives.
+//! Time: about 40,000 triangles a view are set up at any size, the rest is linear in pixels. What can go wrong: a configuration
 //! out of range is refused by [`Street::new`].
 //!
 //! Left out: lens and motion blur, rolling shutter, pedestrians, rain; glass shows no rooms; the LiDAR's revolution takes no time.
@@ -21,7 +21,6 @@ mod camera;
 mod car;
 mod car_paint;
 mod config;
-mod draws;
 mod facade;
 mod frame;
 mod furniture;
@@ -31,10 +30,11 @@ mod light;
 mod mesh;
 mod paint;
 mod path;
-mod piece;
+mod random;
 mod raster;
 mod render;
 mod scene;
+mod segment;
 mod sensor;
 mod shadow;
 mod street;
@@ -48,6 +48,6 @@ mod writer;
 
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
 pub use frame::{ObjectTruth, SynthFrame};
-pub use path::PIECE_M;
+pub use path::SEGMENT_M;
 pub use street::{Street, SynthError};
 pub use writer::write_kitti;

@@ -1,20 +1,20 @@
-//! What a surface shows at a place: reflectance from noise pictures and box-filtered patterns, all attached to the surface.
+//! What a surface shows at a point: reflectance from noise pictures and box-filtered patterns, all attached to the surface.
 
 use super::car::{Shape, shape};
 use super::config::CarKind;
-use super::draws::{cell, unit};
 use super::layout;
+use super::random::{cell, unit};
 use super::surface::{Kind, Surface, Tone};
 use super::texture::{Textures, floor};
 use super::{car_paint, window_paint};
 
-/// A place on a surface and how large a pixel is there.
-pub struct Spot {
+/// A point on a surface and the size of a pixel there.
+pub struct SurfacePoint {
     /// Surface coordinates, m.
     pub surface_m: [f32; 3],
     /// Extent of a pixel along each of them, m.
     pub footprint_m: [f32; 3],
-    /// Normal in the thing's own frame.
+    /// Normal in the object's own frame.
     pub own_normal: [f32; 3],
 }
 
@@ -36,7 +36,7 @@ impl Painted {
     }
 }
 
-/// Everything painting needs besides the place.
+/// Everything painting needs besides the position.
 pub struct Painter {
     /// Noise.
     pub textures: Textures,
@@ -62,13 +62,13 @@ pub fn stripes(x: f32, period: f32, width: f32, footprint: f32) -> f32 {
     let per = 1.0 / period;
     let sum = |x: f32| {
         let count = x * per;
-        let whole = floor(count) as f32;
-        whole * width + ((count - whole) * period).min(width)
+        let periods = floor(count) as f32;
+        periods * width + ((count - periods) * period).min(width)
     };
     (sum(x + half) - sum(x - half)) / (2.0 * half)
 }
 
-/// One tone turned towards another.
+/// One tone blended towards another.
 #[inline]
 pub fn blend(a: Tone, b: Tone, share: f32) -> Tone {
     [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share, a[2] + (b[2] - a[2]) * share]
@@ -93,48 +93,48 @@ impl Painter {
         Self { textures: Textures::new(), shapes: CarKind::ALL.map(shape) }
     }
 
-    /// What is seen at a spot. `coat` is the paint of the thing, if it has one.
-    pub fn paint(&self, surface: &Surface, spot: &Spot, coat: Tone) -> Painted {
+    /// The paint at a point of a surface. `coat` is the paint of the object, if it has one.
+    pub fn paint(&self, surface: &Surface, surface_point: &SurfacePoint, coat: Tone) -> Painted {
         match surface.kind {
-            Kind::Road => self.road(surface, spot),
-            Kind::Pavement => self.pavement(surface, spot),
-            Kind::Kerb => self.kerb(surface, spot),
-            Kind::Yard => self.yard(surface, spot),
-            Kind::Plaster => self.plaster(surface, spot),
-            Kind::Brick => self.masonry(surface, spot, (0.25, 0.085, 0.012), 0.20),
-            Kind::Stone => self.masonry(surface, spot, (0.72, 0.36, 0.018), 0.10),
-            Kind::Window => window_paint::window(self, surface, spot),
-            Kind::Shop => window_paint::shop(self, surface, spot),
-            Kind::Board => window_paint::board(self, surface, spot),
-            Kind::Door => window_paint::door(self, surface, spot),
-            Kind::Tiles => self.tiles(surface, spot),
-            Kind::Plain => self.plain(surface, spot),
-            Kind::Fence => self.fence(surface, spot),
-            Kind::Bark => self.bark(surface, spot),
-            Kind::Leaves => self.leaves(surface, spot),
-            Kind::Sign => window_paint::sign(surface, spot),
-            Kind::Car => car_paint::shell(self, &self.shapes[surface.size_m[0] as usize % 5], spot, coat),
-            Kind::Wheel => car_paint::wheel(surface, spot),
+            Kind::Road => self.road(surface, surface_point),
+            Kind::Pavement => self.pavement(surface, surface_point),
+            Kind::Kerb => self.kerb(surface, surface_point),
+            Kind::Yard => self.yard(surface, surface_point),
+            Kind::Plaster => self.plaster(surface, surface_point),
+            Kind::Brick => self.masonry(surface, surface_point, (0.25, 0.085, 0.012), 0.20),
+            Kind::Stone => self.masonry(surface, surface_point, (0.72, 0.36, 0.018), 0.10),
+            Kind::Window => window_paint::window(self, surface, surface_point),
+            Kind::Shop => window_paint::shop(self, surface, surface_point),
+            Kind::Board => window_paint::board(self, surface, surface_point),
+            Kind::Door => window_paint::door(self, surface, surface_point),
+            Kind::Tiles => self.tiles(surface, surface_point),
+            Kind::Plain => self.plain(surface, surface_point),
+            Kind::Fence => self.fence(surface, surface_point),
+            Kind::Bark => self.bark(surface, surface_point),
+            Kind::Leaves => self.leaves(surface, surface_point),
+            Kind::Sign => window_paint::sign(surface, surface_point),
+            Kind::Car => car_paint::shell(self, &self.shapes[surface.size_m[0] as usize % 5], surface_point, coat),
+            Kind::Wheel => car_paint::wheel(surface, surface_point),
         }
     }
 
-    /// Fine noise at the spot's first two coordinates, shifted by a seed.
-    pub fn fine(&self, seed: u32, spot: &Spot, scale: f32) -> f32 {
-        let (u, v) = shifted(seed, spot, 3.0);
-        let [fu, fv, _] = spot.footprint_m;
+    /// Fine noise at the point's first two coordinates, shifted by a seed.
+    pub fn fine(&self, seed: u32, surface_point: &SurfacePoint, scale: f32) -> f32 {
+        let (u, v) = shifted(seed, surface_point, 3.0);
+        let [fu, fv, _] = surface_point.footprint_m;
         self.textures.fine.at(u * scale, v * scale, fu * scale, fv * scale)
     }
 
     /// Broad noise, likewise.
-    pub fn broad(&self, seed: u32, spot: &Spot, scale: f32) -> f32 {
-        let (u, v) = shifted(seed, spot, 24.0);
-        let [fu, fv, _] = spot.footprint_m;
+    pub fn broad(&self, seed: u32, surface_point: &SurfacePoint, scale: f32) -> f32 {
+        let (u, v) = shifted(seed, surface_point, 24.0);
+        let [fu, fv, _] = surface_point.footprint_m;
         self.textures.broad.at(u * scale, v * scale, fu * scale, fv * scale)
     }
 
-    fn road(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let [s, d, _] = spot.surface_m;
-        let [fs, fd, _] = spot.footprint_m;
+    fn road(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let [s, d, _] = surface_point.surface_m;
+        let [fs, fd, _] = surface_point.footprint_m;
         let fine = self.textures.asphalt.at(s, d, fs, fd);
         let broad = self.textures.broad.at(s, d, fs, fd);
         let mut shade = 1.0 + 0.50 * fine + 0.06 * broad;
@@ -185,57 +185,58 @@ impl Painter {
         *shade *= 1.0 - 0.35 * seam;
     }
 
-    fn pavement(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let [s, d, _] = spot.surface_m;
-        let [fs, fd, _] = spot.footprint_m;
+    fn pavement(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let [s, d, _] = surface_point.surface_m;
+        let [fs, fd, _] = surface_point.footprint_m;
         let (row, size) = (floor(d * 2.0), 0.5);
         let shifted = s + 0.25 * (row & 1) as f32;
         let column = floor(shifted * 2.0);
         let joint = 1.0 - (1.0 - stripes(shifted, size, 0.012, fs)) * (1.0 - stripes(d, size, 0.012, fd));
         let own = (unit(cell(surface.seed, column.rem_euclid(480), row)) - 0.5) * survives(size, fs.max(fd));
-        let fine = self.fine(3, spot, 1.0);
-        let broad = self.broad(4, spot, 1.0);
+        let fine = self.fine(3, surface_point, 1.0);
+        let broad = self.broad(4, surface_point, 1.0);
         let shade = 1.0 + 0.22 * fine + 0.10 * broad + 0.26 * own;
         Painted::dull(blend(times(surface.tone, shade), surface.second, 0.7 * joint))
     }
 
-    fn kerb(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let [s, ..] = spot.surface_m;
-        let [fs, ..] = spot.footprint_m;
+    fn kerb(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let [s, ..] = surface_point.surface_m;
+        let [fs, ..] = surface_point.footprint_m;
         let joint = stripes(s, 1.0, 0.015, fs);
         let own = unit(cell(surface.seed, floor(s), 0)) - 0.5;
-        let shade = 1.0 + 0.16 * self.fine(6, spot, 1.3) + 0.3 * own * survives(1.0, fs) + 0.08 * self.broad(7, spot, 1.0);
+        let shade =
+            1.0 + 0.16 * self.fine(6, surface_point, 1.3) + 0.3 * own * survives(1.0, fs) + 0.08 * self.broad(7, surface_point, 1.0);
         Painted::dull(blend(times(surface.tone, shade), surface.second, joint))
     }
 
-    fn yard(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let broad = self.broad(8, spot, 1.0);
-        let [u, v, _] = spot.surface_m;
-        let [fu, fv, _] = spot.footprint_m;
+    fn yard(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let broad = self.broad(8, surface_point, 1.0);
+        let [u, v, _] = surface_point.surface_m;
+        let [fu, fv, _] = surface_point.footprint_m;
         let blades = self.textures.leaves.at(u * 2.0, v * 2.0, 2.0 * fu, 2.0 * fv);
-        let gravel = self.fine(9, spot, 1.0);
+        let gravel = self.fine(9, surface_point, 1.0);
         let grass = times(surface.tone, 0.8 + 0.25 * blades + 0.15 * broad);
         let stones = times(surface.second, 1.0 + 0.3 * gravel);
         Painted::dull(blend(grass, stones, (0.25 - broad).clamp(0.0, 1.0)))
     }
 
-    fn plaster(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let fine = self.fine(surface.seed, spot, 0.8);
-        let broad = self.broad(surface.seed, spot, 1.0);
+    fn plaster(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let fine = self.fine(surface.seed, surface_point, 0.8);
+        let broad = self.broad(surface.seed, surface_point, 1.0);
         // Rain draws streaks: noise stretched downwards.
-        let (u, v) = shifted(surface.seed, spot, 24.0);
-        let [fu, fv, _] = spot.footprint_m;
+        let (u, v) = shifted(surface.seed, surface_point, 24.0);
+        let [fu, fv, _] = surface_point.footprint_m;
         let streak = self.textures.broad.at(u * 2.0, v * 0.18, 2.0 * fu, 0.18 * fv);
-        let height = -spot.surface_m[1];
+        let height = -surface_point.surface_m[1];
         let splash = ((0.9 - height) * 0.5).clamp(0.0, 0.35);
         let shade = 1.0 + 0.11 * fine + 0.06 * broad + 0.06 * streak - splash * (0.7 + 0.3 * broad);
         Painted::dull(times(surface.tone, shade))
     }
 
     /// Running bond: (length, height, joint) of a stone in m, spread of the stones' tones.
-    fn masonry(&self, surface: &Surface, spot: &Spot, (length, height, joint): (f32, f32, f32), spread: f32) -> Painted {
-        let [u, v, _] = spot.surface_m;
-        let [fu, fv, _] = spot.footprint_m;
+    fn masonry(&self, surface: &Surface, surface_point: &SurfacePoint, (length, height, joint): (f32, f32, f32), spread: f32) -> Painted {
+        let [u, v, _] = surface_point.surface_m;
+        let [fu, fv, _] = surface_point.footprint_m;
         let row = floor(v / height);
         let along = u + 0.5 * length * (row & 1) as f32;
         let column = floor(along / length);
@@ -243,8 +244,8 @@ impl Painter {
         let h = cell(surface.seed, column, row);
         let kept = survives(length, fu) * survives(height, fv);
         let own = (unit(h) - 0.5) * 2.0 * spread * kept;
-        let fine = self.fine(surface.seed, spot, 1.0);
-        let broad = self.broad(surface.seed, spot, 1.0);
+        let fine = self.fine(surface.seed, surface_point, 1.0);
+        let broad = self.broad(surface.seed, surface_point, 1.0);
         let shade = 1.0 + own + 0.15 * fine + 0.07 * broad;
         let mut tone = times(surface.tone, shade);
         // A few burnt stones.
@@ -252,28 +253,29 @@ impl Painter {
         Painted::dull(blend(tone, times(surface.second, 1.0 + 0.06 * fine), gap))
     }
 
-    fn tiles(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let [u, v, _] = spot.surface_m;
-        let [fu, fv, _] = spot.footprint_m;
+    fn tiles(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let [u, v, _] = surface_point.surface_m;
+        let [fu, fv, _] = surface_point.footprint_m;
         let (wide, tall) = (0.24, 0.32);
         let (row, column) = (floor(v / tall), floor(u / wide));
         let lip = stripes(v, tall, 0.05, fv);
         let roll = stripes(u, wide, 0.07, fu);
         let own = (unit(cell(surface.seed, column, row)) - 0.5) * survives(wide, fu.max(fv)) * 0.45;
-        let shade =
-            1.0 + own + 0.10 * self.fine(surface.seed, spot, 1.0) + 0.14 * self.broad(surface.seed, spot, 1.0) - 0.5 * lip - 0.2 * roll;
+        let shade = 1.0 + own + 0.10 * self.fine(surface.seed, surface_point, 1.0) + 0.14 * self.broad(surface.seed, surface_point, 1.0)
+            - 0.5 * lip
+            - 0.2 * roll;
         Painted::dull(times(surface.tone, shade))
     }
 
-    fn plain(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let shade = 1.0 + 0.05 * self.fine(surface.seed, spot, 1.0) + 0.06 * self.broad(surface.seed, spot, 2.0);
+    fn plain(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let shade = 1.0 + 0.05 * self.fine(surface.seed, surface_point, 1.0) + 0.06 * self.broad(surface.seed, surface_point, 2.0);
         Painted { tone: times(surface.tone, shade), gloss: 0.04, open: 1.0 }
     }
 
-    fn fence(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let [u, ..] = spot.surface_m;
-        let [fu, ..] = spot.footprint_m;
-        let shade = 1.0 + 0.10 * self.fine(surface.seed, spot, 1.0) + 0.05 * self.broad(surface.seed, spot, 1.0);
+    fn fence(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let [u, ..] = surface_point.surface_m;
+        let [fu, ..] = surface_point.footprint_m;
+        let shade = 1.0 + 0.10 * self.fine(surface.seed, surface_point, 1.0) + 0.05 * self.broad(surface.seed, surface_point, 1.0);
         if surface.second != surface.tone {
             // Cloth: two tones in turn.
             let share = stripes(u, 0.6, 0.3, fu);
@@ -284,16 +286,16 @@ impl Painter {
         Painted::dull(times(surface.tone, (shade + own) * (1.0 - 0.7 * gap)))
     }
 
-    fn bark(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let (u, v) = shifted(surface.seed, spot, 3.0);
-        let [fu, fv, _] = spot.footprint_m;
+    fn bark(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let (u, v) = shifted(surface.seed, surface_point, 3.0);
+        let [fu, fv, _] = surface_point.footprint_m;
         let ridges = self.textures.fine.at(u * 2.0, v * 0.4, 2.0 * fu, 0.4 * fv);
         Painted::dull(times(surface.tone, 1.0 + 0.35 * ridges))
     }
 
-    fn leaves(&self, surface: &Surface, spot: &Spot) -> Painted {
-        let [u, v, _] = spot.surface_m;
-        let [fu, fv, _] = spot.footprint_m;
+    fn leaves(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+        let [u, v, _] = surface_point.surface_m;
+        let [fu, fv, _] = surface_point.footprint_m;
         let leaf = self.textures.leaves.at(u, v, fu, fv);
         let mut tone = times(surface.tone, (0.85 + 0.34 * leaf).max(0.2));
         tone[0] *= 1.0 + 0.12 * leaf;
@@ -301,8 +303,11 @@ impl Painter {
     }
 }
 
-fn shifted(seed: u32, spot: &Spot, tile_m: f32) -> (f32, f32) {
-    (spot.surface_m[0] + unit(seed.wrapping_mul(0x9E37_79B1)) * tile_m, spot.surface_m[1] + unit(seed.wrapping_mul(0x85EB_CA77)) * tile_m)
+fn shifted(seed: u32, surface_point: &SurfacePoint, tile_m: f32) -> (f32, f32) {
+    (
+        surface_point.surface_m[0] + unit(seed.wrapping_mul(0x9E37_79B1)) * tile_m,
+        surface_point.surface_m[1] + unit(seed.wrapping_mul(0x85EB_CA77)) * tile_m,
+    )
 }
 
 /// Share of a manhole's lid in the footprint, if one is near.

@@ -1,7 +1,7 @@
 //! The street's reference line (the middle of the camera's lane): heading in closed form, position by Gauss–Legendre quadrature.
 //!
 //! The heading is a bounded sum of sines, so that the street never meets itself however long it gets. Positions are summed from the
-//! street's start piece by piece in one order: any frame, asked for alone, finds the same bits.
+//! street's start segment by segment in one order: any frame, asked for alone, finds the same bits.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -9,10 +9,10 @@ use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 
 use super::config::StreetConfig;
-use super::draws::Dice;
+use super::random::Rng;
 
-/// Length of one piece of street, m: what is generated, kept and dropped together.
-pub const PIECE_M: f64 = 24.0;
+/// Length of one segment of street, m: what is generated, cached and dropped together.
+pub const SEGMENT_M: f64 = 24.0;
 
 const TURN: f64 = 2.0 * core::f64::consts::PI;
 const AMPLITUDE_RAD: [f64; 2] = [0.42, 0.15];
@@ -28,21 +28,21 @@ const GAUSS: [(f64, f64); 5] = [
 
 /// The line's shape.
 #[derive(Debug)]
-pub struct Course {
+pub struct Centerline {
     amplitude_rad: [f64; 2],
     phase_rad: [f64; 2],
-    /// A piece already walked to and its start: driving on costs nothing more. The sum is the same from there as from the start.
+    /// A segment already walked to and its start: driving on costs nothing more. The sum is the same from there as from the start.
     walked: Mutex<(i64, Vector3<f64>)>,
 }
 
-impl Course {
-    /// The course of a configured street.
+impl Centerline {
+    /// The centerline of a configured street.
     pub fn new(config: &StreetConfig) -> Self {
-        let mut dice = Dice::new(config.seed, 0x0C0_0125E, 0);
+        let mut rng = Rng::new(config.seed, 0x0C0_0125E, 0);
         let amplitude_rad = if config.curvature { AMPLITUDE_RAD } else { [0.0; 2] };
         Self {
             amplitude_rad,
-            phase_rad: [TURN * dice.unit(), TURN * dice.unit()],
+            phase_rad: [TURN * rng.unit(), TURN * rng.unit()],
             walked: Mutex::default(),
         }
     }
@@ -64,53 +64,53 @@ impl Course {
         })
     }
 
-    /// The stretch of street from piece `first` to piece `last`, both included. Time: linear in the way
-    /// from the last stretch when driving on, else from the street's start.
-    pub fn stretch(&self, first: i64, last: i64) -> Stretch<'_> {
-        let step = |piece: i64| self.advance(piece as f64 * PIECE_M, (piece + 1) as f64 * PIECE_M);
-        // Both ways from the street's start, so that a piece's place does not depend on where the stretch begins.
+    /// The span of street from segment `first` to segment `last`, both included. Time: linear in the way
+    /// from the last span when driving on, else from the street's start.
+    pub fn span(&self, first: i64, last: i64) -> RoadSpan<'_> {
+        let step = |segment: i64| self.advance(segment as f64 * SEGMENT_M, (segment + 1) as f64 * SEGMENT_M);
+        // Both ways from the street's start, so that a segment's position does not depend on where the span begins.
         let mut starts_m = Vec::new();
         let mut start = Vector3::zeros();
-        for piece in (first..0).rev() {
-            start -= step(piece);
-            if piece <= last {
+        for segment in (first..0).rev() {
+            start -= step(segment);
+            if segment <= last {
                 starts_m.push(start);
             }
         }
         starts_m.reverse();
         let mut walked = self.walked.lock().unwrap_or_else(PoisonError::into_inner);
         let (known, mut start) = if walked.0 <= first { *walked } else { Default::default() };
-        for piece in known..=last {
-            if piece == first {
-                *walked = (piece, start);
+        for segment in known..=last {
+            if segment == first {
+                *walked = (segment, start);
             }
-            if piece >= first {
+            if segment >= first {
                 starts_m.push(start);
             }
-            start += step(piece);
+            start += step(segment);
         }
-        Stretch { course: self, first, starts_m }
+        RoadSpan { centerline: self, first, starts_m }
     }
 }
 
 /// Positions along a part of the street.
-pub struct Stretch<'a> {
-    course: &'a Course,
+pub struct RoadSpan<'a> {
+    centerline: &'a Centerline,
     first: i64,
     starts_m: Vec<Vector3<f64>>,
 }
 
-impl Stretch<'_> {
+impl RoadSpan<'_> {
     /// Position on the reference line.
     pub fn point(&self, s_m: f64) -> Vector3<f64> {
         let last = self.starts_m.len() as i64 - 1;
-        let at = (libm::floor(s_m / PIECE_M) as i64 - self.first).clamp(0, last);
-        self.starts_m[at as usize] + self.course.advance((at + self.first) as f64 * PIECE_M, s_m)
+        let at = (libm::floor(s_m / SEGMENT_M) as i64 - self.first).clamp(0, last);
+        self.starts_m[at as usize] + self.centerline.advance((at + self.first) as f64 * SEGMENT_M, s_m)
     }
 
-    /// The frame that stands on the road at `s_m`, `lateral_m` to the right of the reference line, turned by `yaw_rad` more than it.
+    /// The frame that stands on the road at `s_m`, `lateral_m` to the right of the reference line, rotated by `yaw_rad` against it.
     pub fn t_street_local(&self, s_m: f64, lateral_m: f64, yaw_rad: f64) -> Transform {
-        let heading = self.course.heading_rad(s_m);
+        let heading = self.centerline.heading_rad(s_m);
         let right = Vector3::new(libm::cos(heading), 0.0, -libm::sin(heading));
         let mut pose = Transform::new(Vector3::new(0.0, heading + yaw_rad, 0.0), Vector3::zeros());
         pose.translation_m = (self.point(s_m) + right * lateral_m).into();
@@ -125,17 +125,17 @@ mod tests {
     #[test]
     fn the_line_is_smooth_across_pieces_and_as_long_as_it_says() {
         let config = StreetConfig::default();
-        let course = Course::new(&config);
-        let stretch = course.stretch(-2, 12);
+        let centerline = Centerline::new(&config);
+        let span = centerline.span(-2, 12);
         let mut length = 0.0;
         for step in 0..2400 {
             let s = f64::from(step) * 0.1;
-            let delta = stretch.point(s + 0.1) - stretch.point(s);
-            let heading = course.heading_rad(s + 0.05);
+            let delta = span.point(s + 0.1) - span.point(s);
+            let heading = centerline.heading_rad(s + 0.05);
             assert!((delta - Vector3::new(libm::sin(heading), 0.0, libm::cos(heading)) * 0.1).norm() < 1e-6);
             length += delta.norm();
         }
         assert!((length - 240.0).abs() < 1e-3);
-        assert_eq!(course.stretch(7, 8).point(180.0), stretch.point(180.0), "asked for alone, the same bits");
+        assert_eq!(centerline.span(7, 8).point(180.0), span.point(180.0), "asked for alone, the same bits");
     }
 }

@@ -32,8 +32,8 @@ pub struct Pinhole {
 pub struct Setup {
     /// Barycentric weight of each corner over depth.
     pub weights: [[f64; 3]; 3],
-    /// Which thing of the scene.
-    pub thing: u32,
+    /// Which object of the scene.
+    pub object: u32,
     /// Which triangle of it.
     pub triangle: u32,
     /// Surface group: samples of one group share one colour.
@@ -65,7 +65,7 @@ impl Setup {
             let (x, y) = (plane.x * scale, plane.y * scale);
             [x, y, plane.z * (1.0 / volume) - x * u - y * v]
         });
-        Some(Self { weights, thing: 0, triangle: 0, group: 0, columns, rows, extent_px })
+        Some(Self { weights, object: 0, triangle: 0, group: 0, columns, rows, extent_px })
     }
 
     /// Inverse depth's plane.
@@ -135,7 +135,7 @@ impl Band {
     }
 
     /// Draws one triangle into all samples.
-    pub fn draw(&mut self, number: u32, setup: &Setup) {
+    pub fn rasterize(&mut self, number: u32, setup: &Setup) {
         let first = setup.rows.0.max(self.first_row as i32);
         let last = setup.rows.1.min((self.first_row + self.rows) as i32 - 1);
         let [per_column, per_row, constant] = setup.inverse_depth();

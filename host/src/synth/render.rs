@@ -1,6 +1,6 @@
 //! Pictures of a scene: visibility first, then every visible surface is shaded once per pixel.
 //!
-//! The picture is cut into bands of fixed height; each is drawn and shaded by itself, so that the number of threads cannot matter.
+//! The picture is cut into bands of fixed height; each is rasterized and shaded by itself, so that the number of threads cannot matter.
 //! A pixel's depth and instance are those of the ray through its centre; its colour is the mean of five samples where they see
 //! different surfaces.
 
@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::light::{Light, develop};
 use super::mesh::{Mesh, Point};
-use super::paint::{Painter, Spot};
+use super::paint::{Painter, SurfacePoint};
 use super::raster::{Band, OFFSETS_PX, Pinhole, SAMPLES, SKY, Setup};
-use super::scene::{Scene, Thing};
+use super::scene::{Scene, SceneObject};
 use super::sensor::Sensor;
 use super::surface::{Kind, Tone};
 
@@ -47,7 +47,7 @@ impl Renderer<'_> {
     /// Draws the scene `offset_m` to the right of the left camera, with so much light let in.
     pub fn picture(&self, scene: &Scene, offset_m: f64, gain: f32, sensor: &Sensor) -> Picture {
         let parts: Vec<Vec<Setup>> =
-            scene.things.par_iter().enumerate().map(|(number, thing)| self.set_up(thing, number as u32, offset_m)).collect();
+            scene.objects.par_iter().enumerate().map(|(number, object)| self.set_up(object, number as u32, offset_m)).collect();
         let setups: Vec<Setup> = parts.into_iter().flatten().collect();
         let (width, height) = (self.pinhole.width, self.pinhole.height);
         let bands = height.div_ceil(BAND_ROWS);
@@ -56,38 +56,38 @@ impl Renderer<'_> {
             let (first, last) = (setup.rows.0 as usize / BAND_ROWS, setup.rows.1 as usize / BAND_ROWS);
             lists[first..=last].iter_mut().for_each(|list| list.push(number as u32));
         }
-        let drawn: Vec<Picture> = lists
+        let bands: Vec<Picture> = lists
             .par_iter()
             .enumerate()
             .map(|(index, list)| {
                 let first_row = index * BAND_ROWS;
                 let mut band = Band::new(width, first_row, BAND_ROWS.min(height - first_row));
                 for &number in list {
-                    band.draw(number, &setups[number as usize]);
+                    band.rasterize(number, &setups[number as usize]);
                 }
                 Shading { renderer: self, scene, setups: &setups, offset_m, gain, sensor }.band(&band)
             })
             .collect();
-        let mut whole = Picture { rgb: Vec::new(), depth_m: Vec::new(), instances: Vec::new() };
-        for part in drawn {
-            whole.rgb.extend(part.rgb);
-            whole.depth_m.extend(part.depth_m);
-            whole.instances.extend(part.instances);
+        let mut picture = Picture { rgb: Vec::new(), depth_m: Vec::new(), instances: Vec::new() };
+        for part in bands {
+            picture.rgb.extend(part.rgb);
+            picture.depth_m.extend(part.depth_m);
+            picture.instances.extend(part.instances);
         }
-        whole
+        picture
     }
 
-    fn set_up(&self, thing: &Thing, number: u32, offset_m: f64) -> Vec<Setup> {
-        let mesh = thing.mesh(self.bodies);
+    fn set_up(&self, object: &SceneObject, number: u32, offset_m: f64) -> Vec<Setup> {
+        let mesh = object.mesh(self.bodies);
         let shift = Point::new(offset_m, 0.0, 0.0);
-        let middle = thing.to_camera.point(mesh.middle_m) - shift;
+        let middle = object.to_camera.point(mesh.middle_m) - shift;
         if self.out_of_sight(middle, mesh.radius_m) {
             return Vec::new();
         }
         let far = middle.z - mesh.radius_m > SLIGHT_PER_PX * self.pinhole.focal_px;
         // The eye in the mesh's frame tells faces that look away before anything is computed.
-        let eye = thing.to_camera.turn.tr_mul(&(shift - thing.to_camera.shift));
-        let places: Vec<Point> = mesh.vertices.iter().map(|vertex| thing.to_camera.point(vertex.place_m) - shift).collect();
+        let eye = object.to_camera.rotation.tr_mul(&(shift - object.to_camera.shift));
+        let positions: Vec<Point> = mesh.vertices.iter().map(|vertex| object.to_camera.point(vertex.position_m) - shift).collect();
         let mut setups = Vec::new();
         for (index, (triangle, plane)) in mesh.triangles.iter().zip(&mesh.planes).enumerate() {
             let two_sided = plane[0].is_infinite();
@@ -97,10 +97,10 @@ impl Renderer<'_> {
             if !two_sided && plane[0] * eye.x + plane[1] * eye.y + plane[2] * eye.z < plane[3] {
                 continue;
             }
-            let corners = triangle.corners.map(|corner| places[corner as usize]);
+            let corners = triangle.corners.map(|corner| positions[corner as usize]);
             if let Some(setup) = Setup::new(&self.pinhole, corners, two_sided) {
                 let group = number << 12 | u32::from(triangle.surface);
-                setups.push(Setup { thing: number, triangle: index as u32, group, ..setup });
+                setups.push(Setup { object: number, triangle: index as u32, group, ..setup });
             }
         }
         setups
@@ -133,8 +133,8 @@ struct Shading<'a> {
 }
 
 impl Shading<'_> {
-    fn thing(&self, seen: u32) -> &Thing {
-        &self.scene.things[self.setups[seen as usize].thing as usize]
+    fn object(&self, seen: u32) -> &SceneObject {
+        &self.scene.objects[self.setups[seen as usize].object as usize]
     }
 
     fn group(&self, seen: u32) -> u32 {
@@ -158,7 +158,7 @@ impl Shading<'_> {
                 let levels = light.map(|value| develop(value * self.gain));
                 picture.rgb.push(self.sensor.read((band.first_row + row) * width + column, levels));
                 picture.depth_m.push(depth_m);
-                picture.instances.push(if centre == SKY { 0 } else { self.thing(centre).instance });
+                picture.instances.push(if centre == SKY { 0 } else { self.object(centre).instance });
             }
         }
         picture
@@ -187,15 +187,15 @@ impl Shading<'_> {
     fn sample(&self, u: f64, v: f64, seen: u32) -> (Tone, f32) {
         let pinhole = &self.renderer.pinhole;
         let ray = Vector3::new((u - pinhole.center_px.0) / pinhole.focal_px, (v - pinhole.center_px.1) / pinhole.focal_px, 1.0);
-        let turn = &self.scene.anchor_camera.turn;
-        let direction = (turn * ray).map(|value| value as f32);
+        let rotation = &self.scene.anchor_camera.rotation;
+        let direction = (rotation * ray).map(|value| value as f32);
         let painter = self.renderer.painter;
         if seen == SKY {
             return (self.renderer.light.sky(direction * (1.0 / direction.dot(&direction).sqrt()), &painter.textures.broad), 0.0);
         }
         let setup = &self.setups[seen as usize];
-        let thing = &self.scene.things[setup.thing as usize];
-        let mesh = thing.mesh(self.renderer.bodies);
+        let object = &self.scene.objects[setup.object as usize];
+        let mesh = object.mesh(self.renderer.bodies);
         let triangle = &mesh.triangles[setup.triangle as usize];
         let surface = &mesh.surfaces[triangle.surface as usize];
         let [first, second, third] = triangle.corners;
@@ -209,36 +209,36 @@ impl Shading<'_> {
             (value as f32, ((plane[0] - value * inverse[0]) * depth) as f32, ((plane[1] - value * inverse[1]) * depth) as f32)
         };
         let ((b, b_u, b_v), (c, c_u, c_v)) = (share(1), share(2));
-        let mut spot = Spot { surface_m: [0.0; 3], footprint_m: [0.0; 3], own_normal: [0.0; 3] };
+        let mut surface_point = SurfacePoint { surface_m: [0.0; 3], footprint_m: [0.0; 3], own_normal: [0.0; 3] };
         for k in 0..3 {
             let [p, q, r] = [corners[0].surface_m[k], corners[1].surface_m[k], corners[2].surface_m[k]];
-            spot.surface_m[k] = p + b * (q - p) + c * (r - p);
+            surface_point.surface_m[k] = p + b * (q - p) + c * (r - p);
             let (du, dv) = (b_u * (q - p) + c_u * (r - p), b_v * (q - p) + c_v * (r - p));
-            spot.footprint_m[k] = (du * du + dv * dv).sqrt();
+            surface_point.footprint_m[k] = (du * du + dv * dv).sqrt();
             let [p, q, r] = [corners[0].normal[k], corners[1].normal[k], corners[2].normal[k]];
-            spot.own_normal[k] = p + b * (q - p) + c * (r - p);
+            surface_point.own_normal[k] = p + b * (q - p) + c * (r - p);
         }
-        let place = turn * (ray * depth + Point::new(self.offset_m, 0.0, 0.0)) + self.scene.anchor_camera.shift;
-        let place = place.map(|value| value as f32);
-        let own = Vector3::from(spot.own_normal);
-        let normal = thing.turn * own;
+        let position = rotation * (ray * depth + Point::new(self.offset_m, 0.0, 0.0)) + self.scene.anchor_camera.shift;
+        let position = position.map(|value| value as f32);
+        let own = Vector3::from(surface_point.own_normal);
+        let normal = object.rotation * own;
         let mut normal = normal * (1.0 / normal.dot(&normal).sqrt());
         let to_eye = direction * (-1.0 / direction.dot(&direction).sqrt());
         let thin = surface.two_sided;
         if thin && surface.kind != Kind::Leaves && normal.dot(&to_eye) < 0.0 {
             normal = -normal;
         }
-        let painted = painter.paint(surface, &spot, thing.coat);
-        let open = self.openness(surface.kind, place);
-        let sunlit = if thin || normal.dot(&self.renderer.light.to_sun) > 0.0 { self.scene.shadow.light(place, normal) } else { 0.0 };
+        let painted = painter.paint(surface, &surface_point, object.coat);
+        let open = self.openness(surface.kind, position);
+        let sunlit = if thin || normal.dot(&self.renderer.light.to_sun) > 0.0 { self.scene.shadow.light(position, normal) } else { 0.0 };
         let light = self.renderer.light.shade(&painted, normal, to_eye, sunlit, open, surface.kind == Kind::Leaves);
         (self.renderer.light.through_air(light, depth as f32), depth as f32)
     }
 
-    /// Share of the sky a place sees: little under cars, less at the foot of what stands.
-    fn openness(&self, kind: Kind, place: Vector3<f32>) -> f32 {
-        let height = -place.y;
-        let ground = if height < 0.5 { self.scene.ground.open(place) } else { 1.0 };
+    /// Share of the sky a point sees: little under cars, less at the foot of what stands.
+    fn openness(&self, kind: Kind, position: Vector3<f32>) -> f32 {
+        let height = -position.y;
+        let ground = if height < 0.5 { self.scene.ground.open(position) } else { 1.0 };
         match kind {
             Kind::Road | Kind::Pavement | Kind::Kerb | Kind::Yard => ground,
             Kind::Car | Kind::Wheel => (0.35 + 0.8 * height).min(1.0),

@@ -1,6 +1,6 @@
 //! The camera's noise: a function of seed, frame, camera and pixel, so that any frame alone is the same.
 
-use super::draws::mix;
+use super::random::mix;
 
 /// One camera at one frame.
 pub struct Sensor {

@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::mesh::{Mesh, Point};
-use super::scene::Placed;
+use super::scene::MatrixPose;
 
 const SIDE: usize = 1024;
 const TEXEL_M: f64 = 0.10;
@@ -24,13 +24,13 @@ impl SunAxes {
         Self([u, to_sun.cross(&u), to_sun])
     }
 
-    /// Texel coordinates and way towards the sun of a place in the street.
-    fn texel(&self, place: Point) -> Point {
-        Point::new(place.dot(&self.0[0]) / TEXEL_M, place.dot(&self.0[1]) / TEXEL_M, place.dot(&self.0[2]))
+    /// Texel coordinates and way towards the sun of a point in the street.
+    fn texel(&self, point: Point) -> Point {
+        Point::new(point.dot(&self.0[0]) / TEXEL_M, point.dot(&self.0[1]) / TEXEL_M, point.dot(&self.0[2]))
     }
 }
 
-/// What a piece of street or a car holds up against the sun, on the texels of the whole street. Depths count from `base_m`.
+/// What a segment of street or a car holds up against the sun, on the texels of the whole street. Depths count from `base_m`.
 pub struct ShadowTile {
     corner: [i64; 2],
     size: [usize; 2],
@@ -39,12 +39,12 @@ pub struct ShadowTile {
 }
 
 impl ShadowTile {
-    /// Draws meshes, each with its place in the street. Only faces towards the sun count: what is closed throws the same shadow.
-    pub fn new<'a>(axes: &SunAxes, meshes: impl Iterator<Item = (&'a Mesh, Placed)> + Clone) -> Self {
+    /// Draws meshes, each with its pose in the street. Only faces towards the sun count: what is closed throws the same shadow.
+    pub fn new<'a>(axes: &SunAxes, meshes: impl Iterator<Item = (&'a Mesh, MatrixPose)> + Clone) -> Self {
         let (mut low, mut high) = (Point::repeat(f64::MAX), Point::repeat(f64::MIN));
-        for (mesh, placed) in meshes.clone() {
+        for (mesh, pose) in meshes.clone() {
             for vertex in &mesh.vertices {
-                let texel = axes.texel(placed.point(vertex.place_m));
+                let texel = axes.texel(pose.point(vertex.position_m));
                 (low, high) = (low.inf(&texel), high.sup(&texel));
             }
         }
@@ -52,16 +52,19 @@ impl ShadowTile {
         let size = [(high.x - low.x) as usize + 2, (high.y - low.y) as usize + 2];
         let mut tile = Self { corner, size, base_m: high.z, depth_m: vec![FAR_M; size[0] * size[1]] };
         let origin = Point::new(corner[0] as f64, corner[1] as f64, high.z);
-        for (mesh, placed) in meshes {
-            let places: Vec<Point> = mesh.vertices.iter().map(|vertex| axes.texel(placed.point(vertex.place_m)) - origin).collect();
+        for (mesh, pose) in meshes {
+            let positions: Vec<Point> = mesh.vertices.iter().map(|vertex| axes.texel(pose.point(vertex.position_m)) - origin).collect();
             for triangle in &mesh.triangles {
-                tile.draw(triangle.corners.map(|corner| places[corner as usize]), mesh.surfaces[triangle.surface as usize].two_sided);
+                tile.rasterize(
+                    triangle.corners.map(|corner| positions[corner as usize]),
+                    mesh.surfaces[triangle.surface as usize].two_sided,
+                );
             }
         }
         tile
     }
 
-    fn draw(&mut self, [a, b, c]: [Point; 3], two_sided: bool) {
+    fn rasterize(&mut self, [a, b, c]: [Point; 3], two_sided: bool) {
         let area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
         if area.abs() < 1e-9 || (area < 0.0 && !two_sided) {
             return;
@@ -110,7 +113,7 @@ pub struct ShadowMap {
 }
 
 impl ShadowMap {
-    /// An empty map around `focus`; places are given relative to `anchor`, a point of the street.
+    /// An empty map around `focus`; positions are given relative to `anchor`, a point of the street.
     pub fn new(axes: SunAxes, anchor: Point, focus: Point) -> Self {
         let (middle, anchor) = (axes.texel(focus), axes.texel(anchor));
         let corner = [middle.x, middle.y].map(|value| libm::floor(value) as i64 - (SIDE / 2) as i64);
@@ -136,10 +139,10 @@ impl ShadowMap {
         }
     }
 
-    /// Shares of sunlight that reach `place` (relative to the anchor), 0 to 1; outside the map it shines.
-    pub fn light(&self, place: Vector3<f32>, normal: Vector3<f32>) -> f32 {
+    /// Shares of sunlight that reach `point` (relative to the anchor), 0 to 1; outside the map it shines.
+    pub fn light(&self, point: Vector3<f32>, normal: Vector3<f32>) -> f32 {
         let axis = |k: usize| self.axes.0[k].map(|value| value as f32);
-        let lifted = place + normal * 0.06;
+        let lifted = point + normal * 0.06;
         let scale = 1.0 / TEXEL_M as f32;
         // Two look-ups half a texel to either side, averaged: a tent over three texels each way.
         let u = lifted.dot(&axis(0)) * scale + self.offset[0] as f32 - 0.5;
@@ -205,10 +208,10 @@ impl GroundLight {
         }
     }
 
-    /// Share of sky seen from `place`, relative to the anchor.
-    pub fn open(&self, place: Vector3<f32>) -> f32 {
+    /// Share of sky seen from `point`, relative to the anchor.
+    pub fn open(&self, point: Vector3<f32>) -> f32 {
         let scale = 1.0 / GROUND_TEXEL_M as f32;
-        let (u, v) = (place.x * scale + self.offset[0] as f32, place.z * scale + self.offset[1] as f32);
+        let (u, v) = (point.x * scale + self.offset[0] as f32, point.z * scale + self.offset[1] as f32);
         let limit = GROUND_SIDE as f32 - 2.0;
         if !(u > 0.0 && v > 0.0 && u < limit && v < limit) {
             return 1.0;

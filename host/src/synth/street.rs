@@ -9,16 +9,16 @@ use nalgebra::Vector3;
 use super::camera;
 use super::car;
 use super::config::{CarKind, StreetConfig};
-use super::draws::Dice;
 use super::frame::{ObjectTruth, SynthFrame};
 use super::layout;
 use super::light::Light;
 use super::mesh::Mesh;
 use super::paint::Painter;
-use super::path::{Course, PIECE_M, Stretch};
-use super::piece::{Piece, piece};
+use super::path::{Centerline, RoadSpan, SEGMENT_M};
+use super::random::Rng;
 use super::render::Renderer;
 use super::scene::Scene;
+use super::segment::{Segment, segment};
 use super::sensor::{Sensor, luma};
 use super::shadow::SunAxes;
 use super::surface::Tone;
@@ -26,8 +26,8 @@ use super::traffic;
 
 /// How far behind and ahead of the camera the street exists, m.
 const REACH_M: (f64, f64) = (70.0, 180.0);
-/// Pieces kept: more than one frame needs.
-const KEPT_PIECES: usize = 16;
+/// Segments cached: more than one frame needs.
+const CACHED_SEGMENTS: usize = 16;
 /// Slower than this a car stands, m/s.
 const STANDS_M_S: f64 = 1e-9;
 
@@ -53,12 +53,12 @@ pub enum SynthError {
 /// A synthetic street.
 pub struct Street {
     config: StreetConfig,
-    course: Course,
+    centerline: Centerline,
     painter: Painter,
     light: Light,
     sun: SunAxes,
     bodies: [Mesh; 5],
-    pieces: Mutex<VecDeque<(i64, Arc<Piece>)>>,
+    segments: Mutex<VecDeque<(i64, Arc<Segment>)>>,
     t_camera0_street: Transform,
 }
 
@@ -73,7 +73,7 @@ struct Present {
 
 /// The street around the camera at one frame.
 pub(super) struct Surroundings {
-    /// Things and shadows.
+    /// Objects and shadows.
     pub scene: Scene,
     /// Camera in the street.
     pub t_street_camera: Transform,
@@ -89,20 +89,20 @@ impl Street {
         if let Some(problem) = config.problem() {
             return Err(SynthError::Config(problem));
         }
-        let course = Course::new(&config);
-        let mut dice = Dice::new(config.seed, 0x50_1A2, 0);
+        let centerline = Centerline::new(&config);
+        let mut rng = Rng::new(config.seed, 0x50_1A2, 0);
         // The sun stands behind the camera's left shoulder: houses on the right are lit, those on the left throw shadows on the road.
-        let (height, side) = (dice.between(0.70, 0.85), dice.between(-1.25, -0.65));
+        let (height, side) = (rng.between(0.70, 0.85), rng.between(-1.25, -0.65));
         let flat = libm::cos(height);
         let to_sun = Vector3::new(flat * libm::sin(side), -libm::sin(height), -flat * libm::cos(side));
-        let t_street_camera = camera::t_street_camera(&config, &course.stretch(0, 0), 0.0);
+        let t_street_camera = camera::t_street_camera(&config, &centerline.span(0, 0), 0.0);
         Ok(Self {
-            course,
+            centerline,
             painter: Painter::new(),
             light: Light { to_sun: to_sun.map(|value| value as f32) },
             sun: SunAxes::new(to_sun),
             bodies: CarKind::ALL.map(car::body),
-            pieces: Mutex::new(VecDeque::new()),
+            segments: Mutex::new(VecDeque::new()),
             t_camera0_street: t_street_camera.inverse(),
             config,
         })
@@ -125,8 +125,8 @@ impl Street {
 
     /// Camera pose at frame `index`; exactly the identity at frame 0.
     pub fn t_world_camera(&self, index: u32) -> Transform {
-        let at = libm::floor(camera::along_m(&self.config, self.time_s(index)) / PIECE_M) as i64;
-        self.to_world(&camera::t_street_camera(&self.config, &self.course.stretch(at, at), self.time_s(index)), index)
+        let at = libm::floor(camera::along_m(&self.config, self.time_s(index)) / SEGMENT_M) as i64;
+        self.to_world(&camera::t_street_camera(&self.config, &self.centerline.span(at, at), self.time_s(index)), index)
     }
 
     fn to_world(&self, t_street_camera: &Transform, index: u32) -> Transform {
@@ -181,24 +181,24 @@ impl Street {
         let time_s = self.time_s(index);
         let along = camera::along_m(&self.config, time_s);
         let reach = (along - REACH_M.0, along + REACH_M.1);
-        let (first, last) = (libm::floor(reach.0 / PIECE_M) as i64, libm::floor(reach.1 / PIECE_M) as i64);
-        let stretch = self.course.stretch(first, last);
-        let t_street_camera = camera::t_street_camera(&self.config, &stretch, time_s);
-        let pieces: Vec<Arc<Piece>> = (first..=last).map(|number| self.piece(number)).collect();
-        let cars = self.present(&pieces, &stretch, time_s, reach);
-        let anchor = stretch.point(libm::floor(along / PIECE_M) * PIECE_M);
-        let placed: Vec<_> = cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
-        let scene = Scene::new(&self.bodies, &pieces, &placed, &t_street_camera, (anchor, self.sun));
+        let (first, last) = (libm::floor(reach.0 / SEGMENT_M) as i64, libm::floor(reach.1 / SEGMENT_M) as i64);
+        let span = self.centerline.span(first, last);
+        let t_street_camera = camera::t_street_camera(&self.config, &span, time_s);
+        let segments: Vec<Arc<Segment>> = (first..=last).map(|number| self.segment(number)).collect();
+        let cars = self.present(&segments, &span, time_s, reach);
+        let anchor = span.point(libm::floor(along / SEGMENT_M) * SEGMENT_M);
+        let posed_cars: Vec<_> = cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
+        let scene = Scene::new(&self.bodies, &segments, &posed_cars, &t_street_camera, (anchor, self.sun));
         Surroundings { scene, t_street_camera, cars }
     }
 
-    fn present(&self, pieces: &[Arc<Piece>], stretch: &Stretch<'_>, time_s: f64, reach: (f64, f64)) -> Vec<Present> {
+    fn present(&self, segments: &[Arc<Segment>], span: &RoadSpan<'_>, time_s: f64, reach: (f64, f64)) -> Vec<Present> {
         let mut cars: Vec<Present> = Vec::new();
-        for driver in traffic::drivers(&self.config, stretch, time_s, reach) {
+        for driver in traffic::drivers(&self.config, span, time_s, reach) {
             let traffic::Driver { id, kind, paint, t_street_car, speed_m_s } = driver;
             cars.push(Present { id, kind, paint, t_street_car, speed_m_s });
         }
-        for car in pieces.iter().flat_map(|piece| &piece.parked) {
+        for car in segments.iter().flat_map(|segment| &segment.parked) {
             cars.push(Present {
                 id: car.id,
                 kind: car.kind,
@@ -208,25 +208,27 @@ impl Street {
             });
         }
         cars.sort_by_key(|car| car.id);
-        // 8 parking places a piece and traffic 30 m apart leave this bound far away; scripts could reach it.
+        // 8 parking spaces a segment and traffic 30 m apart leave this bound far away; scripts could reach it.
         cars.truncate(usize::from(u8::MAX));
         debug_assert!(cars.iter().all(|car| car.id < layout::PARKED_IDS || car.speed_m_s == 0.0));
         cars
     }
 
-    /// A piece, from the few that are kept or made anew: either way the same.
-    fn piece(&self, number: i64) -> Arc<Piece> {
-        let find = |kept: &VecDeque<(i64, Arc<Piece>)>| kept.iter().find(|(known, _)| *known == number).map(|(_, piece)| Arc::clone(piece));
-        let lock = || self.pieces.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    /// A segment, from the few that are cached or made anew: either way the same.
+    fn segment(&self, number: i64) -> Arc<Segment> {
+        let find = |cached: &VecDeque<(i64, Arc<Segment>)>| {
+            cached.iter().find(|(known, _)| *known == number).map(|(_, segment)| Arc::clone(segment))
+        };
+        let lock = || self.segments.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(known) = find(&lock()) {
             return known;
         }
-        let made = Arc::new(piece(&self.config, &self.course, &self.sun, number));
-        let mut kept = lock();
-        if kept.len() >= KEPT_PIECES {
-            kept.pop_front();
+        let made = Arc::new(segment(&self.config, &self.centerline, &self.sun, number));
+        let mut cached = lock();
+        if cached.len() >= CACHED_SEGMENTS {
+            cached.pop_front();
         }
-        kept.push_back((number, Arc::clone(&made)));
+        cached.push_back((number, Arc::clone(&made)));
         made
     }
 

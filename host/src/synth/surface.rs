@@ -19,7 +19,7 @@ pub fn scaled(tone: Tone, factor: f64) -> Tone {
 /// How a surface is painted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Asphalt with markings; coordinates are arc length within the piece and lateral place.
+    /// Asphalt with markings; coordinates are arc length within the segment and lateral position.
     Road,
     /// Slabs; the same coordinates.
     Pavement,
@@ -53,7 +53,7 @@ pub enum Kind {
     Leaves,
     /// A traffic sign's face; `seed` chooses which.
     Sign,
-    /// A car's shell, painted by place in the car's frame.
+    /// A car's shell, painted by position in the car's frame.
     Car,
     /// A wheel's side: first coordinate is the distance from the hub as a share of the radius.
     Wheel,

@@ -45,7 +45,7 @@ fn flat(frame: &SynthFrame, u: usize, v: usize) -> bool {
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
-    assert!(values.len() > 1000, "too little to judge: {}", values.len());
+    assert!(values.len() > 1000, "too few values: {}", values.len());
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }
@@ -106,7 +106,7 @@ fn a_static_pixel_carried_to_the_next_frame_finds_its_own_grey() {
 }
 
 #[test]
-fn a_frame_is_the_same_whatever_was_asked_for_before_and_on_any_number_of_threads() {
+fn a_frame_depends_neither_on_earlier_frames_nor_on_threads() {
     let config = StreetConfig { width: 200, height: 64, ..StreetConfig::default() };
     let street = Street::new(config.clone()).unwrap();
     for index in [0, 90, 12, 400, 36] {
@@ -160,16 +160,16 @@ fn lidar_and_depth_agree_where_both_see() {
     assert!(scan.len() > 60_000, "{} echoes", scan.len());
     let mut errors = Vec::new();
     for point in &scan {
-        let place = street.t_camera_lidar().transform_point(Point3::new(f64::from(point[0]), f64::from(point[1]), f64::from(point[2])));
-        if place.z < 1.0 {
+        let point = street.t_camera_lidar().transform_point(Point3::new(f64::from(point[0]), f64::from(point[1]), f64::from(point[2])));
+        if point.z < 1.0 {
             continue;
         }
-        let (u, v) = projected(&street, &place);
+        let (u, v) = projected(&street, &point);
         let (u, v) = ((u + 0.5) as isize, (v + 0.5) as isize);
         if u >= 2 && v >= 2 && u < frame.width as isize - 2 && v < frame.height as isize - 2 {
             let depth = f64::from(frame.depth_m[v as usize * frame.width + u as usize]);
             if depth > 0.0 && flat(&frame, u as usize, v as usize) {
-                errors.push((place.z - depth).abs() / depth);
+                errors.push((point.z - depth).abs() / depth);
             }
         }
     }
@@ -189,8 +189,8 @@ fn the_camera_and_every_car_move_smoothly() {
         assert!((pair[0].inverse() * pair[1]).angle_rad() < 0.02);
         assert!((pair[0].distance_m() - 0.9).abs() < 0.06);
     }
-    let turned = poses[119].angle_rad();
-    assert!(turned > 0.02, "a camera that turns, not {turned}");
+    let angle_rad = poses[119].angle_rad();
+    assert!(angle_rad > 0.02, "a camera that turns, not {angle_rad}");
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn one_scripted_car_starts_and_one_stops_and_speeds_match_the_way_driven() {
 }
 
 #[test]
-fn nobody_moves_on_a_static_street_and_no_two_cars_overlap() {
+fn a_static_street_has_no_motion_and_no_two_cars_overlap() {
     let still = Street::new(StreetConfig { width: 64, height: 32, ..StreetConfig::static_street() }).unwrap();
     assert!(still.frame(50).objects.iter().all(|object| !object.moving));
     let street = Street::new(StreetConfig { width: 64, height: 32, ..StreetConfig::default() }).unwrap();
@@ -264,9 +264,9 @@ fn a_written_street_reads_back_as_it_was() {
     let config = StreetConfig { width: 160, height: 48, frames: 3, ..StreetConfig::default() };
     let street = Street::new(config).unwrap();
     let folder = scratch("written");
-    let mut told = Vec::new();
-    write_kitti(&street, &folder, |done, all| told.push((done, all))).unwrap();
-    assert_eq!(told, [(1, 3), (2, 3), (3, 3)]);
+    let mut progress = Vec::new();
+    write_kitti(&street, &folder, |done, all| progress.push((done, all))).unwrap();
+    assert_eq!(progress, [(1, 3), (2, 3), (3, 3)]);
     let sequence = folder.join("sequences/00");
     for index in 0..3 {
         let frame = street.frame(index);

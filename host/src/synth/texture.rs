@@ -3,7 +3,7 @@
 //!
 //! Memory: 2 B x (2 x side)² per picture, 2 MiB at 512. Time: one look-up reads 4 to 16 values.
 
-use super::draws::{Dice, cell, unit};
+use super::random::{Rng, cell, unit};
 
 const LOG: usize = 9;
 const SIDE: usize = 1 << LOG;
@@ -71,14 +71,14 @@ impl Ripmap {
     /// Many small leaves on each other, each of a tone of its own.
     pub fn foliage(seed: u64, tile_m: f32) -> Self {
         let mut base = vec![-1.5_f32; SIDE * SIDE];
-        let mut dice = Dice::new(seed, 0x1EAF, 0);
+        let mut rng = Rng::new(seed, 0x1EAF, 0);
         for k in 0..5200 {
-            let (x, y) = (dice.between(0.0, SIDE as f64), dice.between(0.0, SIDE as f64));
-            let (long, short) = (dice.between(9.0, 17.0), dice.between(4.0, 7.0));
-            let angle = dice.between(0.0, core::f64::consts::PI);
+            let (x, y) = (rng.between(0.0, SIDE as f64), rng.between(0.0, SIDE as f64));
+            let (long, short) = (rng.between(9.0, 17.0), rng.between(4.0, 7.0));
+            let angle = rng.between(0.0, core::f64::consts::PI);
             let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
             // Later leaves lie on top and in the light.
-            let tone = dice.between(-1.0, 1.0) + 1.2 * (k as f64 / 5200.0);
+            let tone = rng.between(-1.0, 1.0) + 1.2 * (k as f64 / 5200.0);
             let reach = long as i32 + 1;
             for dy in -reach..=reach {
                 for dx in -reach..=reach {
@@ -137,8 +137,8 @@ impl Ripmap {
 /// Largest integer not above.
 #[inline]
 pub fn floor(value: f32) -> i32 {
-    let whole = value as i32;
-    whole.wrapping_sub(i32::from(value < whole as f32))
+    let integer = value as i32;
+    integer.wrapping_sub(i32::from(value < integer as f32))
 }
 
 /// Level of reduction for a footprint in texels, and how far towards the next: the logarithm read off the exponent.
@@ -146,10 +146,10 @@ pub fn floor(value: f32) -> i32 {
 fn level(texels: f32) -> (usize, f32) {
     // Nearly a texel is a texel: the look-up's own interpolation is wider than that.
     let bits = (texels.clamp(1.0, 400.0)).to_bits();
-    let whole = (bits >> 23) as usize - 127;
+    let level = (bits >> 23) as usize - 127;
     let part = (bits & 0x7F_FFFF) as f32 * (1.0 / 8_388_608.0);
     let sharp = (part * 3.0 - 1.0).clamp(0.0, 1.0);
-    (whole, sharp)
+    (level, sharp)
 }
 
 /// The pictures a street needs.

@@ -3,10 +3,10 @@
 use dynvox_core::geometry::Transform;
 
 use super::config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
-use super::draws::Dice;
 use super::layout;
-use super::path::Stretch;
-use super::piece::choose_car;
+use super::path::RoadSpan;
+use super::random::Rng;
+use super::segment::choose_car;
 use super::surface::Tone;
 
 /// Over how many metres a car changes from one strip to another.
@@ -64,7 +64,7 @@ pub fn ends_m(car: &ScriptedCar, rate_hz: f64) -> (f64, f64) {
     (car.start_m, car.start_m + sign * way)
 }
 
-/// Lateral place and its slope over the way driven.
+/// Lateral position and its slope over the way driven.
 fn lateral(car: &ScriptedCar, way_m: f64, rate_hz: f64) -> (f64, f64) {
     let from = layout::lateral_m(car.lane);
     let Some(to_lane) = car.to_lane else { return (from, 0.0) };
@@ -79,8 +79,8 @@ fn lateral(car: &ScriptedCar, way_m: f64, rate_hz: f64) -> (f64, f64) {
     (from + (to - from) * smooth, (to - from) * slope)
 }
 
-/// All cars of the traffic between two places along the street.
-pub fn drivers(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64, (from_m, to_m): (f64, f64)) -> Vec<Driver> {
+/// All cars of the traffic between two positions along the street.
+pub fn drivers(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64, (from_m, to_m): (f64, f64)) -> Vec<Driver> {
     let Traffic::Moving(moving) = &config.traffic else { return Vec::new() };
     let mut drivers = Vec::new();
     for (number, car) in moving.cars.iter().enumerate() {
@@ -91,14 +91,14 @@ pub fn drivers(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64, (from_
         if !(from_m..to_m).contains(&at) {
             continue;
         }
-        let turn = if sign < 0.0 { core::f64::consts::PI } else { 0.0 };
-        let yaw = turn + libm::atan(slope * sign);
-        let paint = choose_car(&mut Dice::new(config.seed, number as i64, 0x5C21)).1;
-        let t_street_car = stretch.t_street_local(at, lateral_m, yaw);
+        let facing_rad = if sign < 0.0 { core::f64::consts::PI } else { 0.0 };
+        let yaw = facing_rad + libm::atan(slope * sign);
+        let paint = choose_car(&mut Rng::new(config.seed, number as i64, 0x5C21)).1;
+        let t_street_car = span.t_street_local(at, lateral_m, yaw);
         drivers.push(Driver { id: number as u32 + 1, kind: car.kind, paint, t_street_car, speed_m_s });
     }
-    flow(config, moving, stretch, time_s, (from_m, to_m), Lane::Oncoming, &mut drivers);
-    flow(config, moving, stretch, time_s, (from_m, to_m), Lane::Overtaking, &mut drivers);
+    flow(config, moving, span, time_s, (from_m, to_m), Lane::Oncoming, &mut drivers);
+    flow(config, moving, span, time_s, (from_m, to_m), Lane::Overtaking, &mut drivers);
     drivers
 }
 
@@ -106,7 +106,7 @@ pub fn drivers(config: &StreetConfig, stretch: &Stretch<'_>, time_s: f64, (from_
 fn flow(
     config: &StreetConfig,
     moving: &MovingTraffic,
-    stretch: &Stretch<'_>,
+    span: &RoadSpan<'_>,
     time_s: f64,
     (from_m, to_m): (f64, f64),
     lane: Lane,
@@ -122,13 +122,13 @@ fn flow(
     let shift = sign * speed * time_s;
     let mut slot = libm::floor((from_m - shift) / gap) as i64 - 1;
     while (slot as f64) * gap + shift < to_m {
-        let mut dice = Dice::new(config.seed ^ u64::from(first_id), slot, 7);
-        let at = (slot as f64 + dice.between(0.0, 0.7)) * gap + shift;
-        let (kind, paint) = choose_car(&mut dice);
-        let aside = dice.between(-0.15, 0.15);
+        let mut rng = Rng::new(config.seed ^ u64::from(first_id), slot, 7);
+        let at = (slot as f64 + rng.between(0.0, 0.7)) * gap + shift;
+        let (kind, paint) = choose_car(&mut rng);
+        let offset_m = rng.between(-0.15, 0.15);
         if (from_m..to_m).contains(&at) {
-            let turn = if sign < 0.0 { core::f64::consts::PI } else { 0.0 };
-            let t_street_car = stretch.t_street_local(at, layout::lateral_m(lane) + aside, turn);
+            let facing_rad = if sign < 0.0 { core::f64::consts::PI } else { 0.0 };
+            let t_street_car = span.t_street_local(at, layout::lateral_m(lane) + offset_m, facing_rad);
             let id = first_id + slot.rem_euclid(1_000_000) as u32;
             drivers.push(Driver { id, kind, paint, t_street_car, speed_m_s: speed });
         }

@@ -1,26 +1,26 @@
 //! Panes, shop fronts, doors and boards.
 
-use super::draws::{cell, unit};
-use super::paint::{Painted, Painter, Spot, above, blend, stripes, survives, times, within};
+use super::paint::{Painted, Painter, SurfacePoint, above, blend, stripes, survives, times, within};
+use super::random::{cell, unit};
 use super::surface::{Surface, Tone};
 use super::texture::floor;
 
 /// Glass as one sees it by day: dark rooms, a little sky, brighter upwards.
-fn glass(painter: &Painter, surface: &Surface, spot: &Spot) -> Tone {
+fn glass(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Tone {
     let height = surface.size_m[1];
-    let up = 1.0 - spot.surface_m[1] / height;
-    let mirrored = painter.broad(surface.seed, spot, 3.0);
+    let up = 1.0 - surface_point.surface_m[1] / height;
+    let mirrored = painter.broad(surface.seed, surface_point, 3.0);
     let sky = (0.02 + 0.12 * up * up) * (1.0 + 0.55 * mirrored).max(0.0) * (0.4 + unit(surface.seed));
     blend(times(surface.tone, 0.7), [0.42, 0.52, 0.66], sky.min(0.6))
 }
 
 /// A window: frame, bars, and what hangs behind it.
-pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
-    let ([u, v, _], [fu, fv, _], [width, height]) = (spot.surface_m, spot.footprint_m, surface.size_m);
+pub fn window(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+    let ([u, v, _], [fu, fv, _], [width, height]) = (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
     let h = surface.seed;
-    let mut tone = glass(painter, surface, spot);
+    let mut tone = glass(painter, surface, surface_point);
     let folds = || {
-        let hung = Spot {
+        let hung = SurfacePoint {
             footprint_m: [fu, 0.2 * fv, 0.0],
             surface_m: [u * 1.5, v * 0.2, 0.0],
             own_normal: [0.0; 3],
@@ -35,9 +35,9 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
             tone = blend(tone, times(cloth, 0.5 * folds()), 0.8 * hang);
         }
         2 => {
-            let drawn = height * (0.2 + 0.7 * unit(h << 8));
+            let lowered = height * (0.2 + 0.7 * unit(h << 8));
             let slat = 1.0 - 0.25 * stripes(v, 0.06, 0.02, fv);
-            tone = blend(tone, times(cloth, 0.55 * slat), 0.9 * (1.0 - above(drawn, v, fv)));
+            tone = blend(tone, times(cloth, 0.55 * slat), 0.9 * (1.0 - above(lowered, v, fv)));
         }
         3 => tone = blend(tone, times(cloth, 0.42 * folds()), 0.55),
         _ => {}
@@ -58,9 +58,9 @@ pub fn window(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
 }
 
 /// A shop: large panes, goods and lamps behind them.
-pub fn shop(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
-    let ([u, v, _], [fu, fv, _], [width, height]) = (spot.surface_m, spot.footprint_m, surface.size_m);
-    let mut tone = glass(painter, surface, spot);
+pub fn shop(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+    let ([u, v, _], [fu, fv, _], [width, height]) = (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
+    let mut tone = glass(painter, surface, surface_point);
     // Goods: boxes on shelves, each of its own tone.
     let shelf = height / 4.0;
     let (row, column) = (floor(v / shelf), floor(u / 0.42));
@@ -83,19 +83,22 @@ pub fn shop(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
 }
 
 /// A shop's name: letters of strokes that spell nothing.
-pub fn board(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
-    let ([u, v, _], [fu, fv, _], [width, height]) = (spot.surface_m, spot.footprint_m, surface.size_m);
-    let ground = times(surface.tone, 1.0 + 0.05 * painter.fine(surface.seed, spot, 1.0) + 0.05 * painter.broad(surface.seed, spot, 1.0));
+pub fn board(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+    let ([u, v, _], [fu, fv, _], [width, height]) = (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
+    let ground = times(
+        surface.tone,
+        1.0 + 0.05 * painter.fine(surface.seed, surface_point, 1.0) + 0.05 * painter.broad(surface.seed, surface_point, 1.0),
+    );
     let letter = 0.34;
     let count = 5 + (surface.seed % 6) as i32;
     let start = 0.5 * width - 0.5 * letter * count as f32;
-    let place = (u - start) / letter;
-    let number = floor(place);
+    let column = (u - start) / letter;
+    let number = floor(column);
     if number < 0 || number >= count {
         return Painted::dull(ground);
     }
     let h = cell(surface.seed, number, 1);
-    let (x, y) = ((place - number as f32) * letter, (v - 0.14) / (height - 0.28));
+    let (x, y) = ((column - number as f32) * letter, (v - 0.14) / (height - 0.28));
     let fy = fv / (height - 0.28);
     let upright = |at: f32| within(at, at + 0.055, x, fu) * within(0.0, 1.0, y, fy);
     let bar = |at: f32| within(at - 0.08, at + 0.08, y, fy) * within(0.04, 0.26, x, fu);
@@ -110,9 +113,9 @@ pub fn board(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
 }
 
 /// A door with panels and a light above.
-pub fn door(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
-    let ([u, v, _], [fu, fv, _], [width, height]) = (spot.surface_m, spot.footprint_m, surface.size_m);
-    let wood = times(surface.tone, 1.0 + 0.08 * painter.fine(surface.seed, spot, 1.0));
+pub fn door(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+    let ([u, v, _], [fu, fv, _], [width, height]) = (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
+    let wood = times(surface.tone, 1.0 + 0.08 * painter.fine(surface.seed, surface_point, 1.0));
     let mut tone = wood;
     for (from, to) in [(0.30, 0.58), (0.64, 0.95)] {
         for (a, b) in [(0.14, 0.46), (0.54, 0.86)] {
@@ -131,9 +134,9 @@ pub fn door(painter: &Painter, surface: &Surface, spot: &Spot) -> Painted {
 }
 
 /// A sign's face in coordinates -1..1.
-pub fn sign(surface: &Surface, spot: &Spot) -> Painted {
-    let [x, y, _] = spot.surface_m;
-    let [fx, fy, _] = spot.footprint_m;
+pub fn sign(surface: &Surface, surface_point: &SurfacePoint) -> Painted {
+    let [x, y, _] = surface_point.surface_m;
+    let [fx, fy, _] = surface_point.footprint_m;
     let f = fx.max(fy);
     let radius = (x * x + y * y).sqrt();
     let (red, white, blue, black) = ([0.50, 0.02, 0.02], [0.80, 0.80, 0.78], [0.02, 0.10, 0.42], [0.02, 0.02, 0.02]);

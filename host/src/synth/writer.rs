@@ -17,12 +17,12 @@ use super::street::{Street, SynthError};
 ///
 /// - `sequences/00/image_{0,1}` grey and `image_{2,3}` colour pairs, `times.txt`, `calib.txt` (`P0`..`P3`, `Tr` from LiDAR to camera),
 ///   `velodyne/NNNNNN.bin`;
-/// - `sequences/00/depth` (1/256 m) and `disp` (1/256 px) as 16-bit PNG, 0 where there is none or it does not fit;
+/// - `sequences/00/depth` (1/256 m) and `disp` (1/256 px) as 16-bit PNG, 0 where it is missing or does not fit;
 /// - `sequences/00/instances/NNNNNN.png` (k = the frame's instance k) and `.txt` (`id class score x1 y1 x2 y2`);
 /// - `sequences/00/objects.csv`: every car near the camera at every frame, `instance` being its value in the masks;
 /// - `poses/00.txt`.
 ///
-/// `progress` is told (frames written, frames in all). Colour and grey cameras share one place, so `P2` equals `P0` and `P3` equals `P1`.
+/// `progress` receives (frames written, frames in all). Colour and grey cameras share one position, so `P2` equals `P0` and `P3` equals `P1`.
 ///
 /// # Errors
 /// `folder` exists and is not empty, or a file cannot be written; nothing half-written stays behind.

@@ -1,4 +1,4 @@
-//! Hashes and draws: every random figure is a function of what it belongs to, never of what was asked for before.
+//! Hashes and random numbers: every random figure is a function of what it belongs to, never of what was asked for before.
 
 use dynvox_core::random::Random;
 
@@ -30,11 +30,11 @@ pub fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// A generator for one thing of the street: a building, a tree, a car.
-pub struct Dice(Random);
+/// A generator for one object of the street: a building, a tree, a car.
+pub struct Rng(Random);
 
-impl Dice {
-    /// Draws for thing `a`, `b` under `seed`.
+impl Rng {
+    /// Random numbers for object `a`, `b` under `seed`.
     pub fn new(seed: u64, a: i64, b: i64) -> Self {
         Self(Random::new(hash(seed, a, b)))
     }

@@ -1,27 +1,27 @@
-//! One piece of street, generated from the seed and its number: ground, houses, furniture, parked cars.
+//! One segment of street, generated from the seed and its number: ground, houses, furniture, parked cars.
 
 use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 
 use super::config::{CarKind, StreetConfig};
-use super::draws::Dice;
 use super::furniture;
 use super::mesh::{Mesh, Point};
-use super::path::{Course, PIECE_M};
-use super::scene::Placed;
+use super::path::{Centerline, SEGMENT_M};
+use super::random::Rng;
+use super::scene::MatrixPose;
 use super::shadow::{ShadowTile, SunAxes};
 use super::surface::{Kind, Surface, Tone, tone};
 use super::{facade, layout};
 
 /// What is generated together and kept while the camera is near.
-pub struct Piece {
-    /// Things that stand, in the street's frame moved to the piece's start.
-    pub things: Vec<Mesh>,
-    /// The piece's start: x right of, z along the street there.
-    pub t_street_piece: Transform,
+pub struct Segment {
+    /// Static meshes, in the street's frame moved to the segment's start.
+    pub meshes: Vec<Mesh>,
+    /// The segment's start: x right of, z along the street there.
+    pub t_street_segment: Transform,
     /// Parked cars.
     pub parked: Vec<ParkedCar>,
-    /// What its things hold up against the sun.
+    /// What its meshes hold up against the sun.
     pub shadow: ShadowTile,
 }
 
@@ -55,30 +55,35 @@ const PAINTS: [(u8, u8, u8); 14] = [
 ];
 
 /// A body and a paint, as one sees them on streets.
-pub fn choose_car(dice: &mut Dice) -> (CarKind, Tone) {
-    let kind = match dice.below(12) {
+pub fn choose_car(rng: &mut Rng) -> (CarKind, Tone) {
+    let kind = match rng.below(12) {
         0..=3 => CarKind::Hatchback,
         4..=5 => CarKind::Saloon,
         6..=8 => CarKind::Estate,
         9..=10 => CarKind::Offroad,
         _ => CarKind::Van,
     };
-    let (red, green, blue) = dice.pick(&PAINTS);
+    let (red, green, blue) = rng.pick(&PAINTS);
     (kind, tone(red, green, blue))
 }
 
-/// Generates piece `number`.
-pub fn piece(config: &StreetConfig, course: &Course, sun: &SunAxes, number: i64) -> Piece {
-    let builder = Builder::new(config, course, number);
-    let mut things = builder.ground();
+/// Generates segment `number`.
+pub fn segment(config: &StreetConfig, centerline: &Centerline, sun: &SunAxes, number: i64) -> Segment {
+    let builder = Builder::new(config, centerline, number);
+    let mut meshes = builder.ground();
     for side in [Side::Left, Side::Right] {
-        builder.houses(side, &mut things);
-        builder.pavement_things(side, &mut things);
+        builder.houses(side, &mut meshes);
+        builder.street_furniture(side, &mut meshes);
     }
-    let placed = Placed::new(&builder.t_street_piece);
-    // The ground, first of the things, shades nothing.
-    let shadow = ShadowTile::new(sun, things.iter().skip(1).map(|mesh| (mesh, placed)));
-    Piece { things, t_street_piece: builder.t_street_piece, parked: builder.parked(), shadow }
+    let pose = MatrixPose::new(&builder.t_street_segment);
+    // The ground, first of the meshes, shades nothing.
+    let shadow = ShadowTile::new(sun, meshes.iter().skip(1).map(|mesh| (mesh, pose)));
+    Segment {
+        meshes,
+        t_street_segment: builder.t_street_segment,
+        parked: builder.parked(),
+        shadow,
+    }
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -105,31 +110,31 @@ struct Builder<'a> {
     config: &'a StreetConfig,
     number: i64,
     start_m: f64,
-    stretch: super::path::Stretch<'a>,
-    t_street_piece: Transform,
+    span: super::path::RoadSpan<'a>,
+    t_street_segment: Transform,
 }
 
 impl<'a> Builder<'a> {
-    fn new(config: &'a StreetConfig, course: &'a Course, number: i64) -> Self {
-        let stretch = course.stretch(number, number);
-        let start_m = number as f64 * PIECE_M;
-        let t_street_piece = stretch.t_street_local(start_m, 0.0, 0.0);
-        Self { config, number, start_m, stretch, t_street_piece }
+    fn new(config: &'a StreetConfig, centerline: &'a Centerline, number: i64) -> Self {
+        let span = centerline.span(number, number);
+        let start_m = number as f64 * SEGMENT_M;
+        let t_street_segment = span.t_street_local(start_m, 0.0, 0.0);
+        Self { config, number, start_m, span, t_street_segment }
     }
 
-    fn dice(&self, purpose: i64) -> Dice {
-        Dice::new(self.config.seed, self.number, purpose)
+    fn rng(&self, purpose: i64) -> Rng {
+        Rng::new(self.config.seed, self.number, purpose)
     }
 
-    /// Frame in the piece, `along_m` from its start.
+    /// Frame in the segment, `along_m` from its start.
     fn local(&self, along_m: f64, lateral_m: f64, yaw_rad: f64) -> Transform {
-        self.t_street_piece.inverse() * self.stretch.t_street_local(self.start_m + along_m, lateral_m, yaw_rad)
+        self.t_street_segment.inverse() * self.span.t_street_local(self.start_m + along_m, lateral_m, yaw_rad)
     }
 
     /// Strips of ground, swept along the line in steps of one metre.
     fn ground(&self) -> Vec<Mesh> {
-        let mut dice = self.dice(1);
-        let seed = dice.seed();
+        let mut rng = self.rng(1);
+        let seed = rng.seed();
         let crossing = if layout::crossing(self.config.seed, self.number) { 1.0 } else { 0.0 };
         let mut mesh = Mesh::default();
         let road = mesh.surface(Surface::new(Kind::Road, tone(98, 98, 100), self.number as u32).sized(crossing, 0.0));
@@ -151,13 +156,13 @@ impl<'a> Builder<'a> {
             (slabs, (right + layout::KERB_WIDTH_M, up), (out_right, up)),
             (yard, (out_right, up), (out_right + 45.0, up)),
         ];
-        let steps = PIECE_M as usize;
+        let steps = SEGMENT_M as usize;
         let frames: Vec<Transform> = (0..=steps).map(|k| self.local(k as f64, 0.0, 0.0)).collect();
         for (surface, from, to) in strips {
             for k in 0..steps {
                 let corner = |k: usize, (lateral, y): (f64, f64)| {
-                    let place = frames[k].transform_point(Point::new(lateral, y, 0.0));
-                    (place, [k as f32, (lateral + y) as f32, y as f32])
+                    let point = frames[k].transform_point(Point::new(lateral, y, 0.0));
+                    (point, [k as f32, (lateral + y) as f32, y as f32])
                 };
                 let upright = from.0 == to.0;
                 let outward = if upright { frames[k].rotate(Point::new(-from.0.signum(), 0.0, 0.0)) } else { -Point::y() };
@@ -167,9 +172,9 @@ impl<'a> Builder<'a> {
         vec![mesh.finish()]
     }
 
-    fn houses(&self, side: Side, things: &mut Vec<Mesh>) {
-        let mut dice = self.dice(if side == Side::Left { 10 } else { 20 });
-        let cuts: &[f64] = dice.pick(&[
+    fn houses(&self, side: Side, meshes: &mut Vec<Mesh>) {
+        let mut rng = self.rng(if side == Side::Left { 10 } else { 20 });
+        let cuts: &[f64] = rng.pick(&[
             &[0.0, 10.0, 24.0][..],
             &[0.0, 8.0, 15.0, 24.0],
             &[0.0, 12.0, 24.0],
@@ -179,100 +184,100 @@ impl<'a> Builder<'a> {
         ]);
         for pair in cuts.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            if dice.chance(0.14) {
-                self.garden(side, (from, to), &mut dice, things);
+            if rng.chance(0.14) {
+                self.garden(side, (from, to), &mut rng, meshes);
                 continue;
             }
-            let setback = if dice.chance(0.2) { dice.between(1.0, 2.5) } else { 0.0 };
+            let setback = if rng.chance(0.2) { rng.between(1.0, 2.5) } else { 0.0 };
             let lateral = side.front_m() + side.sign() * setback;
             let corner = |along: f64| Point::from(self.local(along, lateral, 0.0).translation_m);
             let (a, b) = if side == Side::Right { (corner(from), corner(to)) } else { (corner(to), corner(from)) };
             let along = b - a;
             let mut mesh = Mesh::default();
-            facade::house(&mut mesh, &mut dice, along.norm());
+            facade::house(&mut mesh, &mut rng, along.norm());
             let mut pose = Transform::new(Vector3::new(0.0, libm::atan2(-along.z, along.x), 0.0), Vector3::zeros());
             pose.translation_m = (a - Point::y() * layout::KERB_HEIGHT_M).into();
-            mesh.place(0, &pose);
-            things.push(mesh.finish());
+            mesh.move_by(0, &pose);
+            meshes.push(mesh.finish());
             if setback > 0.0 {
-                self.edge(side, (from + 0.1, to - 2.5), &mut dice, things);
+                self.edge(side, (from + 0.1, to - 2.5), &mut rng, meshes);
             }
         }
     }
 
     /// An empty plot: fence or hedge at the pavement, trees and a shed behind.
-    fn garden(&self, side: Side, (from, to): (f64, f64), dice: &mut Dice, things: &mut Vec<Mesh>) {
-        self.edge(side, (from + 0.1, to - 0.1), dice, things);
+    fn garden(&self, side: Side, (from, to): (f64, f64), rng: &mut Rng, meshes: &mut Vec<Mesh>) {
+        self.edge(side, (from + 0.1, to - 0.1), rng, meshes);
         for _ in 0..3 {
             let mut mesh = Mesh::default();
-            furniture::tree(&mut mesh, dice);
-            let (along, out) = (dice.between(from + 2.0, to - 2.0), dice.between(3.0, 9.0));
-            self.stand(mesh, along, side.front_m() + side.sign() * out, 0.0, things);
+            furniture::tree(&mut mesh, rng);
+            let (along, out) = (rng.between(from + 2.0, to - 2.0), rng.between(3.0, 9.0));
+            self.stand(mesh, along, side.front_m() + side.sign() * out, 0.0, meshes);
         }
         let mut mesh = Mesh::default();
-        facade::house(&mut mesh, dice, to - from + 4.0);
+        facade::house(&mut mesh, rng, to - from + 4.0);
         let yaw = side.sign() * -0.25 * core::f64::consts::PI * 2.0;
         let along = if side == Side::Right { from - 2.0 } else { to + 2.0 };
-        self.stand(mesh, along, side.front_m() + side.sign() * 13.0, yaw, things);
+        self.stand(mesh, along, side.front_m() + side.sign() * 13.0, yaw, meshes);
     }
 
-    fn edge(&self, side: Side, (from, to): (f64, f64), dice: &mut Dice, things: &mut Vec<Mesh>) {
+    fn edge(&self, side: Side, (from, to): (f64, f64), rng: &mut Rng, meshes: &mut Vec<Mesh>) {
         let mut mesh = Mesh::default();
-        if dice.chance(0.5) {
-            furniture::hedge(&mut mesh, dice, to - from);
+        if rng.chance(0.5) {
+            furniture::hedge(&mut mesh, rng, to - from);
         } else {
-            furniture::fence(&mut mesh, dice, to - from);
+            furniture::fence(&mut mesh, rng, to - from);
         }
         let lateral = side.front_m() + side.sign() * 0.35;
         let (a, b) = (Point::from(self.local(from, lateral, 0.0).translation_m), Point::from(self.local(to, lateral, 0.0).translation_m));
         let along = b - a;
         let mut pose = Transform::new(Vector3::new(0.0, libm::atan2(along.x, along.z), 0.0), Vector3::zeros());
         pose.translation_m = (a - Point::y() * layout::KERB_HEIGHT_M).into();
-        mesh.place(0, &pose);
-        things.push(mesh.finish());
+        mesh.move_by(0, &pose);
+        meshes.push(mesh.finish());
     }
 
-    /// Puts a thing on the pavement.
-    fn stand(&self, mut mesh: Mesh, along_m: f64, lateral_m: f64, yaw_rad: f64, things: &mut Vec<Mesh>) {
+    /// Puts a mesh on the pavement.
+    fn stand(&self, mut mesh: Mesh, along_m: f64, lateral_m: f64, yaw_rad: f64, meshes: &mut Vec<Mesh>) {
         let mut pose = self.local(along_m, lateral_m, yaw_rad);
         pose.translation_m[1] -= layout::KERB_HEIGHT_M;
-        mesh.place(0, &pose);
-        things.push(mesh.finish());
+        mesh.move_by(0, &pose);
+        meshes.push(mesh.finish());
     }
 
-    fn pavement_things(&self, side: Side, things: &mut Vec<Mesh>) {
-        let mut dice = self.dice(if side == Side::Left { 11 } else { 21 });
+    fn street_furniture(&self, side: Side, meshes: &mut Vec<Mesh>) {
+        let mut rng = self.rng(if side == Side::Left { 11 } else { 21 });
         let lateral = side.kerb_m() + side.sign() * 0.55;
-        let turn = if side == Side::Left { core::f64::consts::PI } else { 0.0 };
-        let trees = if dice.chance(0.75) { dice.below(3) } else { 0 };
+        let facing_rad = if side == Side::Left { core::f64::consts::PI } else { 0.0 };
+        let trees = if rng.chance(0.75) { rng.below(3) } else { 0 };
         for k in 0..trees {
             let mut mesh = Mesh::default();
-            furniture::tree(&mut mesh, &mut dice);
-            self.stand(mesh, 6.0 + 11.0 * k as f64 + dice.between(-1.5, 1.5), lateral, dice.between(0.0, 3.0), things);
+            furniture::tree(&mut mesh, &mut rng);
+            self.stand(mesh, 6.0 + 11.0 * k as f64 + rng.between(-1.5, 1.5), lateral, rng.between(0.0, 3.0), meshes);
         }
         if (self.number + i64::from(side == Side::Left)) % 2 == 0 {
             let mut mesh = Mesh::default();
-            furniture::lamp(&mut mesh, &mut dice);
-            self.stand(mesh, 1.2, lateral, turn, things);
+            furniture::lamp(&mut mesh, &mut rng);
+            self.stand(mesh, 1.2, lateral, facing_rad, meshes);
         }
         for _ in 0..2 {
             let mut mesh = Mesh::default();
-            let along = dice.pick(&[2.4, 3.6, 10.8, 12.6, 21.2, 22.6]) + dice.between(-0.4, 0.4);
-            match dice.below(6) {
-                0 | 1 => furniture::sign(&mut mesh, &mut dice),
-                2 => furniture::bin(&mut mesh, &mut dice),
-                3 => furniture::cabinet(&mut mesh, &mut dice),
-                4 => furniture::bench(&mut mesh, &mut dice),
-                _ => furniture::bollard(&mut mesh, &mut dice),
+            let along = rng.pick(&[2.4, 3.6, 10.8, 12.6, 21.2, 22.6]) + rng.between(-0.4, 0.4);
+            match rng.below(6) {
+                0 | 1 => furniture::sign(&mut mesh, &mut rng),
+                2 => furniture::bin(&mut mesh, &mut rng),
+                3 => furniture::cabinet(&mut mesh, &mut rng),
+                4 => furniture::bench(&mut mesh, &mut rng),
+                _ => furniture::bollard(&mut mesh, &mut rng),
             }
             // Signs on the left face those who come from ahead.
-            self.stand(mesh, along, lateral, turn + dice.between(-0.08, 0.08), things);
+            self.stand(mesh, along, lateral, facing_rad + rng.between(-0.08, 0.08), meshes);
         }
-        if dice.chance(0.3) {
+        if rng.chance(0.3) {
             for k in 0..6 {
                 let mut mesh = Mesh::default();
-                furniture::bollard(&mut mesh, &mut dice);
-                self.stand(mesh, 13.4 + 1.5 * f64::from(k), side.kerb_m() + side.sign() * 0.4, 0.0, things);
+                furniture::bollard(&mut mesh, &mut rng);
+                self.stand(mesh, 13.4 + 1.5 * f64::from(k), side.kerb_m() + side.sign() * 0.4, 0.0, meshes);
             }
         }
     }
@@ -281,21 +286,21 @@ impl<'a> Builder<'a> {
         let mut cars = Vec::new();
         let cleared = layout::cleared_m(self.config);
         for slot in 0..8 {
-            let mut dice = self.dice(100 + slot);
+            let mut rng = self.rng(100 + slot);
             let side = if slot < 4 { Side::Left } else { Side::Right };
-            let taken = dice.chance(self.config.parked_density);
-            let (kind, paint) = choose_car(&mut dice);
+            let occupied = rng.chance(self.config.parked_density);
+            let (kind, paint) = choose_car(&mut rng);
             let play = if kind == CarKind::Van { 0.2 } else { 0.45 };
-            let along = 3.0 + 6.0 * (slot % 4) as f64 + dice.between(-play, play);
+            let along = 3.0 + 6.0 * (slot % 4) as f64 + rng.between(-play, play);
             let at = self.start_m + along;
-            let lateral = layout::parking_m(side == Side::Right) + dice.between(-0.1, 0.1);
-            let turn = if side == Side::Left { core::f64::consts::PI } else { 0.0 };
-            let yaw = turn + dice.between(-0.025, 0.025);
+            let lateral = layout::parking_m(side == Side::Right) + rng.between(-0.1, 0.1);
+            let facing_rad = if side == Side::Left { core::f64::consts::PI } else { 0.0 };
+            let yaw = facing_rad + rng.between(-0.025, 0.025);
             let blocked = cleared.iter().any(|&(right, from, to)| right == (side == Side::Right) && (from..to).contains(&at));
             let on_crossing = layout::crossing(self.config.seed, self.number) && (along - layout::CROSSING_M).abs() < 5.0;
-            if taken && !blocked && !on_crossing {
+            if occupied && !blocked && !on_crossing {
                 let id = layout::PARKED_IDS + (self.number.rem_euclid(10_000_000) as u32) * 8 + slot as u32;
-                cars.push(ParkedCar { id, kind, paint, t_street_car: self.stretch.t_street_local(at, lateral, yaw) });
+                cars.push(ParkedCar { id, kind, paint, t_street_car: self.span.t_street_local(at, lateral, yaw) });
             }
         }
         cars
