@@ -6,7 +6,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
-    memory::Carver,
+    memory::{Carver, Slot},
     volume::{BlockCoord, BlockIndex},
 };
 use std::hint::black_box;
@@ -20,41 +20,37 @@ const SLOTS: usize = 1 << 17;
 
 /// What a table has to do.
 trait Table {
-    fn find(&self, coords: &[[i16; 4]], coord: BlockCoord) -> Option<u32>;
-    fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32);
-    fn remove(&mut self, coords: &[[i16; 4]], coord: BlockCoord);
+    fn find(&self, coords: &[BlockCoord], coord: BlockCoord) -> Option<Slot>;
+    fn insert(&mut self, coords: &[BlockCoord], coord: BlockCoord, slot: Slot);
+    fn remove(&mut self, coords: &[BlockCoord], coord: BlockCoord);
 }
 
 impl Table for BlockIndex<'_> {
-    fn find(&self, coords: &[[i16; 4]], coord: BlockCoord) -> Option<u32> {
-        self.find(coords, coord)
+    fn find(&self, coords: &[BlockCoord], coord: BlockCoord) -> Option<Slot> {
+        self.find(coord, |slot| Some(coords[slot.index()]))
     }
 
-    fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32) {
-        self.insert(coords, coord, slot).unwrap();
+    fn insert(&mut self, coords: &[BlockCoord], coord: BlockCoord, slot: Slot) {
+        self.insert(coord, slot, |slot| Some(coords[slot.index()])).unwrap();
     }
 
-    fn remove(&mut self, coords: &[[i16; 4]], coord: BlockCoord) {
-        assert!(self.remove(coords, coord));
+    fn remove(&mut self, coords: &[BlockCoord], coord: BlockCoord) {
+        assert!(self.remove(coord, |slot| Some(coords[slot.index()])));
     }
 }
 
 /// Slots + 1 by hash; 0 is none.
 struct Plain(Vec<u32>);
 
-fn place(coord: [i16; 4]) -> usize {
-    let [x, y, z, _] = coord.map(|c| i64::from(c) as u64);
+fn place(coord: BlockCoord) -> usize {
+    let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
     let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     (mixed ^ (mixed >> 29)) as usize & (SLOTS - 1)
 }
 
-fn packed(coord: BlockCoord) -> [i16; 4] {
-    [coord.x, coord.y, coord.z, 0]
-}
-
 impl Plain {
-    fn seek(&self, coords: &[[i16; 4]], coord: [i16; 4]) -> Result<usize, usize> {
+    fn seek(&self, coords: &[BlockCoord], coord: BlockCoord) -> Result<usize, usize> {
         let mut at = place(coord);
         while self.0[at] != 0 {
             if coords[self.0[at] as usize - 1] == coord {
@@ -67,21 +63,21 @@ impl Plain {
 }
 
 impl Table for Plain {
-    fn find(&self, coords: &[[i16; 4]], coord: BlockCoord) -> Option<u32> {
-        self.seek(coords, packed(coord)).ok().map(|at| self.0[at] - 1)
+    fn find(&self, coords: &[BlockCoord], coord: BlockCoord) -> Option<Slot> {
+        self.seek(coords, coord).ok().map(|at| Slot::new(self.0[at] - 1))
     }
 
-    fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32) {
-        let mut at = place(packed(coord));
+    fn insert(&mut self, coords: &[BlockCoord], coord: BlockCoord, slot: Slot) {
+        let mut at = place(coord);
         while self.0[at] != 0 {
             at = (at + 1) & (SLOTS - 1);
         }
         let _ = coords;
-        self.0[at] = slot + 1;
+        self.0[at] = slot.get() + 1;
     }
 
-    fn remove(&mut self, coords: &[[i16; 4]], coord: BlockCoord) {
-        let mut hole = self.seek(coords, packed(coord)).unwrap();
+    fn remove(&mut self, coords: &[BlockCoord], coord: BlockCoord) {
+        let mut hole = self.seek(coords, coord).unwrap();
         let mut at = hole;
         loop {
             at = (at + 1) & (SLOTS - 1);
@@ -104,7 +100,7 @@ fn block(number: usize) -> BlockCoord {
 
 struct Drive<T> {
     table: T,
-    coords: Vec<[i16; 4]>,
+    coords: Vec<BlockCoord>,
     /// Blocks entered so far; the oldest of those in the table is `BLOCKS` behind.
     entered: usize,
     insertions_ns: Vec<u32>,
@@ -112,7 +108,12 @@ struct Drive<T> {
 
 impl<T: Table> Drive<T> {
     fn new(table: T) -> Self {
-        let mut drive = Self { table, coords: vec![[0; 4]; BLOCKS], entered: 0, insertions_ns: Vec::new() };
+        let mut drive = Self {
+            table,
+            coords: vec![BlockCoord::default(); BLOCKS],
+            entered: 0,
+            insertions_ns: Vec::new(),
+        };
         for _ in 0..40 * BLOCKS / SLICE {
             drive.slice();
         }
@@ -128,9 +129,9 @@ impl<T: Table> Drive<T> {
             if number >= BLOCKS {
                 self.table.remove(&self.coords, block(number - BLOCKS));
             }
-            self.coords[slot] = packed(block(number));
+            self.coords[slot] = block(number);
             let one = Instant::now();
-            self.table.insert(&self.coords, block(number), slot as u32);
+            self.table.insert(&self.coords, block(number), Slot::new(slot as u32));
             self.insertions_ns.push(one.elapsed().as_nanos() as u32);
             for back in 0..4 {
                 let number = number - (number % BLOCKS).min(back * 777);

@@ -37,10 +37,10 @@ fn use_grows_with_the_map_and_never_beyond_what_was_cut() {
         for frame in clip.stereo() {
             let report = mapper.step(&frame, &Serial).expect("a good frame");
             let footprint = mapper.footprint();
-            let sdf = footprint.region("volume.sdf").expect("the map has distances");
-            assert_eq!(sdf.used, report.blocks.used as usize * 1_024);
-            assert!(sdf.used >= last && sdf.peak <= sdf.bytes);
-            last = sdf.used;
+            let voxels = footprint.region("volume.voxels").expect("the map has voxels");
+            assert_eq!(voxels.used, report.blocks.used as usize * 1_536);
+            assert!(voxels.used >= last && voxels.peak <= voxels.bytes);
+            last = voxels.used;
         }
         assert!(last > 0);
     });
@@ -53,7 +53,7 @@ fn a_block_takes_the_bytes_promised_and_finding_and_remembering_it_little_beside
         clip.with_mapper(&capacity, |mapper| {
             let footprint = mapper.footprint();
             let bytes = |names: &[&str]| names.iter().filter_map(|name| footprint.region(name)).map(|region| region.bytes).sum::<usize>();
-            let voxels = bytes(&["volume.sdf", "volume.weight", "volume.colour"]);
+            let voxels = bytes(&["volume.voxels", "volume.colour"]);
             assert_eq!(voxels, voxel_bytes * capacity.blocks);
             let beside = bytes(&["volume.index", "volume.history", "volume.history_due", "volume.born"]);
             assert!(beside > 0 && 20 * beside <= voxels, "{beside} bytes beside {voxels}");

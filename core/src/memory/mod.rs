@@ -12,5 +12,5 @@ mod slab;
 pub use capacity::Capacity;
 pub use footprint::{Footprint, Region};
 pub use one_shot::OneShot;
-pub use pool::{Full, Handle, SlotPool};
+pub use pool::{Full, Slot, SlotPool};
 pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, region_bytes};

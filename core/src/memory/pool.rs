@@ -1,32 +1,55 @@
-//! A pool of numbered slots with a free list and a generation per slot.
+//! A pool of numbered slots with a free list.
 //!
-//! The pool hands out positions, not memory: whoever owns the payload keeps it in arrays of the same length. A [`Handle`] remembers
-//! the generation it was born in, so a slot that was freed and given out again is not mistaken for the old one.
+//! The pool hands out positions, not memory: whoever owns the payload keeps it in arrays of the same length.
 //!
-//! Memory: 8 bytes per slot (a generation, a free-list entry). Time: constant. Order: a new pool gives out 0, 1, 2, …; a freed slot is
-//! the next one given out.
+//! Memory: 4 bytes and 1 bit per slot (a free-list entry, whether the slot is taken). Time: constant; a walk over the slots taken visits
+//! 64 of them a step where none is. Order: a new pool gives out 0, 1, 2, …; a freed slot is the next one given out.
 
 use super::{Carver, region_bytes};
 use crate::snapshot::Archive;
+use bytemuck::{Pod, Zeroable};
+use core::fmt;
 
 /// Every slot is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Full;
 
-/// A slot as it was when it was given out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Handle {
-    /// Position of the slot in the pool.
-    pub slot: u32,
-    /// How often the slot had been freed when this handle was made.
-    pub generation: u32,
+impl fmt::Display for Full {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("every slot is taken")
+    }
 }
 
-/// The pool. Even generations are free, odd ones taken.
+impl core::error::Error for Full {}
+
+/// A position in a pool, and in the arrays that hold what belongs to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Slot(u32);
+
+impl Slot {
+    /// The slot at a position.
+    pub const fn new(position: u32) -> Self {
+        Self(position)
+    }
+
+    /// The position.
+    pub const fn get(self) -> u32 {
+        self.0
+    }
+
+    /// The position, to index arrays with.
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// The pool.
 #[derive(Debug)]
 pub struct SlotPool<'s> {
-    generation: &'s mut [u32],
-    freed: &'s mut [u32],
+    /// A bit per slot: whether it is taken.
+    live: &'s mut [u64],
+    freed: &'s mut [Slot],
     freed_len: usize,
     fresh: usize,
     peak: usize,
@@ -35,14 +58,14 @@ pub struct SlotPool<'s> {
 impl<'s> SlotPool<'s> {
     /// Bytes of the slab for `slots` slots.
     pub const fn bytes(slots: usize) -> usize {
-        2 * region_bytes::<u32>(slots)
+        region_bytes::<u64>(slots.div_ceil(64)) + region_bytes::<Slot>(slots)
     }
 
-    /// Cuts a pool of `slots` slots. `names` are those of its two regions: generations, free list.
+    /// Cuts a pool of `slots` slots. `names` are those of its two regions: taken slots, free list.
     pub fn new_in(carver: &mut Carver<'s>, slots: usize, names: [&'static str; 2]) -> Self {
-        let [generations, free_list] = names;
+        let [live, free_list] = names;
         Self {
-            generation: carver.alloc(generations, slots),
+            live: carver.alloc(live, slots.div_ceil(64)),
             freed: carver.alloc(free_list, slots),
             freed_len: 0,
             fresh: 0,
@@ -52,7 +75,7 @@ impl<'s> SlotPool<'s> {
 
     /// Slots in all.
     pub fn capacity(&self) -> usize {
-        self.generation.len()
+        self.freed.len()
     }
 
     /// Slots taken.
@@ -75,86 +98,164 @@ impl<'s> SlotPool<'s> {
         self.peak
     }
 
-    /// One past the highest position ever given out: what a walk over all slots has to visit.
+    /// One past the highest position ever given out.
     pub fn high_water(&self) -> usize {
         self.fresh
     }
 
     /// Takes a slot.
-    pub fn take(&mut self) -> Result<Handle, Full> {
+    pub fn take(&mut self) -> Result<Slot, Full> {
         let slot = if let Some(last) = self.freed_len.checked_sub(1) {
             let slot = *self.freed.get(last).ok_or(Full)?;
             self.freed_len = last;
-            slot as usize
-        } else {
-            self.fresh
-        };
-        let generation = self.generation.get_mut(slot).ok_or(Full)?;
-        *generation = generation.wrapping_add(1);
-        let handle = Handle { slot: slot as u32, generation: *generation };
-        if slot == self.fresh {
+            slot
+        } else if self.fresh < self.capacity() {
             self.fresh += 1;
-        }
+            Slot(self.fresh as u32 - 1)
+        } else {
+            return Err(Full);
+        };
+        debug_assert!(!self.is_live(slot), "a slot given out is free");
+        self.set_live(slot, true);
         if self.len() > self.peak {
             self.peak = self.len();
         }
-        Ok(handle)
+        Ok(slot)
     }
 
-    /// Gives a slot back. Returns `false`, and does nothing, when the handle is stale.
-    pub fn free(&mut self, handle: Handle) -> bool {
-        if !self.is_live(handle) {
-            return false;
-        }
-        if let (Some(generation), Some(entry)) = (self.generation.get_mut(handle.slot as usize), self.freed.get_mut(self.freed_len)) {
-            *generation = generation.wrapping_add(1);
-            *entry = handle.slot;
+    /// Gives a slot back, which must be taken.
+    pub fn free(&mut self, slot: Slot) {
+        debug_assert!(self.is_live(slot), "a slot is freed once");
+        if self.is_live(slot)
+            && let Some(entry) = self.freed.get_mut(self.freed_len)
+        {
+            *entry = slot;
             self.freed_len += 1;
-            return true;
+            self.set_live(slot, false);
         }
-        false
     }
 
-    /// Writes or reads the pool: which slots are taken, how often each was, and in which order the freed ones will be given out.
+    /// Whether a slot is taken.
+    pub fn is_live(&self, slot: Slot) -> bool {
+        self.live.get(slot.index() / 64).is_some_and(|word| word >> (slot.0 % 64) & 1 == 1)
+    }
+
+    /// The slots taken, ascending.
+    pub fn live(&self) -> impl Iterator<Item = Slot> + Clone + '_ {
+        let words = self.live.iter().take(self.fresh.div_ceil(64));
+        (0u32..).zip(words).flat_map(|(i, &word)| bits(word).map(move |bit| Slot(64 * i + bit)))
+    }
+
+    /// The first slot at or after position `from` that is taken: a walk that may free slots on its way.
+    pub fn next_live(&self, from: u32) -> Option<Slot> {
+        let first = from / 64;
+        let words = (first..).zip(self.live.iter().skip(first as usize));
+        words.map(|(i, &word)| (i, if i == first { word & u64::MAX << (from % 64) } else { word })).find_map(|(i, word)| {
+            let bit = bits(word).next()?;
+            Some(Slot(64 * i + bit))
+        })
+    }
+
+    fn set_live(&mut self, slot: Slot, live: bool) {
+        if let Some(word) = self.live.get_mut(slot.index() / 64) {
+            let bit = 1 << (slot.0 % 64);
+            *word = if live { *word | bit } else { *word & !bit };
+        }
+    }
+
+    /// Writes or reads the pool: how many slots were given out, and in which order the freed ones will be given out again.
+    /// [`SlotPool::rebuild`] must follow a reading.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
         let capacity = self.capacity();
         archive.count(&mut self.fresh, capacity);
         archive.count(&mut self.freed_len, self.fresh);
         archive.count(&mut self.peak, capacity);
-        archive.u32s(self.generation.get_mut(..self.fresh).unwrap_or(&mut []));
-        archive.u32s(self.freed.get_mut(..self.freed_len).unwrap_or(&mut []));
+        archive.u32s(bytemuck::cast_slice_mut(self.freed.get_mut(..self.freed_len).unwrap_or(&mut [])));
     }
 
-    /// Whether the slot is still the one the handle was made for.
-    pub fn is_live(&self, handle: Handle) -> bool {
-        handle.generation % 2 == 1 && self.generation.get(handle.slot as usize) == Some(&handle.generation)
+    /// Finds which slots are taken: those given out and not in the free list. Whether that list can be: each slot in it given out, and once.
+    pub(crate) fn rebuild(&mut self) -> bool {
+        self.live.fill(0);
+        (0..self.fresh as u32).for_each(|position| self.set_live(Slot(position), true));
+        for at in 0..self.freed_len {
+            let Some(slot) = self.freed.get(at).copied().filter(|&slot| self.is_live(slot)) else { return false };
+            self.set_live(slot, false);
+        }
+        true
     }
+}
 
-    /// The handle of a slot that is taken now.
-    pub fn handle(&self, slot: u32) -> Option<Handle> {
-        let generation = *self.generation.get(slot as usize)?;
-        (generation % 2 == 1).then_some(Handle { slot, generation })
-    }
+/// The bits set in a word, lowest first.
+fn bits(mut word: u64) -> impl Iterator<Item = u32> + Clone {
+    core::iter::from_fn(move || {
+        let bit = word.trailing_zeros();
+        word &= word.wrapping_sub(1);
+        (bit < 64).then_some(bit)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::memory::Slab;
+    use crate::{memory::SLAB_ALIGN, random::Random};
+    use std::{boxed::Box, collections::BTreeSet, vec, vec::Vec};
+
+    fn pool(slots: usize) -> SlotPool<'static> {
+        let bytes = SlotPool::bytes(slots);
+        let memory = Box::leak(vec![0u8; bytes + SLAB_ALIGN].into_boxed_slice());
+        let start = memory.as_ptr().align_offset(SLAB_ALIGN);
+        SlotPool::new_in(&mut Carver::new(&mut memory[start..], bytes).unwrap(), slots, ["live", "freed"])
+    }
 
     #[test]
     fn gives_each_slot_once_then_says_full() {
-        let mut slab = std::boxed::Box::new(Slab([0u8; SlotPool::bytes(17)]));
-        let mut carver = Carver::new(&mut slab.0, SlotPool::bytes(17)).unwrap();
-        let mut pool = SlotPool::new_in(&mut carver, 17, ["generation", "freed"]);
-        let handles: std::vec::Vec<_> = (0..17).map(|_| pool.take().unwrap()).collect();
-        assert!(handles.iter().enumerate().all(|(i, h)| h.slot == i as u32));
+        let mut pool = pool(17);
+        let slots: Vec<_> = (0..17).map(|_| pool.take().unwrap()).collect();
+        assert!(slots.iter().enumerate().all(|(i, slot)| slot.index() == i));
         assert_eq!(pool.take(), Err(Full));
-        assert!(pool.free(handles[3]));
-        assert!(!pool.free(handles[3]), "a slot is freed once");
-        let again = pool.take().unwrap();
-        assert_eq!(again.slot, 3);
-        assert!(!pool.is_live(handles[3]) && pool.is_live(again), "the old handle is stale, the new one is not");
+        pool.free(slots[3]);
+        assert!(!pool.is_live(slots[3]));
+        assert_eq!(pool.take(), Ok(slots[3]), "freed last, given out next");
         assert_eq!((pool.len(), pool.peak(), pool.high_water()), (17, 17, 17));
+    }
+
+    #[test]
+    #[should_panic(expected = "a slot is freed once")]
+    fn a_slot_freed_twice_is_a_fault_of_the_software() {
+        let mut pool = pool(3);
+        let slot = pool.take().unwrap();
+        pool.free(slot);
+        pool.free(slot);
+    }
+
+    #[test]
+    fn walks_over_the_slots_taken_in_order_and_finds_them_again_from_the_free_list() {
+        let (mut pool, mut model, mut random) = (pool(200), BTreeSet::new(), Random::new(4));
+        for round in 0..5_000 {
+            if random.below(5) < 2 && !model.is_empty() {
+                let slot = *model.iter().nth(random.below(model.len() as u32) as usize).unwrap();
+                model.remove(&slot);
+                pool.free(slot);
+            } else if let Ok(slot) = pool.take() {
+                assert!(model.insert(slot));
+            }
+            if round % 50 == 0 {
+                assert!(pool.live().eq(model.iter().copied()));
+                let from = random.below(210);
+                assert_eq!(pool.next_live(from), model.range(Slot::new(from)..).next().copied());
+                assert!(pool.rebuild() && pool.live().eq(model.iter().copied()));
+            }
+        }
+    }
+
+    #[test]
+    fn refuses_a_free_list_that_cannot_be() {
+        for wrong in [Slot::new(1), Slot::new(2)] {
+            let mut pool = pool(3);
+            let slots = [pool.take().unwrap(), pool.take().unwrap()];
+            slots.into_iter().for_each(|slot| pool.free(slot));
+            pool.freed[0] = wrong;
+            assert!(!pool.rebuild(), "freed twice, or never given out");
+        }
     }
 }

@@ -11,7 +11,7 @@ use super::{BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Viewpoint, Volum
 use crate::{
     geometry::scalar::{floor_i32, max_f32},
     image::View,
-    memory::{Carver, region_bytes},
+    memory::{Carver, Slot, region_bytes},
 };
 use nalgebra::Vector3;
 
@@ -173,7 +173,7 @@ impl Volume<'_> {
             report.beyond += 1;
             return;
         };
-        let (found, probes) = self.index.probe(self.blocks.coord, coord);
+        let (found, probes) = self.index.probe(coord, |slot| self.blocks.coord(slot));
         if probes > report.probes_most {
             report.probes_most = probes;
         }
@@ -197,7 +197,7 @@ impl Volume<'_> {
     }
 
     /// Enters a slot into the visible list.
-    fn list(&mut self, slot: u32, report: &mut AllocationReport) {
+    fn list(&mut self, slot: Slot, report: &mut AllocationReport) {
         if self.visible.mark(slot).is_err() {
             report.unlisted += 1;
         }
@@ -205,15 +205,15 @@ impl Volume<'_> {
     }
 
     /// Takes a slot for a new, empty block.
-    pub(super) fn make(&mut self, coord: BlockCoord) -> Option<u32> {
-        let handle = self.pool.take().ok()?;
-        self.blocks.clear(handle.slot, coord);
-        if self.index.insert(self.blocks.coord, coord, handle.slot).is_err() {
-            self.pool.free(handle);
+    pub(super) fn make(&mut self, coord: BlockCoord) -> Option<Slot> {
+        let slot = self.pool.take().ok()?;
+        self.blocks.clear(slot, coord);
+        if self.index.insert(coord, slot, |slot| self.blocks.coord(slot)).is_err() {
+            self.pool.free(slot);
             return None;
         }
-        self.history.born(handle.slot, self.visible.frame());
-        Some(handle.slot)
+        self.history.born(slot, self.visible.frame());
+        Some(slot)
     }
 
     /// Lists the blocks visible in the last frame that still lie in the picture.
@@ -224,7 +224,7 @@ impl Volume<'_> {
         let farthest = f64::from(self.config.far_m + self.config.truncation_m);
         for i in 0.. {
             let Some(slot) = self.visible.before(i) else { break };
-            if self.visible.is_marked(slot) || self.pool.handle(slot).is_none() {
+            if self.visible.is_marked(slot) || !self.pool.is_live(slot) {
                 continue;
             }
             let Some(coord) = self.blocks.coord(slot) else { continue };

@@ -24,16 +24,16 @@ pub fn empty(config: &VolumeConfig, blocks: usize) -> Volume<'static> {
 pub fn fill(volume: &mut Volume<'_>, coords: impl IntoIterator<Item = BlockCoord>, tell: impl Fn([i32; 3]) -> Told) {
     let scale = 32_767.0 / volume.config.truncation_m;
     for coord in coords {
-        let handle = volume.pool.take().unwrap();
-        volume.blocks.clear(handle.slot, coord);
-        volume.index.insert(volume.blocks.coord, coord, handle.slot).unwrap();
-        let slot = handle.slot as usize;
+        let slot = volume.pool.take().unwrap();
+        volume.blocks.clear(slot, coord);
+        volume.index.insert(coord, slot, |slot| volume.blocks.coord(slot)).unwrap();
+        let slot = slot.index();
         let origin = coord.origin();
         for voxel in 0..BLOCK_VOXELS {
             let [x, y, z] = [voxel & 7, voxel >> 3 & 7, voxel >> 6].map(|c| c as i32);
             if let Some((sdf_m, weight, colour)) = tell([origin[0] + x, origin[1] + y, origin[2] + z]) {
-                volume.blocks.sdf[slot][voxel] = libm::roundf(clamp_f32(sdf_m * scale, -32_767.0, 32_767.0)) as i16;
-                volume.blocks.weight[slot][voxel] = weight;
+                volume.blocks.voxels[slot].sdf[voxel] = libm::roundf(clamp_f32(sdf_m * scale, -32_767.0, 32_767.0)) as i16;
+                volume.blocks.voxels[slot].weight[voxel] = weight;
                 (0..3).for_each(|c| volume.blocks.colour[slot][c][voxel] = colour[c]);
             }
         }

@@ -7,11 +7,12 @@ impl Volume<'_> {
     /// Writes or reads the volume; [`Volume::remake`] must follow a reading.
     pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
         self.pool.archive(archive);
+        if !self.pool.rebuild() {
+            archive.refuse();
+        }
         let slots = self.pool.high_water();
-        for slot in 0..slots as u32 {
-            if self.pool.handle(slot).is_some() {
-                self.blocks.archive(slot as usize, archive);
-            }
+        for slot in self.pool.live() {
+            self.blocks.archive(slot, archive);
         }
         self.visible.archive(slots, archive);
         self.history.archive(slots, archive);
@@ -21,15 +22,14 @@ impl Volume<'_> {
     /// Enters the blocks that were read into the index, in slot order, and sums their digests. Whether they can be: no place twice, room for all. Nothing that
     /// comes later depends on the order the index was filled in: it only ever answers for one place, and nothing walks it.
     pub(crate) fn remake(&mut self) -> bool {
-        for slot in 0..self.pool.high_water() as u32 {
-            if self.pool.handle(slot).is_none() {
-                continue;
-            }
+        for slot in self.pool.live() {
             let Some(coord) = self.blocks.coord(slot) else { return false };
-            if self.find(coord).is_some() || self.index.insert(self.blocks.coord, coord, slot).is_err() {
+            if self.index.find(coord, |slot| self.blocks.coord(slot)).is_some()
+                || self.index.insert(coord, slot, |slot| self.blocks.coord(slot)).is_err()
+            {
                 return false;
             }
-            self.digest = self.digest.wrapping_add(self.blocks.digest.get(slot as usize).copied().unwrap_or(0));
+            self.digest = self.digest.wrapping_add(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));
         }
         true
     }

@@ -1,10 +1,11 @@
-//! What blocks hold: structure of arrays, one entry a block.
+//! What blocks hold: an array of records, and beside it one for what is read without the voxels and one for colour
+//! (docs/decisions/0036-blocks-as-records.md).
 //!
-//! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and 17 bytes beside them (coordinates, content digest, faintest
-//! weight).
+//! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and a header of 16.
 
-use crate::memory::{Capacity, Carver, region_bytes};
+use crate::memory::{Capacity, Carver, Slot, region_bytes};
 use crate::snapshot::Archive;
+use bytemuck::{Pod, Zeroable};
 
 /// Lattice points along a block's side.
 pub const BLOCK_SIDE: usize = 8;
@@ -42,118 +43,122 @@ impl BlockCoord {
     pub fn origin(self) -> [i32; 3] {
         [self.x, self.y, self.z].map(|c| i32::from(c) * BLOCK_SIDE as i32)
     }
+}
 
-    pub(super) fn packed(self) -> [i16; 4] {
-        [self.x, self.y, self.z, 0]
+/// A block without its colour: what every stage that visits it reads together.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Voxels {
+    /// Signed distance in units of truncation / 32,767: positive before the surface, meaningless where the weight is 0.
+    pub sdf: [i16; BLOCK_VOXELS],
+    /// Observations, up to `max_weight`; 0 is never observed.
+    pub weight: [u8; BLOCK_VOXELS],
+}
+
+/// Red, green and blue planes of a block; all three 0 is no colour yet.
+pub(crate) type Colour = [[u8; BLOCK_VOXELS]; 3];
+
+/// What is kept of a block beside its voxels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Header {
+    /// Digest of the block's coordinates and content; 0 until the block is first fused.
+    pub digest: u64,
+    coord: [i16; 3],
+    /// Least weight of the observed voxels, so that pruning need not read them; 0 where it is not known.
+    pub min_weight: u8,
+    reserved: u8,
+}
+
+impl Header {
+    /// That of an empty block.
+    pub fn new(coord: BlockCoord) -> Self {
+        Self { coord: [coord.x, coord.y, coord.z], ..Self::default() }
     }
 
-    pub(super) fn unpacked(packed: [i16; 4]) -> Self {
-        Self { x: packed[0], y: packed[1], z: packed[2] }
+    /// Where the block lies.
+    #[inline]
+    pub fn coord(&self) -> BlockCoord {
+        let [x, y, z] = self.coord;
+        BlockCoord { x, y, z }
     }
 }
 
-/// The payload of all blocks, by slot of the block pool. Voxel (x, y, z) of a block is item `x + 8 y + 64 z`.
+/// All blocks, by slot of the block pool. Voxel (x, y, z) of a block is item `x + 8 y + 64 z`.
 #[derive(Debug)]
 pub struct Blocks<'s> {
-    /// Coordinates.
-    pub(super) coord: &'s mut [[i16; 4]],
-    /// Signed distance in units of truncation / 32,767: positive before the surface, meaningless where the weight is 0.
-    pub(super) sdf: &'s mut [[i16; BLOCK_VOXELS]],
-    /// Observations, up to `max_weight`; 0 is never seen.
-    pub(super) weight: &'s mut [[u8; BLOCK_VOXELS]],
-    /// Red, green and blue planes; all three 0 is no colour yet. Empty without colour.
-    pub(super) colour: &'s mut [[[u8; BLOCK_VOXELS]; 3]],
-    /// Digest of each block's content and place.
-    pub(super) digest: &'s mut [u64],
-    /// Least weight of each block's seen voxels, so that pruning need not look; 0 where it is not known.
-    pub(super) faintest: &'s mut [u8],
+    pub(super) header: &'s mut [Header],
+    pub(super) voxels: &'s mut [Voxels],
+    /// Empty without colour.
+    pub(super) colour: &'s mut [Colour],
 }
 
 impl<'s> Blocks<'s> {
     /// Bytes of the slab.
     pub const fn bytes(blocks: usize, colour: bool) -> usize {
-        region_bytes::<[i16; 4]>(blocks)
-            + region_bytes::<[i16; BLOCK_VOXELS]>(blocks)
-            + region_bytes::<[u8; BLOCK_VOXELS]>(blocks)
-            + if colour { region_bytes::<[[u8; BLOCK_VOXELS]; 3]>(blocks) } else { 0 }
-            + region_bytes::<u64>(blocks)
-            + region_bytes::<u8>(blocks)
+        region_bytes::<Header>(blocks) + region_bytes::<Voxels>(blocks) + if colour { region_bytes::<Colour>(blocks) } else { 0 }
     }
 
-    /// Cuts the payload of `capacity.blocks` blocks.
+    /// Cuts the memory of `capacity.blocks` blocks.
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
-        let coloured = if capacity.colour { capacity.blocks } else { 0 };
         Self {
-            coord: carver.alloc("volume.coord", capacity.blocks),
-            sdf: carver.alloc_as_found("volume.sdf", capacity.blocks),
-            weight: carver.alloc_as_found("volume.weight", capacity.blocks),
-            colour: if capacity.colour { carver.alloc_as_found("volume.colour", coloured) } else { &mut [] },
-            digest: carver.alloc("volume.digest", capacity.blocks),
-            faintest: carver.alloc("volume.faintest", capacity.blocks),
+            header: carver.alloc("volume.header", capacity.blocks),
+            voxels: carver.alloc_as_found("volume.voxels", capacity.blocks),
+            colour: if capacity.colour { carver.alloc_as_found("volume.colour", capacity.blocks) } else { &mut [] },
         }
     }
 
     /// Writes or reads the block in a slot: its place, its voxels and what they were last summed up to. The digest of a block that was made and
     /// never fused is 0, which its voxels would not tell.
-    pub(super) fn archive(&mut self, slot: usize, archive: &mut impl Archive) {
-        if let (Some(coord), Some(sdf), Some(weight)) = (self.coord.get_mut(slot), self.sdf.get_mut(slot), self.weight.get_mut(slot)) {
-            archive.i16s(coord);
-            archive.i16s(sdf);
-            archive.raw(weight);
+    pub(super) fn archive(&mut self, slot: Slot, archive: &mut impl Archive) {
+        if let (Some(header), Some(voxels)) = (self.header.get_mut(slot.index()), self.voxels.get_mut(slot.index())) {
+            archive.i16s(&mut header.coord);
+            archive.i16s(&mut voxels.sdf);
+            archive.raw(&mut voxels.weight);
+            archive.u64(&mut header.digest);
+            archive.u8(&mut header.min_weight);
         }
-        if let (Some(digest), Some(faintest)) = (self.digest.get_mut(slot), self.faintest.get_mut(slot)) {
-            archive.u64(digest);
-            archive.u8(faintest);
-        }
-        self.colour.get_mut(slot).into_iter().flatten().for_each(|plane| archive.raw(plane));
+        self.colour.get_mut(slot.index()).into_iter().flatten().for_each(|plane| archive.raw(plane));
     }
 
     /// Makes a slot an empty block at `coord`.
-    pub(super) fn clear(&mut self, slot: u32, coord: BlockCoord) {
-        let slot = slot as usize;
-        if let Some(entry) = self.coord.get_mut(slot) {
-            *entry = coord.packed();
+    pub(super) fn clear(&mut self, slot: Slot, coord: BlockCoord) {
+        if let Some(header) = self.header.get_mut(slot.index()) {
+            *header = Header::new(coord);
         }
-        if let Some(block) = self.sdf.get_mut(slot) {
-            block.fill(0);
+        if let Some(Voxels { sdf, weight }) = self.voxels.get_mut(slot.index()) {
+            sdf.fill(0);
+            weight.fill(0);
         }
-        if let Some(block) = self.weight.get_mut(slot) {
-            block.fill(0);
-        }
-        if let Some(planes) = self.colour.get_mut(slot) {
+        if let Some(planes) = self.colour.get_mut(slot.index()) {
             planes.iter_mut().for_each(|plane| plane.fill(0));
-        }
-        if let Some(digest) = self.digest.get_mut(slot) {
-            *digest = 0;
-        }
-        if let Some(faintest) = self.faintest.get_mut(slot) {
-            *faintest = 0;
         }
     }
 
     /// Where the block in a slot lies.
-    pub fn coord(&self, slot: u32) -> Option<BlockCoord> {
-        self.coord.get(slot as usize).copied().map(BlockCoord::unpacked)
+    #[inline]
+    pub fn coord(&self, slot: Slot) -> Option<BlockCoord> {
+        self.header.get(slot.index()).map(Header::coord)
     }
 
     /// Signed distances of the block in a slot.
-    pub fn sdf(&self, slot: u32) -> Option<&[i16; BLOCK_VOXELS]> {
-        self.sdf.get(slot as usize)
+    pub fn sdf(&self, slot: Slot) -> Option<&[i16; BLOCK_VOXELS]> {
+        self.voxels.get(slot.index()).map(|voxels| &voxels.sdf)
     }
 
     /// Weights of the block in a slot.
-    pub fn weight(&self, slot: u32) -> Option<&[u8; BLOCK_VOXELS]> {
-        self.weight.get(slot as usize)
+    pub fn weight(&self, slot: Slot) -> Option<&[u8; BLOCK_VOXELS]> {
+        self.voxels.get(slot.index()).map(|voxels| &voxels.weight)
     }
 
     /// Colour planes of the block in a slot; `None` without colour.
-    pub fn colour(&self, slot: u32) -> Option<&[[u8; BLOCK_VOXELS]; 3]> {
-        self.colour.get(slot as usize)
+    pub fn colour(&self, slot: Slot) -> Option<&Colour> {
+        self.colour.get(slot.index())
     }
 }
 
 /// Least weight of the seen voxels; 0 where none is seen.
-pub(super) fn faintest_weight(weight: &[u8; BLOCK_VOXELS]) -> u8 {
+pub(super) fn least_weight(weight: &[u8; BLOCK_VOXELS]) -> u8 {
     // Never seen wraps around to the most there is, and back.
     weight.iter().map(|weight| weight.wrapping_sub(1)).fold(u8::MAX, |least, one| if one < least { one } else { least }).wrapping_add(1)
 }

@@ -7,7 +7,7 @@
 //! frames of 70,000 blocks, where lists of coordinates would take 13.7 MiB (docs/decisions/0005-history-of-bit-sets.md). Time: one bit
 //! per visible block to enter a frame; a pass over one set to take one out.
 
-use crate::memory::{Capacity, Carver, region_bytes};
+use crate::memory::{Capacity, Carver, Slot, region_bytes};
 use crate::snapshot::Archive;
 
 /// Frames, as bit sets over slots, oldest first out.
@@ -73,30 +73,30 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// Notes that the block in `slot` was made in `frame`.
-    pub(super) fn born(&mut self, slot: u32, frame: u32) {
-        if let Some(born) = self.born.get_mut(slot as usize) {
+    pub(super) fn born(&mut self, slot: Slot, frame: u32) {
+        if let Some(born) = self.born.get_mut(slot.index()) {
             *born = frame;
         }
     }
 
     /// Notes that the block in `slot` is gone: it is no longer due, and what the ring says of it is void.
-    pub(super) fn gone(&mut self, slot: u32) {
+    pub(super) fn gone(&mut self, slot: Slot) {
         self.born(slot, u32::MAX);
-        if let Some(word) = self.due.get_mut(slot as usize / 64) {
-            *word &= !(1 << (slot % 64));
+        if let Some(word) = self.due.get_mut(slot.index() / 64) {
+            *word &= !(1 << (slot.get() % 64));
         }
     }
 
     /// Enters the slots visible in `frame`, which must follow the last one entered. The ring must not be full.
-    pub(super) fn enter(&mut self, frame: u32, visible: &[u32]) {
+    pub(super) fn enter(&mut self, frame: u32, visible: &[Slot]) {
         if self.len == 0 {
             self.oldest = frame;
         }
         let Some(set) = self.set_mut(frame) else { return };
         set.fill(0);
         for &slot in visible {
-            if let Some(word) = set.get_mut(slot as usize / 64) {
-                *word |= 1 << (slot % 64);
+            if let Some(word) = set.get_mut(slot.index() / 64) {
+                *word |= 1 << (slot.get() % 64);
             }
         }
         self.len += 1;
@@ -152,7 +152,7 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// The next slot that is due, at or after `from`; it is due no longer.
-    pub(super) fn take_due(&mut self, from: u32) -> Option<u32> {
+    pub(super) fn take_due(&mut self, from: u32) -> Option<Slot> {
         let first = from as usize / 64;
         for (i, word) in self.due.iter_mut().enumerate().skip(first) {
             let below = if i == first { (1 << (from % 64)) - 1 } else { 0 };
@@ -160,7 +160,7 @@ impl<'s> VisibleHistory<'s> {
             if bits != 0 {
                 let bit = bits.trailing_zeros();
                 *word &= !(1 << bit);
-                return Some(i as u32 * 64 + bit);
+                return Some(Slot::new(i as u32 * 64 + bit));
             }
         }
         None

@@ -1,13 +1,13 @@
 //! From block coordinates to the block's slot: a hash table whose entries are integers.
 //!
-//! The table is `hashbrown::HashTable<u32>`: entries are slots of the block pool, keys stay in the pool. It is built once, in the slab,
+//! The table is `hashbrown::HashTable<Slot>`: entries are slots of the block pool, keys stay in the pool. It is built once, in the slab,
 //! for twice the blocks it will ever hold, so that deletion debris is cleaned in place and no second allocation is asked for; one that
 //! was would be refused and reported as [`Full`]. Nothing iterates the table, so its order is never observable.
 //!
 //! Memory: 5 bytes a bucket; buckets are the power of two at or above 16/7 of the blocks.
 
 use super::BlockCoord;
-use crate::memory::{Carver, Full, OneShot, region_bytes};
+use crate::memory::{Carver, Full, OneShot, Slot, region_bytes};
 use hashbrown::HashTable;
 
 /// Room for the control group that hashbrown appends, and for aligning the control bytes.
@@ -15,7 +15,7 @@ const GROUP_BYTES: usize = 64;
 
 /// The index.
 pub struct BlockIndex<'s> {
-    table: HashTable<u32, OneShot<'s>>,
+    table: HashTable<Slot, OneShot<'s>>,
 }
 
 impl core::fmt::Debug for BlockIndex<'_> {
@@ -30,11 +30,6 @@ pub(super) fn hash(coord: BlockCoord) -> u64 {
     let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     mixed ^ (mixed >> 29)
-}
-
-/// Where the block in `slot` lies, for a slot that may be stale.
-fn coord_of(coords: &[[i16; 4]], slot: u32) -> Option<BlockCoord> {
-    coords.get(slot as usize).copied().map(BlockCoord::unpacked)
 }
 
 impl<'s> BlockIndex<'s> {
@@ -68,26 +63,26 @@ impl<'s> BlockIndex<'s> {
         self.table.is_empty()
     }
 
-    /// The slot of the block at `coord`; `coords` are the pool's.
+    /// The slot of the block at `coord`; `coord_of` tells where the block in a slot lies.
     #[inline]
-    pub fn find(&self, coords: &[[i16; 4]], coord: BlockCoord) -> Option<u32> {
-        self.table.find(hash(coord), |&slot| coord_of(coords, slot) == Some(coord)).copied()
+    pub fn find(&self, coord: BlockCoord, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> Option<Slot> {
+        self.table.find(hash(coord), |&slot| coord_of(slot) == Some(coord)).copied()
     }
 
     /// As [`BlockIndex::find`], and with how many blocks' coordinates were compared: 1 where nothing collides.
     #[inline]
-    pub fn probe(&self, coords: &[[i16; 4]], coord: BlockCoord) -> (Option<u32>, u32) {
+    pub fn probe(&self, coord: BlockCoord, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> (Option<Slot>, u32) {
         let mut compared = 0;
-        let same = |&slot: &u32| {
+        let same = |&slot: &Slot| {
             compared += 1;
-            coord_of(coords, slot) == Some(coord)
+            coord_of(slot) == Some(coord)
         };
         (self.table.find(hash(coord), same).copied(), compared)
     }
 
-    /// Enters `slot`, which must hold the coordinates `coord` in `coords` and not be entered yet.
-    pub fn insert(&mut self, coords: &[[i16; 4]], coord: BlockCoord, slot: u32) -> Result<(), Full> {
-        let rehash = |&slot: &u32| coord_of(coords, slot).map_or(0, hash);
+    /// Enters `slot`, whose block `coord_of` must say lies at `coord`, and which must not be in the index yet.
+    pub fn insert(&mut self, coord: BlockCoord, slot: Slot, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> Result<(), Full> {
+        let rehash = |&slot: &Slot| coord_of(slot).map_or(0, hash);
         self.table.try_reserve(1, rehash).map_err(|_| Full)?;
         // Known from the line above to the table, but not to the compiler, which else keeps the way to a panic.
         if self.table.capacity() == self.table.len() {
@@ -98,8 +93,8 @@ impl<'s> BlockIndex<'s> {
     }
 
     /// Strikes the block at `coord`. Whether it was there.
-    pub fn remove(&mut self, coords: &[[i16; 4]], coord: BlockCoord) -> bool {
-        match self.table.find_entry(hash(coord), |&slot| coord_of(coords, slot) == Some(coord)) {
+    pub fn remove(&mut self, coord: BlockCoord, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> bool {
+        match self.table.find_entry(hash(coord), |&slot| coord_of(slot) == Some(coord)) {
             Ok(entry) => {
                 entry.remove();
                 true
@@ -124,29 +119,29 @@ mod tests {
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
         let mut carver = Carver::new(&mut bytes[start..], BlockIndex::bytes(BLOCKS)).unwrap();
         let mut index = BlockIndex::new_in(BLOCKS, &mut carver);
-        let mut coords = [[0i16; 4]; BLOCKS];
-        let mut free: Vec<u32> = (0..BLOCKS as u32).collect();
+        let mut coords = [BlockCoord::default(); BLOCKS];
+        let mut free: Vec<Slot> = (0..BLOCKS as u32).map(Slot::new).collect();
         let mut model = BTreeMap::new();
         let mut random = Random::new(5);
         for _ in 0..200_000 {
             let [x, y, z] = [(); 3].map(|()| random.below(14) as i32 - 7);
             let coord = BlockCoord::new(x, y, z).unwrap();
             if let Some(slot) = model.remove(&coord) {
-                assert_eq!(index.find(&coords, coord), Some(slot));
-                assert!(index.remove(&coords, coord));
+                assert_eq!(index.find(coord, |slot| Some(coords[slot.index()])), Some(slot));
+                assert!(index.remove(coord, |slot| Some(coords[slot.index()])));
                 free.push(slot);
             } else if let Some(slot) = free.pop() {
-                coords[slot as usize] = coord.packed();
-                index.insert(&coords, coord, slot).unwrap();
+                coords[slot.index()] = coord;
+                index.insert(coord, slot, |slot| Some(coords[slot.index()])).unwrap();
                 model.insert(coord, slot);
             }
-            let (found, compared) = index.probe(&coords, coord);
+            let (found, compared) = index.probe(coord, |slot| Some(coords[slot.index()]));
             assert_eq!(found, model.get(&coord).copied());
             assert!(compared >= u32::from(found.is_some()) && compared < 64, "{compared} blocks compared");
             assert_eq!(index.len(), model.len());
         }
         for (&coord, &slot) in &model {
-            assert_eq!(index.find(&coords, coord), Some(slot));
+            assert_eq!(index.find(coord, |slot| Some(coords[slot.index()])), Some(slot));
         }
     }
 }

@@ -36,7 +36,7 @@ pub use store::{BlockStore, EvictionReport, LeavingBlock, NoStore, ReturningBloc
 pub use viewpoint::Viewpoint;
 pub use visible::VisibleList;
 
-use crate::memory::{Capacity, Carver, Footprint, SlotPool};
+use crate::memory::{Capacity, Carver, Footprint, Slot, SlotPool};
 
 /// A map of blocks.
 #[derive(Debug)]
@@ -69,7 +69,7 @@ impl<'s> Volume<'s> {
         Self {
             config: *config,
             index: BlockIndex::new_in(capacity.blocks, carver),
-            pool: SlotPool::new_in(carver, capacity.blocks, ["volume.generation", "volume.free"]),
+            pool: SlotPool::new_in(carver, capacity.blocks, ["volume.live", "volume.free"]),
             blocks: Blocks::new_in(capacity, carver),
             visible: VisibleList::new_in(capacity, carver),
             seen: allocate::Seen::new_in(carver),
@@ -105,8 +105,8 @@ impl<'s> Volume<'s> {
     }
 
     /// The block at `coord`.
-    pub fn find(&self, coord: BlockCoord) -> Option<u32> {
-        self.index.find(self.blocks.coord, coord)
+    pub fn find(&self, coord: BlockCoord) -> Option<Slot> {
+        self.index.find(coord, |slot| self.blocks.coord(slot))
     }
 
     /// A reader of single voxels.
@@ -120,32 +120,22 @@ impl<'s> Volume<'s> {
     }
 
     /// Sums a block up anew after its content changed, and corrects the map's digest by the difference.
-    fn sum_up(&mut self, slot: u32) {
-        let at = slot as usize;
-        let (Some(coord), Some(sdf), Some(weight), Some(digest), Some(faintest)) = (
-            self.blocks.coord(slot),
-            self.blocks.sdf.get(at),
-            self.blocks.weight.get(at),
-            self.blocks.digest.get_mut(at),
-            self.blocks.faintest.get_mut(at),
-        ) else {
-            return;
-        };
-        let new = fuse::block_digest(coord, sdf, weight, self.blocks.colour.get(at));
-        self.digest = self.digest.wrapping_sub(*digest).wrapping_add(new);
-        *digest = new;
-        *faintest = block::faintest_weight(weight);
+    fn sum_up(&mut self, slot: Slot) {
+        let at = slot.index();
+        if let (Some(header), Some(voxels)) = (self.blocks.header.get_mut(at), self.blocks.voxels.get(at)) {
+            let new = fuse::block_digest(header.coord(), voxels, self.blocks.colour.get(at));
+            self.digest = self.digest.wrapping_sub(header.digest).wrapping_add(new);
+            header.digest = new;
+            header.min_weight = block::least_weight(&voxels.weight);
+        }
     }
 
     /// Enters what is in use into a footprint.
     pub fn note_use(&self, footprint: &mut Footprint) {
         let (now, peak) = (self.pool.len(), self.pool.peak());
-        footprint.set_use::<[i16; 4]>("volume.coord", now, peak);
-        footprint.set_use::<[i16; BLOCK_VOXELS]>("volume.sdf", now, peak);
-        footprint.set_use::<[u8; BLOCK_VOXELS]>("volume.weight", now, peak);
-        footprint.set_use::<[[u8; BLOCK_VOXELS]; 3]>("volume.colour", now, peak);
-        footprint.set_use::<u64>("volume.digest", now, peak);
-        footprint.set_use::<u8>("volume.faintest", now, peak);
-        footprint.set_use::<u32>("volume.visible", self.visible.slots().len(), self.visible.peak());
+        footprint.set_use::<block::Header>("volume.header", now, peak);
+        footprint.set_use::<block::Voxels>("volume.voxels", now, peak);
+        footprint.set_use::<block::Colour>("volume.colour", now, peak);
+        footprint.set_use::<Slot>("volume.visible", self.visible.slots().len(), self.visible.peak());
     }
 }

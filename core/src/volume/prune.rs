@@ -6,7 +6,8 @@
 //!
 //! Weight 0 is off, bit for bit.
 
-use super::{BLOCK_VOXELS, Volume};
+use super::{BLOCK_VOXELS, Volume, block::Voxels};
+use crate::memory::Slot;
 
 /// What pruning did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,11 +63,11 @@ impl Volume<'_> {
     /// Prunes every block of the map by `prune_weight`, whenever it was seen.
     pub fn prune_whole(&mut self, prune_weight: u8) -> PruneReport {
         let mut report = PruneReport::default();
-        for slot in 0..self.pool.high_water() as u32 {
-            if self.pool.handle(slot).is_some() {
-                let (reset, freed) = self.prune_block(slot, prune_weight);
-                report.add(reset, freed);
-            }
+        let mut from = 0;
+        while let Some(slot) = self.pool.next_live(from) {
+            let (reset, freed) = self.prune_block(slot, prune_weight);
+            report.add(reset, freed);
+            from = slot.get() + 1;
         }
         report
     }
@@ -78,22 +79,20 @@ impl Volume<'_> {
         {
             let (reset, freed) = self.prune_block(slot, self.config.prune_weight);
             report.add(reset, freed);
-            from = slot + 1;
+            from = slot.get() + 1;
         }
         report.carried_over = self.history.due();
     }
 
     /// Resets the faint voxels of a block, and frees it when nothing is left. How many were reset, and whether it was freed.
-    pub(super) fn prune_block(&mut self, slot: u32, prune_weight: u8) -> (u32, bool) {
-        let at = slot as usize;
+    pub(super) fn prune_block(&mut self, slot: Slot, prune_weight: u8) -> (u32, bool) {
+        let at = slot.index();
         // Most blocks are known to hold nothing faint without a look at them.
         let by_distance = self.config.prune_distance > 0.0;
-        if !by_distance && self.blocks.faintest.get(at).is_some_and(|&faintest| faintest > prune_weight) {
+        if !by_distance && self.blocks.header.get(at).is_some_and(|header| header.min_weight > prune_weight) {
             return (0, false);
         }
-        let (Some(sdf), Some(weight)) = (self.blocks.sdf.get_mut(at), self.blocks.weight.get_mut(at)) else {
-            return (0, false);
-        };
+        let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else { return (0, false) };
         let census = Census::of(weight, prune_weight);
         // A block that leaves is not cleared: whoever takes its slot does that.
         if census.kept == 0 {
@@ -113,13 +112,13 @@ impl Volume<'_> {
     }
 
     /// Takes a block out of the map.
-    pub(super) fn free_block(&mut self, slot: u32) {
-        let (Some(handle), Some(coord)) = (self.pool.handle(slot), self.blocks.coord(slot)) else { return };
-        self.index.remove(self.blocks.coord, coord);
-        self.digest = self.digest.wrapping_sub(self.blocks.digest.get(slot as usize).copied().unwrap_or(0));
+    pub(super) fn free_block(&mut self, slot: Slot) {
+        let Some(coord) = self.blocks.coord(slot) else { return };
+        self.index.remove(coord, |slot| self.blocks.coord(slot));
+        self.digest = self.digest.wrapping_sub(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));
         self.history.gone(slot);
         self.recency.strike(slot);
-        self.pool.free(handle);
+        self.pool.free(slot);
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Memory: 8 bytes a block.
 
-use crate::memory::{Carver, region_bytes};
+use crate::memory::{Carver, Slot, region_bytes};
 use crate::snapshot::Archive;
 
 /// The list. Links are slot + 1; 0 is none.
@@ -12,6 +12,11 @@ pub struct Recency<'s> {
     links: &'s mut [[u32; 2]],
     /// Slot + 1 of the block unseen for longest and of the one seen last.
     ends: [u32; 2],
+}
+
+/// What stands for a slot in the list.
+fn link(slot: Slot) -> u32 {
+    slot.get() + 1
 }
 
 const OLDER: usize = 0;
@@ -29,32 +34,32 @@ impl<'s> Recency<'s> {
     }
 
     /// The slot unseen for longest.
-    pub fn oldest(&self) -> Option<u32> {
-        self.ends[OLDER].checked_sub(1)
+    pub fn oldest(&self) -> Option<Slot> {
+        self.ends[OLDER].checked_sub(1).map(Slot::new)
     }
 
     /// Makes `slot` the one seen last; it need not be in the list yet.
-    pub(super) fn touch(&mut self, slot: u32) {
-        if self.ends[NEWER] == slot + 1 {
+    pub(super) fn touch(&mut self, slot: Slot) {
+        if self.ends[NEWER] == link(slot) {
             return;
         }
         self.strike(slot);
         let last = self.ends[NEWER];
-        self.link(slot + 1, [last, 0]);
-        self.set(last, NEWER, slot + 1);
-        self.ends[NEWER] = slot + 1;
+        self.link(link(slot), [last, 0]);
+        self.set(last, NEWER, link(slot));
+        self.ends[NEWER] = link(slot);
     }
 
     /// Takes `slot` out of the list; nothing happens when it is not in it.
-    pub(super) fn strike(&mut self, slot: u32) {
-        let Some(&[older, newer]) = self.links.get(slot as usize) else { return };
-        let alone = self.ends == [slot + 1; 2];
+    pub(super) fn strike(&mut self, slot: Slot) {
+        let Some(&[older, newer]) = self.links.get(slot.index()) else { return };
+        let alone = self.ends == [link(slot); 2];
         if [older, newer] == [0; 2] && !alone {
             return;
         }
         self.set(older, NEWER, newer);
         self.set(newer, OLDER, older);
-        self.link(slot + 1, [0; 2]);
+        self.link(link(slot), [0; 2]);
     }
 
     /// Writes or reads the list, in a pool of which `slots` slots were ever given out.
@@ -94,9 +99,9 @@ mod tests {
         let mut slab = Box::new(Slab([0u8; Recency::bytes(SLOTS as usize)]));
         let len = slab.0.len();
         let mut recency = Recency::new_in(SLOTS as usize, &mut Carver::new(&mut slab.0, len).unwrap());
-        let (mut model, mut random) = (Vec::<u32>::new(), Random::new(1));
+        let (mut model, mut random) = (Vec::<Slot>::new(), Random::new(1));
         for _ in 0..100_000 {
-            let slot = random.below(SLOTS);
+            let slot = Slot::new(random.below(SLOTS));
             model.retain(|&other| other != slot);
             if random.below(3) == 0 {
                 recency.strike(slot);
@@ -108,7 +113,7 @@ mod tests {
             let mut walked = Vec::new();
             let mut at = recency.ends[OLDER];
             while let Some(slot) = at.checked_sub(1) {
-                walked.push(slot);
+                walked.push(Slot::new(slot));
                 at = recency.links[slot as usize][NEWER];
             }
             assert_eq!(walked, model);

@@ -1,6 +1,7 @@
 //! Reading voxels one lattice point after the other, along a ray or around a cell: most reads fall into the block of the last one.
 
 use super::{BlockCoord, BlockIndex, Blocks};
+use crate::memory::Slot;
 
 /// A voxel as it stands in the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +17,7 @@ pub struct VoxelSample {
 pub struct Sampler<'v, 's> {
     index: &'v BlockIndex<'s>,
     blocks: &'v Blocks<'s>,
-    last: Option<(BlockCoord, Option<u32>)>,
+    last: Option<(BlockCoord, Option<Slot>)>,
 }
 
 impl<'v, 's> Sampler<'v, 's> {
@@ -27,11 +28,11 @@ impl<'v, 's> Sampler<'v, 's> {
 
     /// The slot of a block, if the block exists.
     #[inline]
-    pub fn slot(&mut self, coord: BlockCoord) -> Option<u32> {
+    pub fn slot(&mut self, coord: BlockCoord) -> Option<Slot> {
         match self.last {
             Some((last, slot)) if last == coord => slot,
             _ => {
-                let slot = self.index.find(self.blocks.coord, coord);
+                let slot = self.index.find(coord, |slot| self.blocks.coord(slot));
                 self.last = Some((coord, slot));
                 slot
             }
@@ -41,10 +42,10 @@ impl<'v, 's> Sampler<'v, 's> {
     /// The voxel at a lattice point, if it was ever seen.
     #[inline]
     pub fn voxel(&mut self, point: [i32; 3]) -> Option<VoxelSample> {
-        let slot = self.slot(BlockCoord::of_lattice(point)?)? as usize;
+        let slot = self.slot(BlockCoord::of_lattice(point)?)?.index();
         let voxel = ((point[0] & 7) | (point[1] & 7) << 3 | (point[2] & 7) << 6) as usize;
-        let weight = *self.blocks.weight.get(slot)?.get(voxel)?;
-        let sdf = *self.blocks.sdf.get(slot)?.get(voxel)?;
+        let voxels = self.blocks.voxels.get(slot)?;
+        let (sdf, weight) = (*voxels.sdf.get(voxel)?, *voxels.weight.get(voxel)?);
         (weight > 0).then_some(VoxelSample { sdf, weight })
     }
 }

@@ -4,7 +4,8 @@
 //! then the pool is too small for what is in view, and the new block is refused. What is still within the pruning window when it leaves is
 //! pruned first, as it would have been had it stayed. Constant work per block made, whatever the size of the map.
 
-use super::{BLOCK_VOXELS, BlockCoord, Volume, config::WhenFull};
+use super::{BLOCK_VOXELS, BlockCoord, Volume, block::Voxels, config::WhenFull};
+use crate::memory::Slot;
 
 /// A block as it leaves the map.
 #[derive(Clone, Copy, Debug)]
@@ -93,7 +94,7 @@ impl Volume<'_> {
     }
 
     /// What a slot holds.
-    fn leaving(&self, slot: u32) -> Option<LeavingBlock<'_>> {
+    fn leaving(&self, slot: Slot) -> Option<LeavingBlock<'_>> {
         Some(LeavingBlock {
             coord: self.blocks.coord(slot)?,
             sdf: self.blocks.sdf(slot)?,
@@ -105,10 +106,9 @@ impl Volume<'_> {
     /// Lets every block leave, in slot order, as at the end of a drive.
     pub fn stream_out<S: BlockStore>(&mut self, store: &mut S) -> EvictionReport {
         let mut report = EvictionReport::default();
-        for slot in 0..self.pool.high_water() as u32 {
-            if self.pool.handle(slot).is_none() {
-                continue;
-            }
+        let mut from = 0;
+        while let Some(slot) = self.pool.next_live(from) {
+            from = slot.get() + 1;
             match self.leaving(slot) {
                 Some(block) if block.weight.iter().all(|&weight| weight == 0) => report.empty += 1,
                 Some(block) if store.keep(block) => report.kept += 1,
@@ -134,9 +134,9 @@ impl Volume<'_> {
     }
 
     /// Fills a block that was just made with what the store kept of it.
-    pub(super) fn bring_back<S: BlockStore>(&mut self, slot: u32, coord: BlockCoord, store: &mut S) -> bool {
-        let at = slot as usize;
-        let (Some(sdf), Some(weight)) = (self.blocks.sdf.get_mut(at), self.blocks.weight.get_mut(at)) else { return false };
+    pub(super) fn bring_back<S: BlockStore>(&mut self, slot: Slot, coord: BlockCoord, store: &mut S) -> bool {
+        let at = slot.index();
+        let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else { return false };
         let colour = self.blocks.colour.get_mut(at);
         let returned = store.bring_back(ReturningBlock { coord, sdf, weight, colour });
         if returned {

@@ -5,15 +5,15 @@
 //!
 //! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
 
-use crate::memory::{Capacity, Carver, Full, region_bytes};
+use crate::memory::{Capacity, Carver, Full, Slot, region_bytes};
 use crate::snapshot::Archive;
 
 /// This frame's visible slots, each once.
 #[derive(Debug)]
 pub struct VisibleList<'s> {
-    slots: &'s mut [u32],
+    slots: &'s mut [Slot],
     len: usize,
-    before: &'s mut [u32],
+    before: &'s mut [Slot],
     before_len: usize,
     last_visible: &'s mut [u32],
     frame: u32,
@@ -23,7 +23,7 @@ pub struct VisibleList<'s> {
 impl<'s> VisibleList<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
-        2 * region_bytes::<u32>(capacity.visible_blocks) + region_bytes::<u32>(capacity.blocks)
+        2 * region_bytes::<Slot>(capacity.visible_blocks) + region_bytes::<u32>(capacity.blocks)
     }
 
     /// Cuts the lists.
@@ -53,8 +53,8 @@ impl<'s> VisibleList<'s> {
     }
 
     /// Enters a slot unless it is entered already.
-    pub(super) fn mark(&mut self, slot: u32) -> Result<(), Full> {
-        let last = self.last_visible.get_mut(slot as usize).ok_or(Full)?;
+    pub(super) fn mark(&mut self, slot: Slot) -> Result<(), Full> {
+        let last = self.last_visible.get_mut(slot.index()).ok_or(Full)?;
         if *last == self.frame {
             return Ok(());
         }
@@ -68,22 +68,22 @@ impl<'s> VisibleList<'s> {
     }
 
     /// Whether a slot is entered for this frame.
-    pub(super) fn is_marked(&self, slot: u32) -> bool {
-        self.last_visible.get(slot as usize) == Some(&self.frame)
+    pub(super) fn is_marked(&self, slot: Slot) -> bool {
+        self.last_visible.get(slot.index()) == Some(&self.frame)
     }
 
     /// The frame a slot was last entered in.
-    pub(super) fn last_visible(&self, slot: u32) -> u32 {
-        self.last_visible.get(slot as usize).copied().unwrap_or(0)
+    pub(super) fn last_visible(&self, slot: Slot) -> u32 {
+        self.last_visible.get(slot.index()).copied().unwrap_or(0)
     }
 
     /// Whether a slot was entered in this frame or the last.
-    pub(super) fn was_lately(&self, slot: u32) -> bool {
+    pub(super) fn was_lately(&self, slot: Slot) -> bool {
         self.frame.wrapping_sub(self.last_visible(slot)) <= 1
     }
 
     /// Entry `i` of the last frame's list.
-    pub(super) fn before(&self, i: usize) -> Option<u32> {
+    pub(super) fn before(&self, i: usize) -> Option<Slot> {
         self.before.get(..self.before_len)?.get(i).copied()
     }
 
@@ -94,7 +94,7 @@ impl<'s> VisibleList<'s> {
         let most = self.slots.len();
         archive.count(&mut self.peak, most);
         archive.count(&mut self.len, most);
-        archive.u32s(self.slots.get_mut(..self.len).unwrap_or(&mut []));
+        archive.u32s(bytemuck::cast_slice_mut(self.slots.get_mut(..self.len).unwrap_or(&mut [])));
         archive.u32s(self.last_visible.get_mut(..slots).unwrap_or(&mut []));
     }
 
@@ -103,12 +103,12 @@ impl<'s> VisibleList<'s> {
     pub(super) fn sort(&mut self, end: usize) {
         let entered = (0..).zip(self.last_visible.iter().take(end)).filter(|(_, last)| **last == self.frame);
         for (place, (slot, _)) in self.slots.iter_mut().take(self.len).zip(entered) {
-            *place = slot;
+            *place = Slot::new(slot);
         }
     }
 
     /// The slots visible in this frame, ascending.
-    pub fn slots(&self) -> &[u32] {
+    pub fn slots(&self) -> &[Slot] {
         self.slots.get(..self.len).unwrap_or(&[])
     }
 

@@ -27,7 +27,7 @@ impl VolumeCopy {
     pub fn of(volume: &Volume<'_>) -> Self {
         let (pool, blocks) = (volume.pool(), volume.blocks());
         let mut copy = Self { config: *volume.config(), colour: false, blocks: Vec::with_capacity(pool.len()) };
-        for slot in (0..pool.high_water() as u32).filter(|&slot| pool.handle(slot).is_some()) {
+        for slot in pool.live() {
             let colour = blocks.colour(slot);
             copy.colour |= colour.is_some();
             if let (Some(coord), Some(&sdf), Some(&weight)) = (blocks.coord(slot), blocks.sdf(slot), blocks.weight(slot)) {

@@ -95,8 +95,7 @@ impl MeshOutput {
         if shelf.0.as_ref().is_none_or(|file| file.records() == 0 || file.failure().is_some()) {
             mapper.triangles(&mut |triangle| add(&mut ply, triangle));
             let volume = mapper.background();
-            let slots = (0..volume.pool().high_water() as u32).filter(|&slot| volume.pool().handle(slot).is_some());
-            drawn.extend(slots.filter_map(|slot| volume.blocks().coord(slot)));
+            drawn.extend(volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)));
         } else {
             report = mapper.stream_out(&mut shelf);
         }

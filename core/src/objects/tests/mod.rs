@@ -300,7 +300,7 @@ impl Objects<'_> {
     /// Flips a bit of a voxel of the first object with a volume; its id.
     pub(crate) fn flip_voxel(&mut self, voxel: usize, bit: u32) -> Option<u32> {
         let object = self.volumes.objects.iter_mut().find(|object| object.summary.is_some())?;
-        let slot = (0..).find(|&slot| object.volume.pool().handle(slot).is_some())?;
+        let slot = object.volume.pool().live().next()?;
         object.volume.flip(slot, voxel, bit);
         object.summary.map(|summary| summary.id)
     }

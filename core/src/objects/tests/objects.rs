@@ -24,7 +24,7 @@ fn what_was_seen_before_the_motion_was_known_is_fused_when_it_is() {
         assert_eq!((summary.frames, summary.state), (2, State::Dynamic));
         // A board square to the camera: its blocks lie in one layer, however far it drove meanwhile.
         let volume = object.volume();
-        let layers = (0..volume.pool().high_water() as u32).filter_map(|slot| volume.blocks().coord(slot)).map(|coord| coord.z);
+        let layers = volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)).map(|coord| coord.z);
         let (first, last) = (layers.clone().min().unwrap(), layers.max().unwrap());
         assert!(last - first <= 2, "{first} to {last}");
     });

@@ -11,7 +11,7 @@ const WIDE: Board = Board { half_m: [1.6, 0.5], ..Board::CAR };
 fn content(instances: &Instances<'_>) -> (Vec<BlockCoord>, u8) {
     let Some((_, object)) = instances.objects().next() else { return (Vec::new(), 0) };
     let blocks = object.volume().blocks();
-    let slots = || (0..object.volume().pool().high_water() as u32).filter(|slot| object.volume().pool().handle(*slot).is_some());
+    let slots = || object.volume().pool().live();
     let heaviest = slots().filter_map(|slot| blocks.weight(slot)?.iter().max().copied()).max();
     (slots().filter_map(|slot| blocks.coord(slot)).collect(), heaviest.unwrap_or(0))
 }

@@ -16,7 +16,10 @@ mod tests;
 
 pub use config::MeshConfig;
 
-use crate::volume::{BLOCK_SIDE, BlockCoord, Blocks, Volume};
+use crate::{
+    memory::Slot,
+    volume::{BLOCK_SIDE, BlockCoord, Blocks, Volume},
+};
 use cases::{CASES, EDGE_START, edge_axis};
 
 /// Lattice points along a block's side, with those of the next block that its last cells need.
@@ -50,10 +53,8 @@ impl Volume<'_> {
     /// piece: a block's triangles need the blocks after it on each axis, and no more.
     pub fn triangles_of(&self, config: &MeshConfig, wanted: impl Fn(BlockCoord) -> bool, sink: &mut impl FnMut(Triangle)) -> u64 {
         let mut count = 0;
-        for slot in 0..self.pool().high_water() as u32 {
-            if let (Some(_), Some(coord)) = (self.pool().handle(slot), self.blocks().coord(slot))
-                && wanted(coord)
-            {
+        for slot in self.pool().live() {
+            if let Some(coord) = self.blocks().coord(slot).filter(|&coord| wanted(coord)) {
                 let patch = Patch::load(self, slot, coord, config.min_weight);
                 patch.cells(|cell, inside| count += patch.polygonise(cell, inside, sink));
             }
@@ -66,7 +67,7 @@ impl Volume<'_> {
 struct Patch<'v, 's> {
     blocks: &'v Blocks<'s>,
     /// Slots of the block (0) and of those after it in x (1), y (2), z (4) and combinations.
-    slots: [Option<u32>; 8],
+    slots: [Option<Slot>; 8],
     origin: [i32; 3],
     voxel_size_m: f32,
     /// Distances by `x + 9 y + 81 z`.
@@ -74,7 +75,7 @@ struct Patch<'v, 's> {
 }
 
 impl<'v, 's> Patch<'v, 's> {
-    fn load(volume: &'v Volume<'s>, slot: u32, coord: BlockCoord, min_weight: u8) -> Self {
+    fn load(volume: &'v Volume<'s>, slot: Slot, coord: BlockCoord, min_weight: u8) -> Self {
         let mut slots = [None; 8];
         for (n, entry) in (0i32..).zip(&mut slots) {
             let beside = || volume.find(coord.offset([n & 1, n >> 1 & 1, n >> 2])?);

@@ -6,7 +6,10 @@ use super::{
     spot::{CORNER_STRIDES, Spot, WALLS, Wall},
     surface::Surface,
 };
-use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks};
+use crate::{
+    memory::Slot,
+    volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks},
+};
 
 /// Most blocks one ray visits.
 const MAX_BLOCKS: usize = 6 * super::eye::MAX_REACH_BLOCKS as usize;
@@ -36,7 +39,7 @@ pub(super) struct Marcher<'a, 's> {
 struct Here<'a> {
     ray: &'a Ray,
     /// The slots of the block (0) and of those after it.
-    slots: &'a [u32; 8],
+    slots: &'a [Slot; 8],
     /// Distances of the block.
     sdf: &'a [i16; BLOCK_VOXELS],
     /// Where the ray would be at depth 0, from the block's first cell.
@@ -73,7 +76,7 @@ struct Trail {
 
 /// Where the surface was met.
 struct Crossing<'a> {
-    slots: &'a [u32; 8],
+    slots: &'a [Slot; 8],
     spot: Spot,
     /// The field's gradient there.
     gradient: [f32; 3],
@@ -242,7 +245,7 @@ impl Marcher<'_, '_> {
     }
 
     #[inline]
-    fn is_seen(&self, slot: u32, voxel: usize) -> bool {
+    fn is_seen(&self, slot: Slot, voxel: usize) -> bool {
         self.blocks.weight(slot).and_then(|weights| weights.get(voxel)).is_some_and(|&weight| weight >= self.min_weight)
     }
 

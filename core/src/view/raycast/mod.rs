@@ -34,7 +34,7 @@ pub use config::RaycastConfig;
 use crate::{
     geometry::scalar::min_f32,
     image::View,
-    memory::{Capacity, Carver, Footprint, region_bytes},
+    memory::{Capacity, Carver, Footprint, Slot, region_bytes},
     parallel::{Executor, each},
     volume::{Viewpoint, Volume},
 };
@@ -252,7 +252,7 @@ impl<'s> Raycaster<'s> {
     pub fn note_use(&self, footprint: &mut Footprint) {
         let (now, peak) = (self.surface.len(), self.peak_blocks);
         footprint.set_use::<[i32; 3]>("raycast.local", now, peak);
-        footprint.set_use::<[u32; 8]>("raycast.slots", now, peak);
+        footprint.set_use::<[Slot; 8]>("raycast.slots", now, peak);
         footprint.set_use::<[signs::Layers; 2]>("raycast.signs", now, peak);
         footprint.set_use::<signs::Cells>("raycast.cells", now, peak);
     }

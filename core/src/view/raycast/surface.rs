@@ -8,13 +8,13 @@ use super::{
     signs::{self, Cells},
 };
 use crate::{
-    memory::{Capacity, Carver, region_bytes},
+    memory::{Capacity, Carver, Slot, region_bytes},
     parallel::{Bands, Executor, each, zip2},
     volume::{BLOCK_SIDE, Volume},
 };
 
 /// No block.
-pub(super) const NONE: u32 = u32::MAX;
+pub(super) const NONE: Slot = Slot::new(u32::MAX);
 /// Parts of the far limit by which it is shortened when more blocks are in view than there is room for.
 const RANGE_STEPS: usize = 64;
 
@@ -24,7 +24,7 @@ pub(super) struct Surface<'s> {
     /// Block coordinates relative to the camera's block.
     local: &'s mut [[i32; 3]],
     /// The block's own slot and those of the blocks after it in x (1), y (2), z (4); [`NONE`] where there is none.
-    slots: &'s mut [[u32; 8]],
+    slots: &'s mut [[Slot; 8]],
     signs: &'s mut [[signs::Layers; 2]],
     cells: &'s mut [Cells],
     /// Keys and entries, an open-addressed hash table with linear probes.
@@ -61,7 +61,7 @@ impl<'s> Surface<'s> {
     pub const fn bytes(capacity: &Capacity) -> usize {
         let entries = capacity.visible_blocks;
         region_bytes::<[i32; 3]>(entries)
-            + region_bytes::<[u32; 8]>(entries)
+            + region_bytes::<[Slot; 8]>(entries)
             + region_bytes::<[signs::Layers; 2]>(entries)
             + region_bytes::<Cells>(entries)
             + region_bytes::<u64>(Self::table_len(entries))
@@ -94,8 +94,7 @@ impl<'s> Surface<'s> {
     fn cull(&mut self, volume: &Volume<'_>, eye: &Eye, [near_m, far_m]: [f32; 2]) -> InView {
         // Cells of the block before this one end at this block's first points: the box is one longer on that side.
         let half = (BLOCK_SIDE as f32 + 1.0) * 0.5;
-        let blocks = (0..volume.pool().high_water() as u32).filter_map(|slot| {
-            volume.pool().handle(slot)?;
+        let blocks = volume.pool().live().filter_map(|slot| {
             let local = eye.local(volume.blocks().coord(slot)?)?;
             let center = local.map(|c| (c * BLOCK_SIDE as i32) as f32 + half - 1.0);
             Some((slot, local, eye.extent(center, [half; 3], near_m, far_m)?.depth_m[0]))
@@ -123,7 +122,7 @@ impl<'s> Surface<'s> {
         InView { blocks: count, far_m }
     }
 
-    fn enter(&mut self, slot: u32, block: [i32; 3]) {
+    fn enter(&mut self, slot: Slot, block: [i32; 3]) {
         if let (Some(local), Some(slots)) = (self.local.get_mut(self.len), self.slots.get_mut(self.len)) {
             *local = block;
             *slots = [slot, NONE, NONE, NONE, NONE, NONE, NONE, NONE];
@@ -158,7 +157,7 @@ impl<'s> Surface<'s> {
     }
 
     fn read_signs<E: Executor>(&mut self, volume: &Volume<'_>, min_weight: u8, executor: &E) {
-        let read = |(signs, slots): (&mut [[signs::Layers; 2]], &[[u32; 8]])| {
+        let read = |(signs, slots): (&mut [[signs::Layers; 2]], &[[Slot; 8]])| {
             for (signs, [slot, ..]) in signs.iter_mut().zip(slots) {
                 if let (Some(sdf), Some(weight)) = (volume.blocks().sdf(*slot), volume.blocks().weight(*slot)) {
                     *signs = signs::of_block(sdf, weight, min_weight);
@@ -212,7 +211,7 @@ impl<'s> Surface<'s> {
 
     /// The cells of an entry, and the slots around the last corner of its block.
     #[inline]
-    pub fn block(&self, entry: usize) -> Option<(&Cells, &[u32; 8])> {
+    pub fn block(&self, entry: usize) -> Option<(&Cells, &[Slot; 8])> {
         Some((self.cells.get(entry)?, self.slots.get(entry)?))
     }
 

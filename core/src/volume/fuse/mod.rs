@@ -15,8 +15,8 @@ mod band;
 mod row;
 
 use self::band::Band;
-use super::block::faintest_weight;
-use super::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, CLASS_COUNT, ObservationWeight, Viewpoint, Volume, VolumeConfig};
+use super::block::{Colour, Voxels, least_weight};
+use super::{BLOCK_SIDE, BlockCoord, CLASS_COUNT, ObservationWeight, Viewpoint, Volume, VolumeConfig};
 use crate::{
     digest::Digest,
     image::View,
@@ -139,36 +139,21 @@ impl Fusion<'_> {
     fn band(&self, band: Band<'_>) -> u64 {
         let mut change = 0u64;
         for &slot in band.slots {
-            let at = (slot as usize).wrapping_sub(band.first);
-            let (Some(coord), Some(sdf), Some(weight), Some(digest), Some(faintest)) = (
-                band.coord.get(slot as usize),
-                band.sdf.get_mut(at),
-                band.weight.get_mut(at),
-                band.digest.get_mut(at),
-                band.faintest.get_mut(at),
-            ) else {
-                continue;
-            };
-            let coord = BlockCoord::unpacked(*coord);
+            let at = slot.index().wrapping_sub(band.first);
+            let (Some(header), Some(voxels)) = (band.header.get_mut(at), band.voxels.get_mut(at)) else { continue };
             let mut colour = band.colour.get_mut(at);
-            if self.block(coord, sdf, weight, colour.as_deref_mut()) {
-                let new = block_digest(coord, sdf, weight, colour.as_deref());
-                change = change.wrapping_add(new).wrapping_sub(*digest);
-                *digest = new;
-                *faintest = faintest_weight(weight);
+            if self.block(header.coord(), voxels, colour.as_deref_mut()) {
+                let new = block_digest(header.coord(), voxels, colour.as_deref());
+                change = change.wrapping_add(new).wrapping_sub(header.digest);
+                header.digest = new;
+                header.min_weight = least_weight(&voxels.weight);
             }
         }
         change
     }
 
     /// Fuses one block. Whether any voxel changed.
-    fn block(
-        &self,
-        coord: BlockCoord,
-        sdf: &mut [i16; BLOCK_VOXELS],
-        weight: &mut [u8; BLOCK_VOXELS],
-        mut colour: Option<&mut [[u8; BLOCK_VOXELS]; 3]>,
-    ) -> bool {
+    fn block(&self, coord: BlockCoord, Voxels { sdf, weight }: &mut Voxels, mut colour: Option<&mut Colour>) -> bool {
         let voxel_m = f64::from(self.config.voxel_size_m);
         let origin_m = Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m));
         let corner = (self.camera_from_world * (origin_m - self.camera.coords)).cast::<f32>();
@@ -188,14 +173,9 @@ impl Fusion<'_> {
 }
 
 /// Digest of a block's place and content.
-pub(super) fn block_digest(
-    coord: BlockCoord,
-    sdf: &[i16; BLOCK_VOXELS],
-    weight: &[u8; BLOCK_VOXELS],
-    colour: Option<&[[u8; BLOCK_VOXELS]; 3]>,
-) -> u64 {
+pub(super) fn block_digest(coord: BlockCoord, Voxels { sdf, weight }: &Voxels, colour: Option<&Colour>) -> u64 {
     let mut digest = Digest::default();
-    digest.u64(coord.packed().iter().fold(0, |place, &along| place << 16 | u64::from(along as u16)));
+    digest.u64([coord.x, coord.y, coord.z, 0].iter().fold(0, |place, &along| place << 16 | u64::from(along as u16)));
     digest.i16s(sdf);
     digest.bytes(weight);
     colour.into_iter().flatten().for_each(|plane| digest.bytes(plane));

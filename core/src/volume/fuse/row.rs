@@ -3,7 +3,7 @@
 use super::{Fusion, SHARES};
 use crate::{
     geometry::scalar::clamp_f32,
-    volume::{BLOCK_SIDE, BLOCK_VOXELS},
+    volume::{BLOCK_SIDE, block::Colour},
 };
 use nalgebra::Vector3;
 
@@ -131,7 +131,7 @@ impl Fusion<'_> {
     }
 
     /// Averages the colours of a row's pixels near the surface in. `weight` is that after this observation.
-    pub(super) fn colour_row(&self, row: usize, near: &Row<u32>, planes: &mut [[u8; BLOCK_VOXELS]; 3], weight: &Row<u8>) {
+    pub(super) fn colour_row(&self, row: usize, near: &Row<u32>, planes: &mut Colour, weight: &Row<u8>) {
         for (i, (&pixel, &weight)) in near.iter().zip(weight).enumerate() {
             if pixel == NO_PIXEL {
                 continue;

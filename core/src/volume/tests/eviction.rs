@@ -164,9 +164,9 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
                     continue;
                 };
                 let old = model.get(&coord).copied().unwrap_or(0);
-                assert_eq!(volume.blocks.weight[slot as usize][7], old, "a block is as it was left, in the map or brought back");
+                assert_eq!(volume.blocks.voxels[slot.index()].weight[7], old, "a block is as it was left, in the map or brought back");
                 if random.below(4) > 0 {
-                    volume.blocks.weight[slot as usize].fill(old.saturating_add(1));
+                    volume.blocks.voxels[slot.index()].weight.fill(old.saturating_add(1));
                     volume.sum_up(slot);
                     model.insert(coord, old.saturating_add(1));
                 }
@@ -177,9 +177,7 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
             assert_eq!(volume.pool.len(), volume.index.len());
         }
         let stored = shelf.blocks.iter().map(|(&coord, kept)| (coord, kept.weight[7]));
-        let live = (0..volume.pool.high_water() as u32)
-            .filter(|&slot| volume.pool.handle(slot).is_some())
-            .map(|slot| (volume.blocks.coord(slot).unwrap(), volume.blocks.weight[slot as usize][7]));
+        let live = volume.pool.live().map(|slot| (volume.blocks.coord(slot).unwrap(), volume.blocks.voxels[slot.index()].weight[7]));
         let all: BTreeMap<_, _> = stored.chain(live).filter(|(_, weight)| *weight > 0).collect();
         assert_eq!(all, model);
     });

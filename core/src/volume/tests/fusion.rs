@@ -1,6 +1,7 @@
 //! Allocation and fusion.
 
 use super::*;
+use crate::volume::block::Voxels;
 use nalgebra::Point3;
 use std::collections::BTreeSet;
 
@@ -133,12 +134,14 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
                 }
                 digests.push(volume.digest());
             }
-            let of_content = (0..volume.pool().high_water() as u32)
+            let of_content = volume
+                .pool()
+                .live()
                 .filter(|&slot| volume.blocks().weight(slot).unwrap().iter().any(|&weight| weight > 0))
                 .map(|slot| {
                     let blocks = volume.blocks();
                     let coord = blocks.coord(slot).unwrap();
-                    fuse::block_digest(coord, blocks.sdf(slot).unwrap(), blocks.weight(slot).unwrap(), blocks.colour(slot))
+                    fuse::block_digest(coord, &blocks.voxels[slot.index()], blocks.colour(slot))
                 })
                 .fold(0u64, u64::wrapping_add);
             assert_eq!(volume.digest(), of_content);
@@ -153,11 +156,11 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
 #[test]
 fn blocks_that_swap_their_contents_or_their_planes_change_the_sum_of_digests() {
     let places = [BlockCoord { x: 1, y: -2, z: 300 }, BlockCoord { x: -2, y: 1, z: 300 }];
-    let contents = [([5; BLOCK_VOXELS], [3; BLOCK_VOXELS]), ([-5; BLOCK_VOXELS], [4; BLOCK_VOXELS])];
+    let contents = [(5, 3), (-5, 4)].map(|(sdf, weight)| Voxels { sdf: [sdf; BLOCK_VOXELS], weight: [weight; BLOCK_VOXELS] });
     let planes = [[0; BLOCK_VOXELS], [1; BLOCK_VOXELS], [2; BLOCK_VOXELS]];
     let sum = |order: [usize; 2], planes: &[[u8; BLOCK_VOXELS]; 3]| {
         let blocks = places.iter().zip(order.map(|at| &contents[at]));
-        blocks.map(|(&place, (sdf, weight))| fuse::block_digest(place, sdf, weight, Some(planes))).fold(0u64, u64::wrapping_add)
+        blocks.map(|(&place, voxels)| fuse::block_digest(place, voxels, Some(planes))).fold(0u64, u64::wrapping_add)
     };
     let swapped = [planes[1], planes[0], planes[2]];
     let sums = [sum([0, 1], &planes), sum([1, 0], &planes), sum([0, 0], &planes), sum([1, 1], &planes), sum([0, 1], &swapped)];
@@ -175,7 +178,7 @@ fn a_full_pool_refuses_and_counts_and_keeps_what_it_has() {
                 assert_eq!(volume.pool().len(), blocks);
                 assert_eq!(volume.visible().slots().len(), blocks);
             }
-            let seen = (0..blocks as u32).filter(|&slot| volume.blocks().weight(slot).unwrap().contains(&3)).count();
+            let seen = (0..blocks as u32).map(Slot::new).filter(|&slot| volume.blocks().weight(slot).unwrap().contains(&3)).count();
             assert!(seen > 0, "the blocks there are keep being fused");
         });
     }

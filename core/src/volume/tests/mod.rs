@@ -68,16 +68,16 @@ fn fuse_once(volume: &mut Volume<'_>, view: &Viewpoint, depth_m: &[f32], grey: &
 
 impl Volume<'_> {
     /// Flips a bit of a voxel, 0 to 15 of its distance, 16 to 23 of its weight, and lets the digest know.
-    pub(crate) fn flip(&mut self, slot: u32, voxel: usize, bit: u32) {
+    pub(crate) fn flip(&mut self, slot: Slot, voxel: usize, bit: u32) {
         self.flip_behind_its_back(slot, voxel, bit);
         self.sum_up(slot);
     }
 
     /// The same as a fault of the memory would do it.
-    pub(crate) fn flip_behind_its_back(&mut self, slot: u32, voxel: usize, bit: u32) {
+    pub(crate) fn flip_behind_its_back(&mut self, slot: Slot, voxel: usize, bit: u32) {
         match bit {
-            0..16 => self.blocks.sdf[slot as usize][voxel] ^= 1 << bit,
-            _ => self.blocks.weight[slot as usize][voxel] ^= 1 << (bit - 16),
+            0..16 => self.blocks.voxels[slot.index()].sdf[voxel] ^= 1 << bit,
+            _ => self.blocks.voxels[slot.index()].weight[voxel] ^= 1 << (bit - 16),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::random::Random;
+use crate::volume::block::Voxels;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A config that prunes weights up to `prune_weight` after `prune_lag` frames.
@@ -10,19 +11,19 @@ fn pruning(prune_weight: u8, prune_lag: u32) -> VolumeConfig {
 }
 
 /// Makes a block whose voxels all have that weight, with its digest entered.
-fn plant(volume: &mut Volume<'_>, coord: BlockCoord, weight: impl Fn(usize) -> u8) -> u32 {
+fn plant(volume: &mut Volume<'_>, coord: BlockCoord, weight: impl Fn(usize) -> u8) -> Slot {
     let slot = volume.make(coord).unwrap();
-    let at = slot as usize;
+    let at = slot.index();
     for voxel in 0..BLOCK_VOXELS {
-        volume.blocks.weight[at][voxel] = weight(voxel);
-        volume.blocks.sdf[at][voxel] = 100 + voxel as i16;
+        volume.blocks.voxels[at].weight[voxel] = weight(voxel);
+        volume.blocks.voxels[at].sdf[voxel] = 100 + voxel as i16;
     }
     volume.sum_up(slot);
     slot
 }
 
 /// One frame in which exactly these blocks are visible.
-fn frame(volume: &mut Volume<'_>, slots: &[u32]) -> PruneReport {
+fn frame(volume: &mut Volume<'_>, slots: &[Slot]) -> PruneReport {
     volume.visible.begin_frame();
     slots.iter().for_each(|&slot| volume.visible.mark(slot).unwrap());
     volume.visible.sort(volume.pool.high_water());
@@ -37,9 +38,10 @@ fn coords(from: i32, count: i32) -> Vec<BlockCoord> {
 fn frees_faint_blocks_lag_frames_after_they_were_seen_and_leaves_the_others_alone() {
     with_volume(&CAPACITY, &pruning(2, 10), |volume| {
         volume.visible.begin_frame();
-        let faint: Vec<u32> = coords(0, 60).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
-        let firm: Vec<u32> = coords(100, 40).into_iter().map(|coord| plant(volume, coord, |_| 5)).collect();
-        let before: Vec<_> = firm.iter().map(|&slot| (volume.blocks.sdf[slot as usize], volume.blocks.weight[slot as usize])).collect();
+        let faint: Vec<Slot> = coords(0, 60).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
+        let firm: Vec<Slot> = coords(100, 40).into_iter().map(|coord| plant(volume, coord, |_| 5)).collect();
+        let before: Vec<_> =
+            firm.iter().map(|&slot| (volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight)).collect();
         faint.iter().chain(&firm).for_each(|&slot| volume.visible.mark(slot).unwrap());
         volume.visible.sort(volume.pool.high_water());
         assert_eq!(volume.prune(), PruneReport::default());
@@ -60,7 +62,7 @@ fn frees_faint_blocks_lag_frames_after_they_were_seen_and_leaves_the_others_alon
         );
         assert_eq!((volume.pool.len(), volume.index.len()), (40, 40));
         for (&slot, before) in firm.iter().zip(&before) {
-            assert_eq!((volume.blocks.sdf[slot as usize], volume.blocks.weight[slot as usize]), *before);
+            assert_eq!((volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight), *before);
         }
         let digest = volume.digest();
         coords(0, 60).into_iter().for_each(|coord| {
@@ -78,17 +80,16 @@ fn a_half_noisy_block_keeps_its_good_voxels() {
     with_volume(&CAPACITY, &pruning(1, 1), |volume| {
         volume.visible.begin_frame();
         let slot = plant(volume, BlockCoord::default(), |voxel| if voxel % 2 == 0 { 1 } else { 2 });
-        let planes = &mut volume.blocks.colour[slot as usize];
+        let planes = &mut volume.blocks.colour[slot.index()];
         planes.iter_mut().for_each(|plane| plane.fill(9));
         frame(volume, &[slot]);
         let report = frame(volume, &[]);
         assert_eq!((report.voxels_reset, report.blocks_freed), (256, 0));
         for voxel in 0..BLOCK_VOXELS {
-            let here = (volume.blocks.weight[0][voxel], volume.blocks.sdf[0][voxel], volume.blocks.colour[0][2][voxel]);
+            let here = (volume.blocks.voxels[0].weight[voxel], volume.blocks.voxels[0].sdf[voxel], volume.blocks.colour[0][2][voxel]);
             assert_eq!(here, if voxel % 2 == 0 { (0, 0, 0) } else { (2, 100 + voxel as i16, 9) });
         }
-        let content =
-            fuse::block_digest(BlockCoord::default(), &volume.blocks.sdf[0], &volume.blocks.weight[0], volume.blocks.colour.first());
+        let content = fuse::block_digest(BlockCoord::default(), &volume.blocks.voxels[0], volume.blocks.colour.first());
         assert_eq!(volume.digest(), content);
     });
 }
@@ -99,7 +100,7 @@ fn a_block_far_from_any_surface_goes_only_when_asked() {
         with_volume(&CAPACITY, &VolumeConfig { prune_distance, ..pruning(1, 1) }, |volume| {
             volume.visible.begin_frame();
             let slot = plant(volume, BlockCoord::default(), |_| 9);
-            volume.blocks.sdf[slot as usize].fill(-16_384);
+            volume.blocks.voxels[slot.index()].sdf.fill(-16_384);
             frame(volume, &[slot]);
             frame(volume, &[]);
             assert_eq!(volume.pool.len(), left, "at {prune_distance}");
@@ -121,12 +122,12 @@ fn blocks_left_unread_are_those_with_nothing_faint() {
                         fuse_once(volume, &view([0.0; 3], [0.0; 3]), depth_m, &grey);
                     }
                 }
-                for (slot, weight) in volume.blocks.weight.iter().enumerate().take(volume.pool.high_water()) {
+                for (slot, Voxels { weight, .. }) in volume.blocks.voxels.iter().enumerate().take(volume.pool.high_water()) {
                     let least = weight.iter().copied().filter(|&weight| weight > 0).min().unwrap_or(0);
-                    assert_eq!(volume.blocks.faintest[slot], least, "slot {slot}");
+                    assert_eq!(volume.blocks.header[slot].min_weight, least, "slot {slot}");
                 }
                 if !known {
-                    volume.blocks.faintest.fill(0);
+                    volume.blocks.header.iter_mut().for_each(|header| header.min_weight = 0);
                 }
                 digests.push((volume.prune_whole(prune_weight), volume.digest(), volume.pool.len()));
             });
@@ -139,7 +140,7 @@ fn blocks_left_unread_are_those_with_nothing_faint() {
 fn visits_no_more_blocks_a_frame_than_allowed_and_forgets_none() {
     with_volume(&CAPACITY, &VolumeConfig { prune_blocks_per_frame: 7, ..pruning(1, 2) }, |volume| {
         volume.visible.begin_frame();
-        let slots: Vec<u32> = coords(0, 30).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
+        let slots: Vec<Slot> = coords(0, 30).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
         frame(volume, &slots);
         frame(volume, &[]);
         let visited: Vec<_> = (0..6).map(|_| frame(volume, &[])).map(|report| (report.visited, report.carried_over)).collect();
@@ -177,7 +178,7 @@ fn weight_zero_is_off() {
 fn finish_prunes_what_is_still_in_the_window() {
     with_volume(&CAPACITY, &pruning(1, 50), |volume| {
         volume.visible.begin_frame();
-        let slots: Vec<u32> = coords(0, 5).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
+        let slots: Vec<Slot> = coords(0, 5).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
         frame(volume, &slots);
         assert_eq!(volume.finish().blocks_freed, 5);
         assert_eq!((volume.digest(), volume.pool.len(), volume.history.len()), (0, 0, 0));
@@ -188,7 +189,7 @@ fn finish_prunes_what_is_still_in_the_window() {
 #[derive(Default)]
 struct Model {
     seen: BTreeMap<u32, BTreeSet<(BlockCoord, u32)>>,
-    alive: BTreeMap<BlockCoord, (u32, u32)>,
+    alive: BTreeMap<BlockCoord, (Slot, u32)>,
 }
 
 #[test]
@@ -284,7 +285,7 @@ fn six_blocks_of_one_bucket_can_be_struck_in_any_order() {
         }
         assert_eq!(orders.len(), 720);
         for order in orders {
-            let slots: Vec<u32> = mates.iter().map(|&coord| volume.make(coord).unwrap()).collect();
+            let slots: Vec<Slot> = mates.iter().map(|&coord| volume.make(coord).unwrap()).collect();
             for (struck, &which) in order.iter().enumerate() {
                 volume.free_block(slots[which]);
                 for (i, (&coord, &slot)) in mates.iter().zip(&slots).enumerate() {
