@@ -13,10 +13,8 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod config;
 pub mod digest;
 pub mod egomotion;
-pub mod frame;
 pub mod geometry;
 pub mod image;
 pub mod mapper;
@@ -27,20 +25,17 @@ pub mod parallel;
 pub mod problem;
 pub mod random;
 pub mod rectify;
-pub mod report;
 pub mod scene_flow;
 pub mod snapshot;
-pub mod stage_digests;
 pub mod stereo;
 pub mod tracking;
 pub mod view;
 pub mod volume;
 
-pub use config::Config;
-pub use frame::StereoFrame;
-pub use mapper::{Mapper, NewError, StepError};
+pub use mapper::{
+    BlockCount, Config, Digested, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report, Severity,
+    StageDigests, StepError, StereoFrame,
+};
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial, Stage};
 pub use problem::{Problem, Problems};
-pub use report::{PoseOrigin, Report, Severity};
-pub use stage_digests::{Digested, StageDigests};

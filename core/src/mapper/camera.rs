@@ -1,14 +1,12 @@
 //! The camera's way from one frame to the next, wherever it comes from.
 
-use super::{Mapper, MotionSource};
+use super::{Mapper, MotionSource, PoseOrigin, StereoFrame};
 use crate::{
     egomotion::{
         MotionEstimate,
         icp::{self, IcpReport, IcpStatus, MapPicture},
     },
-    frame::StereoFrame,
     parallel::Executor,
-    report::PoseOrigin,
     volume::Viewpoint,
 };
 

@@ -1,38 +1,75 @@
-//! Settings of the loop.
+//! The one configuration, and what can be wrong with it.
 
-use crate::problem::{Problems, require};
+use super::MapperConfig;
+use crate::{
+    egomotion::{EgomotionConfig, icp::IcpConfig},
+    geometry::{RigProblem, StereoRig},
+    problem::{Problems, require},
+    scene_flow::SceneFlowConfig,
+    stereo::StereoConfig,
+    tracking::InstancesConfig,
+    view::{MeshConfig, RaycastConfig},
+    volume::VolumeConfig,
+};
 
-/// Where the camera's motion comes from, unless a frame brings its pose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum MotionSource {
-    /// From matches over two stereo pairs.
-    #[default]
-    Stereo,
-    /// From depth against the map: the baseline of [`crate::egomotion::icp`].
-    Icp,
+/// Everything a mapper can be told, beside its bounds. Every default stands with its field, in the struct of the stage it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// The cameras.
+    pub rig: StereoRig,
+    /// Stereo matching.
+    pub stereo: StereoConfig,
+    /// Features and their matches over time.
+    pub scene_flow: SceneFlowConfig,
+    /// The camera's motion.
+    pub egomotion: EgomotionConfig,
+    /// The camera's motion from depth, where that is asked for.
+    pub icp: IcpConfig,
+    /// What the loop does, and when.
+    pub mapper: MapperConfig,
+    /// What moves or could.
+    pub instances: InstancesConfig,
+    /// The map.
+    pub volume: VolumeConfig,
+    /// Views of the map.
+    pub raycast: RaycastConfig,
+    /// Its triangles.
+    pub mesh: MeshConfig,
 }
 
-/// What the loop can be told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct MapperConfig {
-    /// Where the camera's motion comes from; `stereo`.
-    pub egomotion: MotionSource,
-    /// Frames from one that is fused to the next: the camera and all tracks are followed in every frame, maps grow in each `fuse_every`-th
-    /// alone, and pruning's lag counts those. 1 and more; 1.
-    pub fuse_every: u32,
-}
-
-impl Default for MapperConfig {
-    fn default() -> Self {
-        Self { egomotion: MotionSource::Stereo, fuse_every: 1 }
+impl Config {
+    /// All defaults, for a rig.
+    pub fn for_rig(rig: StereoRig) -> Self {
+        Self {
+            rig,
+            stereo: StereoConfig::default(),
+            scene_flow: SceneFlowConfig::default(),
+            egomotion: EgomotionConfig::default(),
+            icp: IcpConfig::default(),
+            mapper: MapperConfig::default(),
+            instances: InstancesConfig::default(),
+            volume: VolumeConfig::default(),
+            raycast: RaycastConfig::default(),
+            mesh: MeshConfig::default(),
+        }
     }
-}
 
-impl MapperConfig {
-    /// Notes what is wrong with the settings.
-    pub fn validate(&self, problems: &mut Problems) {
-        require(problems, self.fuse_every >= 1, "mapper.fuse_every", "must be 1 or more");
+    /// Everything wrong with it; empty when nothing is.
+    pub fn validate(&self) -> Problems {
+        let mut problems = Problems::new();
+        let rig = self.rig.validate();
+        require(&mut problems, rig != Err(RigProblem::Focal), "rig.focal_px", "must be a positive number");
+        require(&mut problems, rig != Err(RigProblem::Center), "rig.center_px", "must be finite numbers");
+        require(&mut problems, rig != Err(RigProblem::Baseline), "rig.baseline_m", "must be a positive number");
+        self.stereo.validate(&mut problems);
+        self.scene_flow.validate(&mut problems);
+        self.egomotion.validate(&mut problems);
+        self.icp.validate(&mut problems);
+        self.mapper.validate(&mut problems);
+        self.instances.validate(&mut problems);
+        self.volume.validate(&mut problems);
+        self.raycast.validate(&mut problems);
+        self.mesh.validate(&mut problems);
+        problems
     }
 }

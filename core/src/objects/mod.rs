@@ -20,7 +20,6 @@ pub use report::{InstancesReport, ObjectCount};
 use crate::{
     memory::{Capacity, Carver, Footprint},
     snapshot::Archive,
-    stage_digests::ObjectDigests,
     tracking::ObjectVolumeConfig,
 };
 use crop::{Crop, Crops};
@@ -56,9 +55,9 @@ impl<'s> Objects<'s> {
         self.crops.archive(archive);
     }
 
-    /// Digests of the objects.
-    pub fn digests(&mut self) -> ObjectDigests {
-        ObjectDigests::of(self.volumes.objects.iter_mut().filter_map(|object| object.digest()))
+    /// Numbers of the objects' tracks, and their digests.
+    pub fn digests(&mut self) -> impl Iterator<Item = (u32, u64)> {
+        self.volumes.objects.iter_mut().filter_map(|object| object.digest())
     }
 
     /// Enters what is in use into a footprint.

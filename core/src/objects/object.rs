@@ -21,7 +21,6 @@ use crate::{
     geometry::Transform,
     memory::{Capacity, Carver, region_bytes},
     snapshot::Hasher,
-    stage_digests::ObjectDigest,
     tracking::{Class, ObjectVolumeConfig, State},
     volume::Volume,
 };
@@ -108,12 +107,12 @@ impl<'s> Object<'s> {
         self.summary.as_ref()
     }
 
-    /// Digest of what is known of it and of its map; `None` while the volume waits for an object.
-    pub fn digest(&mut self) -> Option<ObjectDigest> {
+    /// Number of its track, and the digest of what is known of it and of its map; `None` while the volume waits for an object.
+    pub fn digest(&mut self) -> Option<(u32, u64)> {
         let id = self.summary.as_ref()?.id;
         let mut hasher = Hasher::default();
         self.archive(&mut hasher);
-        Some(ObjectDigest { id, digest: hasher.0.finish() })
+        Some((id, hasher.0.finish()))
     }
 
     pub(super) fn retire(&mut self, config: &ObjectVolumeConfig, reason: Retirement, sink: &mut impl ObjectSink) -> bool {

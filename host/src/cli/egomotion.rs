@@ -2,8 +2,8 @@
 
 use super::settings::Settings;
 use crate::input::{self, FrameSource, InputError};
+use dynvox_core::MotionSource;
 use dynvox_core::geometry::Transform;
-use dynvox_core::mapper::MotionSource;
 use std::path::PathBuf;
 use std::str::FromStr;
 

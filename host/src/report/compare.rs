@@ -1,7 +1,7 @@
 //! Two runs held against each other: where they part first, frame by frame and stage by stage.
 
 use dynvox_core::StageDigests;
-use dynvox_core::stage_digests::{Digested, ObjectDigest, ObjectDigests};
+use dynvox_core::{Digested, ObjectDigest, ObjectDigests};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

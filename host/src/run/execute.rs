@@ -7,8 +7,8 @@ use super::state::Gathered;
 use super::{HostSlab, Plan, RunFolder, RunRecord, Stopped, resident_bytes};
 use crate::observe::{LidarAtWork, LidarRecord, ObjectsRecord};
 
+use dynvox_core::MotionSource;
 use dynvox_core::geometry::Transform;
-use dynvox_core::mapper::MotionSource;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
 use std::time::Instant;

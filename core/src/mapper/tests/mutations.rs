@@ -1,7 +1,7 @@
 //! One bit of one thing changes: the digest changes, and the first difference names the stage that the thing belongs to.
 
 use super::*;
-use crate::stage_digests::Digested;
+use crate::mapper::Digested;
 
 /// Frames after which the car has a volume.
 const FRAMES: usize = 7;

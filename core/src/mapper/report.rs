@@ -1,11 +1,11 @@
 //! What one step did, as plain values.
 
+use super::StageDigests;
 use crate::{
     egomotion::{MotionEstimate, icp::IcpReport},
     geometry::Transform,
     objects::InstancesReport,
     scene_flow::FlowReport,
-    stage_digests::StageDigests,
     stereo::StereoReport,
     volume::{AllocationReport, PruneReport},
 };

@@ -2,33 +2,36 @@
 
 mod camera;
 mod config;
-mod look;
+mod digests;
+mod frame;
+mod raycast;
+mod report;
 mod resume;
+mod settings;
+#[cfg(test)]
+mod tests;
 
-pub use config::{MapperConfig, MotionSource};
+pub use config::Config;
+pub use digests::{Digested, ObjectDigest, ObjectDigests, StageDigests};
+pub use frame::StereoFrame;
+pub use report::{BlockCount, PoseOrigin, Report, Severity};
+pub use settings::{MapperConfig, MotionSource};
 
 use crate::{
     Capacity, Executor, Footprint, Stage,
-    config::Config,
     egomotion::{Egomotion, Estimator, MotionEstimate},
-    frame::StereoFrame,
     geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
     memory::{Carver, SlabError, region_bytes},
     objects::{NoSink, Object, ObjectFrame, ObjectSink, ObjectSummary, Objects, Picture},
     problem::Problem,
-    report::{BlockCount, PoseOrigin, Report},
     scene_flow::{FlowMatcher, FlowStatus},
     snapshot::Hasher,
-    stage_digests::StageDigests,
     stereo::StereoMatcher,
     tracking::{CameraMotion, Seen, ThingAt, TrackReport, Tracker},
     view::{Raycaster, Triangle},
     volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Viewpoint, Volume},
 };
-
-#[cfg(test)]
-mod tests;
 
 /// Why a mapper cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -360,7 +363,7 @@ impl<'s> Mapper<'s> {
             egomotion: self.camera.digest(egomotion),
             tracks: self.tracks_digest(),
             background: self.background.digest(),
-            objects: self.objects.digests(),
+            objects: ObjectDigests::of(self.objects.digests().map(|(id, digest)| ObjectDigest { id, digest })),
         }
     }
 
