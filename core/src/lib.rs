@@ -26,15 +26,15 @@ pub mod problem;
 pub mod random;
 pub mod rectify;
 pub mod scene_flow;
-pub mod snapshot;
+mod state;
 pub mod stereo;
 pub mod tracking;
 pub mod view;
 pub mod volume;
 
 pub use mapper::{
-    BlockCount, Config, Digested, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report, Severity,
-    StageDigests, StepError, StereoFrame,
+    BlockCount, Config, Digested, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report,
+    RestoreError, Severity, StageDigests, StepError, StereoFrame,
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial, Stage};

@@ -8,6 +8,7 @@ pub const MAX_PROBLEMS: usize = 32;
 
 /// One thing wrong with a configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Problem {
     /// The key as it stands in a configuration file: `volume.voxel_size_m`.

@@ -1,6 +1,6 @@
 //! Seeded random numbers: one generator per purpose, handed in, so that one user's draws never shift another's.
 
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 
 /// PCG-XSH-RR 64/32 (O'Neill, *PCG: A Family of Simple Fast Space-Efficient Statistically Good Algorithms*, 2014): 8 bytes of state,
 /// integers only.
@@ -16,9 +16,9 @@ impl Random {
     }
 
     /// Visits every field.
-    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { state } = self;
-        archive.u64(state);
+        visitor.u64(state);
     }
 
     /// 32 uniform bits.

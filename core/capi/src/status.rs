@@ -63,6 +63,7 @@ impl From<NewError> for DynvoxStatus {
         match error {
             NewError::Slab(_) => Self::TooSmall,
             NewError::Config(_) => Self::Config,
+            _ => Self::Unknown,
         }
     }
 }
@@ -73,6 +74,7 @@ impl From<StepError> for DynvoxStatus {
             StepError::SizeChanged => Self::SizeChanged,
             StepError::SizesDiffer | StepError::TooLarge { .. } | StepError::TooSmall { .. } => Self::Size,
             StepError::PoseNotFinite | StepError::PoseNotRotation => Self::Pose,
+            _ => Self::Unknown,
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     geometry::{StereoRig, Transform},
     random::Random,
     scene_flow::Match,
-    snapshot::{Archive, Hasher},
+    state::{Hasher, Visitor},
 };
 
 /// Seed of the camera's own draws.
@@ -70,7 +70,7 @@ impl Egomotion {
     /// Digest of the pose, of the motion that will be gone by, of the draws to come, and of this frame's estimate, where there is one.
     pub fn digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
         let mut hasher = Hasher::default();
-        self.archive(&mut hasher);
+        self.visit(&mut hasher);
         let mut digest = hasher.0;
         if let Some(estimate) = estimate {
             let counts = [estimate.status as u32, estimate.matches, estimate.inliers, estimate.samples, estimate.steps];
@@ -81,14 +81,12 @@ impl Egomotion {
     }
 
     /// Visits every field.
-    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { t_world_camera, t_current_previous, held, random } = self;
-        for transform in [t_world_camera, t_current_previous] {
-            archive.f64s(&mut transform.rotation);
-            archive.f64s(&mut transform.translation_m);
-        }
-        archive.u32(held);
-        random.archive(archive);
+        visitor.transform(t_world_camera);
+        visitor.transform(t_current_previous);
+        visitor.u32(held);
+        random.visit(visitor);
     }
 
     /// Maps camera coordinates to world coordinates, which are the first camera's.

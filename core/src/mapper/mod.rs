@@ -3,82 +3,37 @@
 mod camera;
 mod config;
 mod digests;
+mod error;
 mod frame;
 mod raycast;
 mod report;
-mod resume;
 mod settings;
+pub mod snapshot;
 #[cfg(test)]
 mod tests;
 
 pub use config::Config;
 pub use digests::{Digested, ObjectDigest, ObjectDigests, StageDigests};
+pub use error::{MIN_HEIGHT, MIN_WIDTH, NewError, StepError};
 pub use frame::StereoFrame;
 pub use report::{BlockCount, PoseOrigin, Report, Severity};
 pub use settings::{MapperConfig, MotionSource};
+pub use snapshot::RestoreError;
 
 use crate::{
     Capacity, Executor, Footprint, Stage,
     egomotion::{Egomotion, Estimator, MotionEstimate},
     geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
-    memory::{Carver, SlabError, region_bytes},
+    memory::{Carver, region_bytes},
     objects::{NoSink, Object, ObjectFrame, ObjectSink, ObjectSummary, Objects, Picture},
-    problem::Problem,
     scene_flow::{FlowMatcher, FlowStatus},
-    snapshot::Hasher,
+    state::Hasher,
     stereo::StereoMatcher,
     tracking::{CameraMotion, Seen, ThingAt, TrackReport, Tracker},
     view::{Raycaster, Triangle},
     volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Viewpoint, Volume},
 };
-
-/// Why a mapper cannot be made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NewError {
-    /// The slab cannot hold the capacity.
-    Slab(SlabError),
-    /// The configuration is not usable: the first problem; [`Config::validate`] lists them all.
-    Config(Problem),
-}
-
-impl From<SlabError> for NewError {
-    fn from(error: SlabError) -> Self {
-        Self::Slab(error)
-    }
-}
-
-/// Why a frame cannot be taken. The mapper is as it was before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StepError {
-    /// The images of the frame differ in size.
-    SizesDiffer,
-    /// The frame is larger than the capacity allows.
-    TooLarge {
-        /// Widest image, px.
-        width: usize,
-        /// Highest image, px.
-        height: usize,
-    },
-    /// The frame is smaller than the matchers can use.
-    TooSmall {
-        /// Least width, px.
-        width: usize,
-        /// Least height, px.
-        height: usize,
-    },
-    /// The frame's size differs from that of the frames before.
-    SizeChanged,
-    /// The frame's pose is not made of finite numbers.
-    PoseNotFinite,
-    /// The quaternion of the frame's pose does not have length 1.
-    PoseNotRotation,
-}
-
-/// Least image width the matchers can use, px.
-pub const MIN_WIDTH: usize = 64;
-/// Least image height the matchers can use, px.
-pub const MIN_HEIGHT: usize = 32;
 
 /// A stereo mapper in a slab.
 #[derive(Debug)]
@@ -369,10 +324,10 @@ impl<'s> Mapper<'s> {
 
     /// Digest of the tracks by age, their masks, and the crops that wait to be fused.
     fn tracks_digest(&mut self) -> u64 {
-        let mut hasher = Hasher::default();
-        self.tracker.archive(&mut hasher);
-        self.objects.archive_crops(&mut hasher);
-        hasher.0.finish()
+        Hasher::digest(|hasher| {
+            self.tracker.visit(hasher);
+            self.objects.visit_crops(hasher);
+        })
     }
 
     /// The static map's triangles, one after the other, in world coordinates. How many there were.

@@ -3,7 +3,7 @@
 //!
 //! Memory: 8 bytes for each 64 columns a row of a box touches, out of one bounded buffer.
 
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
 /// Pixels in a word.
@@ -26,9 +26,9 @@ pub struct PixelBox {
 
 impl PixelBox {
     /// Visits every field.
-    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { left, top, width, height } = self;
-        [left, top, width, height].into_iter().for_each(|side| archive.i32(side));
+        visitor.i32s([left, top, width, height]);
     }
 
     /// Pixels in the box.
@@ -98,11 +98,11 @@ impl MaskPlace {
     }
 
     /// Visits every field.
-    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { pixels, start, stride } = self;
-        pixels.archive(archive);
-        archive.u32(start);
-        archive.u32(stride);
+        pixels.visit(visitor);
+        visitor.u32(start);
+        visitor.u32(stride);
     }
 
     /// Column at which the words begin.
@@ -125,10 +125,10 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Visits all masks.
-    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { words, used } = self;
-        archive.count(used, words.len());
-        archive.u64s(words.get_mut(..*used).unwrap_or(&mut []));
+        visitor.count(used, words.len());
+        visitor.u64s(words.get_mut(..*used).unwrap_or(&mut []));
     }
 
     /// Forgets all masks.

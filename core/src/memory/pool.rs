@@ -6,7 +6,7 @@
 //! 64 of them a step where none is. Order: a new pool gives out 0, 1, 2, …; a freed slot is the next one given out.
 
 use super::{Carver, region_bytes};
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 use core::fmt;
 
@@ -163,14 +163,14 @@ impl<'s> SlotPool<'s> {
         }
     }
 
-    /// Writes or reads the pool: how many slots were given out, and in which order the freed ones will be given out again.
+    /// Visits every field: how many slots were given out, and in which order the freed ones will be given out again.
     /// [`SlotPool::rebuild`] must follow a reading.
-    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
-        let capacity = self.capacity();
-        archive.count(&mut self.fresh, capacity);
-        archive.count(&mut self.freed_len, self.fresh);
-        archive.count(&mut self.peak, capacity);
-        archive.u32s(bytemuck::cast_slice_mut(self.freed.get_mut(..self.freed_len).unwrap_or(&mut [])));
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { live: _, freed, freed_len, fresh, peak } = self;
+        visitor.count(fresh, freed.len());
+        visitor.count(freed_len, *fresh);
+        visitor.count(peak, freed.len());
+        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(freed.get_mut(..*freed_len).unwrap_or(&mut [])));
     }
 
     /// Finds which slots are taken: those given out and not in the free list. Whether that list can be: each slot in it given out, and once.

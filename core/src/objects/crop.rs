@@ -13,7 +13,7 @@ use crate::{
     image::View,
     masks::{MaskPlace, MaskStore, PixelBox},
     memory::{Capacity, Carver, region_bytes},
-    snapshot::Archive,
+    state::Visitor,
 };
 use bytemuck::{Pod, Zeroable};
 
@@ -105,13 +105,13 @@ pub(super) struct Crop {
 
 impl Crop {
     /// Visits every field; the pixels are [`Crops`]'.
-    fn archive(&mut self, archive: &mut impl Archive) {
+    fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { t_world_camera, t_world_object, pixels, id, start, len, coloured, digest } = self;
-        archive.f64s(t_world_camera);
-        archive.f64s(t_world_object);
-        pixels.archive(archive);
-        [id, start, len, coloured].into_iter().for_each(|number| archive.u32(number));
-        archive.u64(digest);
+        visitor.f64s(t_world_camera);
+        visitor.f64s(t_world_object);
+        pixels.visit(visitor);
+        visitor.u32s([id, start, len, coloured]);
+        visitor.u64(digest);
     }
 }
 
@@ -260,22 +260,22 @@ impl<'s> Crops<'s> {
     }
 
     /// Visits the crops that wait, with their pixels.
-    pub fn archive(&mut self, archive: &mut impl Archive) {
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { disparity_q8, grey, colour, entries, len, next } = self;
-        archive.count(len, entries.len());
-        archive.count(next, disparity_q8.len());
+        visitor.count(len, entries.len());
+        visitor.count(next, disparity_q8.len());
         for crop in entries.iter_mut().take(*len) {
-            crop.archive(archive);
+            crop.visit(visitor);
             let room = crop.start as usize..crop.start as usize + crop.len as usize;
             if room.end > disparity_q8.len() || i64::from(crop.len) != crop.pixels.area() {
-                archive.refuse();
+                visitor.refuse();
                 return;
             }
-            archive.content(crop.digest, |archive| {
-                archive.u16s(disparity_q8.get_mut(room.clone()).unwrap_or(&mut []));
-                archive.raw(grey.get_mut(room.clone()).unwrap_or(&mut []));
+            visitor.content(crop.digest, |visitor| {
+                visitor.u16s(disparity_q8.get_mut(room.clone()).unwrap_or(&mut []));
+                visitor.bytes(grey.get_mut(room.clone()).unwrap_or(&mut []));
                 if crop.coloured > 0 {
-                    archive.raw(colour.get_mut(room).unwrap_or(&mut []).as_flattened_mut());
+                    visitor.bytes(colour.get_mut(room).unwrap_or(&mut []).as_flattened_mut());
                 }
             });
         }

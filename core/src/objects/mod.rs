@@ -2,7 +2,6 @@
 //!
 //! Memory: crops and volumes as their modules say.
 
-mod archive;
 mod crop;
 mod object;
 mod placed;
@@ -10,6 +9,7 @@ mod reconstruct;
 mod report;
 #[cfg(test)]
 mod tests;
+mod visit;
 
 pub use crop::{CROPS_MAX, Picture};
 pub use object::{MAX_OBJECTS, NoSink, Object, ObjectSink, ObjectSummary, RetiredObject, Retirement};
@@ -19,7 +19,7 @@ pub use report::{InstancesReport, ObjectCount};
 
 use crate::{
     memory::{Capacity, Carver, Footprint},
-    snapshot::Archive,
+    state::Visitor,
     tracking::ObjectVolumeConfig,
 };
 use crop::{Crop, Crops};
@@ -51,8 +51,8 @@ impl<'s> Objects<'s> {
     }
 
     /// Visits the crops that wait to be fused.
-    pub(crate) fn archive_crops(&mut self, archive: &mut impl Archive) {
-        self.crops.archive(archive);
+    pub(crate) fn visit_crops(&mut self, visitor: &mut impl Visitor) {
+        self.crops.visit(visitor);
     }
 
     /// Numbers of the objects' tracks, and their digests.

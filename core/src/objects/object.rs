@@ -20,7 +20,7 @@
 use crate::{
     geometry::Transform,
     memory::{Capacity, Carver, region_bytes},
-    snapshot::Hasher,
+    state::Hasher,
     tracking::{Class, ObjectVolumeConfig, State},
     volume::Volume,
 };
@@ -110,9 +110,7 @@ impl<'s> Object<'s> {
     /// Number of its track, and the digest of what is known of it and of its map; `None` while the volume waits for an object.
     pub fn digest(&mut self) -> Option<(u32, u64)> {
         let id = self.summary.as_ref()?.id;
-        let mut hasher = Hasher::default();
-        self.archive(&mut hasher);
-        Some((id, hasher.0.finish()))
+        Some((id, Hasher::digest(|hasher| self.visit(hasher))))
     }
 
     pub(super) fn retire(&mut self, config: &ObjectVolumeConfig, reason: Retirement, sink: &mut impl ObjectSink) -> bool {

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     image::View,
     memory::{Capacity, Carver, region_bytes},
-    snapshot::Archive,
+    state::Visitor,
 };
 
 /// Counts of one image.
@@ -123,11 +123,12 @@ impl<'s> Camera<'s> {
         self.describe(width, height, response_min)
     }
 
-    /// Writes or reads the pixels of the current frame; [`Camera::describe`] makes the rest.
-    pub(super) fn archive(&mut self, [width, height]: [usize; 2], archive: &mut impl Archive) {
-        let [a, b] = &mut self.frames;
-        let frame = if self.current { b } else { a };
-        frame.pixels.chunks_mut(width.max(1)).take(height).for_each(|row| archive.raw(row));
+    /// Visits the pixels of the current frame; [`Camera::describe`] finds the rest. The frame before is not
+    /// looked at again.
+    pub(super) fn visit(&mut self, [width, height]: [usize; 2], visitor: &mut impl Visitor) {
+        let Self { frames: [a, b], current, gradient: _, blob: _, corner: _, sums: _, candidates: _ } = self;
+        let Frame { pixels, dense: _, sparse: _ } = if *current { b } else { a };
+        pixels.chunks_mut(width.max(1)).take(height).for_each(|row| visitor.bytes(row));
     }
 
     /// Finds the features of the current frame.

@@ -17,7 +17,7 @@ use crate::{
     image::View,
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, each, zip3},
-    snapshot::Archive,
+    state::Visitor,
 };
 
 /// Cells in which sparse matches look for support, px; those of the dense pass are [`CELL_MIN_PX`].
@@ -175,18 +175,38 @@ impl<'s> FlowMatcher<'s> {
         self.clear();
     }
 
-    /// Writes or reads the last pair; [`FlowMatcher::remake`] must follow a reading. The matches are of that frame alone and not in it.
-    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
-        let [mut width, mut height] = self.last.unwrap_or_default();
-        archive.count(&mut width, self.capacity[0]);
-        archive.count(&mut height, self.capacity[1]);
-        self.last = (width * height > 0).then_some([width, height]);
-        self.left.archive([width, height], archive);
-        self.right.archive([width, height], archive);
+    /// Visits the last pair; [`FlowMatcher::rebuild`] must follow a reading.
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self {
+            left,
+            right,
+            last,
+            capacity,
+            // Of one frame alone.
+            matched: _,
+            traced: _,
+            prior: _,
+            cells: _,
+            motion: _,
+            keep: _,
+            sparse: _,
+            sparse_len: _,
+            refined: _,
+            refined_len: _,
+            score: _,
+            selection: _,
+            selection_len: _,
+        } = self;
+        let [mut width, mut height] = last.unwrap_or_default();
+        visitor.count(&mut width, capacity[0]);
+        visitor.count(&mut height, capacity[1]);
+        *last = (width * height > 0).then_some([width, height]);
+        left.visit([width, height], visitor);
+        right.visit([width, height], visitor);
     }
 
     /// Finds the features of the pair that was read.
-    pub(crate) fn remake(&mut self, config: &SceneFlowConfig) {
+    pub(crate) fn rebuild(&mut self, config: &SceneFlowConfig) {
         if let Some([width, height]) = self.last {
             self.left.describe(width, height, response_min(config));
             self.right.describe(width, height, response_min(config));

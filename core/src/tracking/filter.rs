@@ -12,7 +12,7 @@
 
 use super::config::MotionConfig;
 use crate::geometry::{StereoRig, Transform};
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
 
@@ -47,13 +47,13 @@ pub(crate) struct Filter {
 
 impl Filter {
     /// Visits every field.
-    pub fn archive(&mut self, archive: &mut impl Archive) {
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { rate, covariance, center_world, frames, contradictions } = self;
-        archive.f64s(rate);
-        archive.f64s(covariance.as_flattened_mut());
-        archive.f64s(center_world);
-        archive.u32(frames);
-        archive.u32(contradictions);
+        visitor.f64s(rate);
+        visitor.f64s(covariance.as_flattened_mut());
+        visitor.f64s(center_world);
+        visitor.u32(frames);
+        visitor.u32(contradictions);
     }
 
     /// Whether a motion has ever been seen.

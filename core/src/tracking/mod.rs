@@ -40,7 +40,6 @@
 //! Everything the detector gets wrong, and all of it is counted. A mask that holds two cars is one track and gets the motion of the one with
 //! more matches.
 
-mod archive;
 mod at;
 mod background;
 mod camera;
@@ -58,6 +57,7 @@ mod state;
 #[cfg(test)]
 pub(crate) mod tests;
 mod track;
+mod visit;
 
 pub use at::ThingAt;
 pub use camera::CameraMotion;

@@ -18,7 +18,7 @@
 //! still counts until the state is lost, or for as long with none.
 
 use super::config::StateConfig;
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
 /// What is known about a thing's motion.
@@ -107,9 +107,9 @@ impl Judgement {
     }
 
     /// Visits every field.
-    pub fn archive(&mut self, archive: &mut impl Archive) {
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { state, vote, streak, since_motion } = self;
-        [state, vote, streak, since_motion].into_iter().for_each(|number| archive.u32(number));
+        visitor.u32s([state, vote, streak, since_motion]);
     }
 
     /// Takes in a frame, seen or not, with a motion or without. Returns the new state.

@@ -13,7 +13,7 @@
 use super::{Class, InstancesConfig, State, config::Overlap, detection::Taken, filter::Filter, state::Judgement};
 use crate::masks::{MaskPlace, MaskStore};
 use crate::memory::{Capacity, Carver, region_bytes};
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
 /// A thing seen over time. Transforms are [x, y, z, w of the rotation, x, y, z of the translation].
@@ -66,7 +66,7 @@ impl Track {
     }
 
     /// Visits every field.
-    fn archive(&mut self, archive: &mut impl Archive) {
+    fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self {
             filter,
             t_world_object,
@@ -91,16 +91,16 @@ impl Track {
             small,
             padding: _,
         } = self;
-        filter.archive(archive);
-        archive.f64s(t_world_object);
-        archive.f64s(t_world_origin);
-        place.archive(archive);
-        drift.iter_mut().for_each(|px| archive.i32(px));
-        judgement.archive(archive);
-        archive.f32(score);
-        archive.f32(sigma_m_s);
-        [id, class, class_lead, first_frame, last_frame, sightings].into_iter().for_each(|number| archive.u32(number));
-        [detection, chain, chains, matches, inliers, measured, small].into_iter().for_each(|number| archive.u32(number));
+        filter.visit(visitor);
+        visitor.f64s(t_world_object);
+        visitor.f64s(t_world_origin);
+        place.visit(visitor);
+        visitor.i32s(drift);
+        judgement.visit(visitor);
+        visitor.f32(score);
+        visitor.f32(sigma_m_s);
+        visitor.u32s([id, class, class_lead, first_frame, last_frame, sightings]);
+        visitor.u32s([detection, chain, chains, matches, inliers, measured, small]);
     }
 
     /// Whether it is nothing yet: too small to be reconstructed, and no motion was ever measured.
@@ -181,11 +181,11 @@ impl<'s> Tracks<'s> {
     }
 
     /// Visits all tracks. The scores are those of one frame.
-    pub fn archive(&mut self, archive: &mut impl Archive) {
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { tracks, len, next_id, scores: _ } = self;
-        archive.count(len, tracks.len());
-        archive.u32(next_id);
-        self.all_mut().iter_mut().for_each(|track| track.archive(archive));
+        visitor.count(len, tracks.len());
+        visitor.u32(next_id);
+        self.all_mut().iter_mut().for_each(|track| track.visit(visitor));
     }
 
     pub fn all(&self) -> &[Track] {

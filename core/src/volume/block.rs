@@ -4,7 +4,7 @@
 //! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and a header of 16.
 
 use crate::memory::{Capacity, Carver, Slot, region_bytes};
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
 /// Lattice points along a block's side.
@@ -108,17 +108,19 @@ impl<'s> Blocks<'s> {
         }
     }
 
-    /// Writes or reads the block in a slot: its place, its voxels and what they were last summed up to. The digest of a block that was made and
+    /// Visits the block in a slot: its place, its voxels and what they were last summed up to. The digest of a block that was made and
     /// never fused is 0, which its voxels would not tell.
-    pub(super) fn archive(&mut self, slot: Slot, archive: &mut impl Archive) {
-        if let (Some(header), Some(voxels)) = (self.header.get_mut(slot.index()), self.voxels.get_mut(slot.index())) {
-            archive.i16s(&mut header.coord);
-            archive.i16s(&mut voxels.sdf);
-            archive.raw(&mut voxels.weight);
-            archive.u64(&mut header.digest);
-            archive.u8(&mut header.min_weight);
+    pub(super) fn visit(&mut self, slot: Slot, visitor: &mut impl Visitor) {
+        let Self { header, voxels, colour } = self;
+        if let (Some(header), Some(voxels)) = (header.get_mut(slot.index()), voxels.get_mut(slot.index())) {
+            let (Header { coord, digest, min_weight, reserved: _ }, Voxels { sdf, weight }) = (header, voxels);
+            visitor.i16s(coord);
+            visitor.i16s(sdf);
+            visitor.bytes(weight);
+            visitor.u64(digest);
+            visitor.u8(min_weight);
         }
-        self.colour.get_mut(slot.index()).into_iter().flatten().for_each(|plane| archive.raw(plane));
+        colour.get_mut(slot.index()).into_iter().flatten().for_each(|plane| visitor.bytes(plane));
     }
 
     /// Makes a slot an empty block at `coord`.

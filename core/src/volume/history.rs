@@ -8,7 +8,7 @@
 //! per visible block to enter a frame; a pass over one set to take one out.
 
 use crate::memory::{Capacity, Carver, Slot, region_bytes};
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 
 /// Frames, as bit sets over slots, oldest first out.
 #[derive(Debug)]
@@ -127,18 +127,19 @@ impl<'s> VisibleHistory<'s> {
         Some(frame)
     }
 
-    /// Writes or reads the ring, in a pool of which `slots` slots were ever given out.
-    pub(super) fn archive(&mut self, slots: usize, archive: &mut impl Archive) {
-        let (capacity, words) = (self.capacity(), slots.div_ceil(64));
-        archive.u32(&mut self.oldest);
-        archive.count(&mut self.len, capacity);
-        archive.count(&mut self.peak, capacity);
-        for age in 0..self.len as u32 {
-            let set = self.set_mut(self.oldest.wrapping_add(age)).and_then(|set| set.get_mut(..words));
-            archive.u64s(set.unwrap_or(&mut []));
+    /// Visits every field, in a pool of which `slots` slots were ever given out.
+    pub(super) fn visit(&mut self, slots: usize, visitor: &mut impl Visitor) {
+        let (capacity, used) = (self.capacity(), slots.div_ceil(64));
+        let Self { sets, words, due, born, oldest, len, peak } = self;
+        visitor.u32(oldest);
+        visitor.count(len, capacity);
+        visitor.count(peak, capacity);
+        for age in 0..*len as u32 {
+            let at = (oldest.wrapping_add(age) as usize).checked_rem(capacity).unwrap_or(0) * *words;
+            visitor.u64s(sets.get_mut(at..at + used).unwrap_or(&mut []));
         }
-        archive.u64s(self.due.get_mut(..words).unwrap_or(&mut []));
-        archive.u32s(self.born.get_mut(..slots).unwrap_or(&mut []));
+        visitor.u64s(due.get_mut(..used).unwrap_or(&mut []));
+        visitor.u32s(born.get_mut(..slots).unwrap_or(&mut []));
     }
 
     /// The oldest frame in the ring.

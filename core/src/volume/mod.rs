@@ -8,7 +8,6 @@
 mod allocate;
 #[cfg(test)]
 pub(crate) mod analytic;
-mod archive;
 mod block;
 mod config;
 mod fuse;
@@ -22,6 +21,7 @@ mod store;
 mod tests;
 mod viewpoint;
 mod visible;
+mod visit;
 
 pub use allocate::{AllocationReport, MAX_BLOCKS_PER_RAY};
 pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, Blocks};

@@ -3,7 +3,7 @@
 //! Memory: 8 bytes a block.
 
 use crate::memory::{Carver, Slot, region_bytes};
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 
 /// The list. Links are slot + 1; 0 is none.
 #[derive(Debug)]
@@ -62,10 +62,11 @@ impl<'s> Recency<'s> {
         self.link(link(slot), [0; 2]);
     }
 
-    /// Writes or reads the list, in a pool of which `slots` slots were ever given out.
-    pub(super) fn archive(&mut self, slots: usize, archive: &mut impl Archive) {
-        archive.u32s(&mut self.ends);
-        archive.u32s(self.links.get_mut(..slots).unwrap_or(&mut []).as_flattened_mut());
+    /// Visits every field, in a pool of which `slots` slots were ever given out.
+    pub(super) fn visit(&mut self, slots: usize, visitor: &mut impl Visitor) {
+        let Self { links, ends } = self;
+        visitor.u32s(ends);
+        visitor.u32s(links.get_mut(..slots).unwrap_or(&mut []).as_flattened_mut());
     }
 
     fn link(&mut self, entry: u32, links: [u32; 2]) {

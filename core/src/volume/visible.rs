@@ -6,7 +6,7 @@
 //! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
 
 use crate::memory::{Capacity, Carver, Full, Slot, region_bytes};
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 
 /// This frame's visible slots, each once.
 #[derive(Debug)]
@@ -87,15 +87,23 @@ impl<'s> VisibleList<'s> {
         self.before.get(..self.before_len)?.get(i).copied()
     }
 
-    /// Writes or reads who was visible, in a pool of which `slots` slots were ever given out. The list before the last is not needed: the next
-    /// frame begins by forgetting it.
-    pub(super) fn archive(&mut self, slots: usize, archive: &mut impl Archive) {
-        archive.u32(&mut self.frame);
-        let most = self.slots.len();
-        archive.count(&mut self.peak, most);
-        archive.count(&mut self.len, most);
-        archive.u32s(bytemuck::cast_slice_mut(self.slots.get_mut(..self.len).unwrap_or(&mut [])));
-        archive.u32s(self.last_visible.get_mut(..slots).unwrap_or(&mut []));
+    /// Visits every field, in a pool of which `end` slots were ever given out.
+    pub(super) fn visit(&mut self, end: usize, visitor: &mut impl Visitor) {
+        let Self {
+            slots,
+            len,
+            last_visible,
+            frame,
+            peak,
+            // The next frame begins by forgetting it.
+            before: _,
+            before_len: _,
+        } = self;
+        visitor.u32(frame);
+        visitor.count(peak, slots.len());
+        visitor.count(len, slots.len());
+        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(slots.get_mut(..*len).unwrap_or(&mut [])));
+        visitor.u32s(last_visible.get_mut(..end).unwrap_or(&mut []));
     }
 
     /// Orders the list by slot, which is the order of fusion and of memory; all slots are below `end`. Reads off which slots are

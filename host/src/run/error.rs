@@ -150,8 +150,8 @@ fn missing(reference: Reference, frames: usize, delay: usize) -> String {
 pub(super) fn refused(profile: &str, error: NewError) -> RunError {
     let reason = match error {
         NewError::Slab(SlabError::TooSmall { missing }) => format!("it lacks {missing} bytes"),
-        NewError::Slab(other) => format!("{other:?}"),
-        NewError::Config(problem) => return RunError::Config { problems: format!("{} {}", problem.key, problem.rule) },
+        NewError::Config(problem) => return RunError::Config { problems: problem.to_string() },
+        other => other.to_string(),
     };
     RunError::Slab { profile: profile.to_owned(), reason }
 }
@@ -165,5 +165,6 @@ pub(super) fn step_reason(error: StepError) -> String {
         StepError::PoseNotRotation => "the quaternion of its pose does not have length 1".to_owned(),
         StepError::TooLarge { width, height } => format!("its images are larger than {width} x {height} px"),
         StepError::TooSmall { width, height } => format!("its images are smaller than {width} x {height} px"),
+        other => other.to_string(),
     }
 }

@@ -1,14 +1,14 @@
 //! A drive stopped and resumed is the drive that never stopped; what is no whole snapshot of this mapper is refused.
 
 use super::*;
-use crate::snapshot::RestoreError;
+use crate::mapper::snapshot;
 use std::println;
 
 const FRAMES: usize = 10;
 /// So few blocks that some must leave.
 const CROWDED: Capacity = Capacity { blocks: 330, ..CAPACITY };
 
-fn saved(mapper: &mut Mapper<'_>) -> Vec<u8> {
+pub(super) fn saved(mapper: &mut Mapper<'_>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut sink = |piece: &[u8]| -> Result<(), ()> {
         bytes.extend_from_slice(piece);
@@ -20,10 +20,10 @@ fn saved(mapper: &mut Mapper<'_>) -> Vec<u8> {
 
 /// What a source says that has no more bytes.
 #[derive(Debug, PartialEq)]
-struct Ended;
+pub(super) struct Ended;
 
 /// Restores a mapper and hands it to `go_on`; a slab full of another's leavings serves as well as a new one.
-fn restored<R>(
+pub(super) fn restored<R>(
     capacity: &Capacity,
     config: &Config,
     bytes: &[u8],
@@ -144,7 +144,7 @@ fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
         refusal(&CAPACITY, &Walk::config(), &changed)
     };
     assert_eq!(with(0, b'x'), RestoreError::Foreign);
-    let previous = crate::snapshot::VERSION - 1;
+    let previous = snapshot::VERSION - 1;
     assert_eq!(with(8, previous as u8), RestoreError::Version(previous));
     assert_eq!(refusal(&Capacity { tracks: 15, ..CAPACITY }, &Walk::config(), &bytes), RestoreError::Capacity);
     let mut other = Walk::config();

@@ -120,9 +120,9 @@ impl<'s> Instances<'s> {
     }
 
     fn digest(&mut self) -> u64 {
-        let mut hasher = crate::snapshot::Hasher::default();
-        self.tracker.archive(&mut hasher);
-        self.objects.archive_crops(&mut hasher);
+        let mut hasher = crate::state::Hasher::default();
+        self.tracker.visit(&mut hasher);
+        self.objects.visit_crops(&mut hasher);
         hasher.0.finish()
     }
 }

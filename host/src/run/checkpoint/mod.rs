@@ -7,7 +7,7 @@
 //! | 8 | length of the host's part |
 //! | 4 | CRC-32 of the 20 bytes before and of the host's part |
 //! | | the host's part, CBOR: how the run was begun, how far the file of blocks had come, what was gathered |
-//! | | the mapper's, to the end: [`dynvox_core::snapshot`] |
+//! | | the mapper's, to the end: [`dynvox_core::mapper::snapshot`] |
 //!
 //! The blocks that left the pool are not copied: their file only ever grows, so its length and a checksum say what it held.
 //!
@@ -26,7 +26,7 @@ use super::state::Gathered;
 use super::{FolderError, RunFolder, write_whole};
 use crate::run::store::Position;
 use dynvox_core::Mapper;
-use dynvox_core::snapshot::RestoreError;
+use dynvox_core::RestoreError;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
@@ -160,7 +160,8 @@ impl Stopped {
             RestoreError::Version(found) => otherwise(format!("its mapper is of version {found}")),
             RestoreError::Capacity => otherwise(format!("profile {} had other bounds", plan.profile)),
             RestoreError::Config => otherwise("its mapper knew other settings".to_owned()),
-            RestoreError::New(error) => otherwise(format!("the core refuses its settings: {error:?}")),
+            RestoreError::New(error) => otherwise(format!("the core refuses its settings: {error}")),
+            other => otherwise(other.to_string()),
         })?;
         match rest.read(&mut [0]) {
             Ok(0) => Ok(mapper),

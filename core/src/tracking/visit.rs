@@ -1,11 +1,11 @@
 //! Tracks and masks as state.
 
 use super::Tracker;
-use crate::snapshot::Archive;
+use crate::state::Visitor;
 
 impl Tracker<'_> {
     /// Visits all that outlives a frame. Of the two mask buffers that is this frame's: the next frame empties the other one.
-    pub(crate) fn archive(&mut self, archive: &mut impl Archive) {
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self {
             masks: [a, b],
             now,
@@ -19,7 +19,7 @@ impl Tracker<'_> {
             frame: _,
             report: _,
         } = self;
-        if *now == 0 { a } else { b }.archive(archive);
-        tracks.archive(archive);
+        if *now == 0 { a } else { b }.visit(visitor);
+        tracks.visit(visitor);
     }
 }

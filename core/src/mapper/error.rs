@@ -1,0 +1,85 @@
+//! Why a mapper cannot be made, and why it refuses a frame.
+
+use crate::{memory::SlabError, problem::Problem};
+use core::fmt;
+
+/// Least image width the matchers can use, px.
+pub const MIN_WIDTH: usize = 64;
+/// Least image height the matchers can use, px.
+pub const MIN_HEIGHT: usize = 32;
+
+/// Why a mapper cannot be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum NewError {
+    /// The slab cannot hold the capacity.
+    Slab(SlabError),
+    /// The configuration is not usable: the first problem; [`super::Config::validate`] lists them all.
+    Config(Problem),
+}
+
+impl From<SlabError> for NewError {
+    fn from(error: SlabError) -> Self {
+        Self::Slab(error)
+    }
+}
+
+impl fmt::Display for NewError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Slab(error) => error.fmt(f),
+            Self::Config(problem) => write!(f, "the configuration cannot be used: {problem}"),
+        }
+    }
+}
+
+impl core::error::Error for NewError {}
+
+/// Why a frame cannot be taken. The mapper is as it was before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum StepError {
+    /// The images of the frame differ in size.
+    SizesDiffer,
+    /// The frame is larger than the capacity allows.
+    TooLarge {
+        /// Widest image, px.
+        width: usize,
+        /// Highest image, px.
+        height: usize,
+    },
+    /// The frame is smaller than the matchers can use.
+    TooSmall {
+        /// Least width, px.
+        width: usize,
+        /// Least height, px.
+        height: usize,
+    },
+    /// The frame's size differs from that of the frames before.
+    SizeChanged,
+    /// The frame's pose is not made of finite numbers.
+    PoseNotFinite,
+    /// The quaternion of the frame's pose does not have length 1.
+    PoseNotRotation,
+}
+
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::SizesDiffer => f.write_str("the images of the frame differ in size"),
+            Self::TooLarge { width, height } => {
+                write!(f, "the frame is larger than the capacity allows: at most {width} x {height} px")
+            }
+            Self::TooSmall { width, height } => {
+                write!(f, "the frame is smaller than the matchers can use: at least {width} x {height} px")
+            }
+            Self::SizeChanged => f.write_str("the frame is not of the size of those before"),
+            Self::PoseNotFinite => f.write_str("the pose of the frame is not made of finite numbers"),
+            Self::PoseNotRotation => f.write_str("the quaternion of the frame's pose does not have length 1"),
+        }
+    }
+}
+
+impl core::error::Error for StepError {}

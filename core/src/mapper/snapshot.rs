@@ -1,0 +1,189 @@
+//! A mapper's state as bytes: what a run needs to go on as if it had never stopped.
+//!
+//! Each struct describes its state once (the module `state`); the description that is hashed into each
+//! step's digests is the one that is written here and read back. What can be rebuilt is not stored:
+//! features of the last pair, the block index. What only one frame needs is not stored either, so
+//! [`Mapper::disparity_q8`] has nothing to show before the next frame.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 8 | `DVXSTATE` |
+//! | 4 | [`VERSION`] |
+//! | 8, 8 | fingerprint of the capacity, of the configuration: a digest of their `Debug` text |
+//! | 4, 4, 4 | frames taken, image width and height, px (0 before the first frame) |
+//! | | the last pair, the camera, tracks, masks and objects, the static map |
+//! | 8 | checksum of everything before: a flipped bit anywhere is found |
+//!
+//! Memory: none but the mapper's. Bytes: about those of the blocks in use, and of what waits to be
+//! pruned.
+
+use super::{Mapper, NewError};
+use crate::{
+    Capacity, Config,
+    digest::Digest,
+    state::{ReadError, Reader, Visitor, Writer},
+};
+use core::fmt::{self, Write};
+
+/// What a snapshot begins with.
+pub const MAGIC: [u8; 8] = *b"DVXSTATE";
+/// Version of the layout. Another one is refused: there is no conversion.
+pub const VERSION: u32 = 3;
+
+/// Why a mapper cannot be restored. There is no mapper then; the slab may be used again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum RestoreError<E> {
+    /// The slab or the configuration.
+    New(NewError),
+    /// The source ended too early or failed.
+    Source(E),
+    /// The bytes are not a snapshot.
+    Foreign,
+    /// The snapshot is of another version of the layout.
+    Version(u32),
+    /// The snapshot is of a mapper with other bounds.
+    Capacity,
+    /// The snapshot is of a mapper with another configuration.
+    Config,
+    /// The bytes are not those that were written.
+    Damaged,
+}
+
+impl<E> From<ReadError<E>> for RestoreError<E> {
+    fn from(error: ReadError<E>) -> Self {
+        match error {
+            ReadError::Source(error) => Self::Source(error),
+            ReadError::Damaged => Self::Damaged,
+        }
+    }
+}
+
+impl<E: fmt::Display> fmt::Display for RestoreError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::New(error) => error.fmt(f),
+            Self::Source(error) => write!(f, "the snapshot cannot be read: {error}"),
+            Self::Foreign => f.write_str("the bytes are not a snapshot of a mapper"),
+            Self::Version(found) => write!(f, "the snapshot is of version {found}, this mapper reads version {VERSION}"),
+            Self::Capacity => f.write_str("the snapshot is of a mapper with another capacity"),
+            Self::Config => f.write_str("the snapshot is of a mapper with another configuration"),
+            Self::Damaged => f.write_str("the snapshot is damaged: its bytes are not those that were written"),
+        }
+    }
+}
+
+impl<E: fmt::Debug + fmt::Display> core::error::Error for RestoreError<E> {}
+
+impl<'s> Mapper<'s> {
+    /// Writes all that later frames depend on to `sink`, piece by piece. A mapper restored from it goes
+    /// on bit for bit as this one does. Nothing changes; `&mut` only because one description of the
+    /// state serves writing and reading.
+    ///
+    /// What a [`crate::volume::BlockStore`] or an [`crate::objects::ObjectSink`] holds is the caller's,
+    /// and not in it.
+    ///
+    /// # Errors
+    /// The sink's first one; what it took until then is not a snapshot.
+    pub fn save<E>(&mut self, sink: &mut impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
+        let mut writer = Writer::new(sink);
+        let (mut magic, mut version) = (MAGIC, VERSION);
+        let mut prints = [fingerprint(&self.capacity), fingerprint(&self.config)];
+        writer.bytes(&mut magic);
+        writer.u32(&mut version);
+        writer.u64s(&mut prints);
+        self.visit(&mut writer);
+        writer.finish()
+    }
+
+    /// Cuts a mapper out of `slab` as [`Mapper::new`] does, and brings it to where [`Mapper::save`] was
+    /// called. `source` fills the bytes it is handed with those that come next.
+    ///
+    /// # Errors
+    /// See [`RestoreError`]. There is no mapper then: nothing half restored can be used.
+    pub fn restore<E>(
+        capacity: &Capacity,
+        config: &Config,
+        slab: &'s mut [u8],
+        source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
+    ) -> Result<Self, RestoreError<E>> {
+        let mut mapper = Self::new(capacity, config, slab).map_err(RestoreError::New)?;
+        let mut reader = Reader::new(source);
+        let (mut magic, mut version, mut prints) = ([0; 8], 0, [0; 2]);
+        reader.bytes(&mut magic);
+        reader.check()?;
+        if magic != MAGIC {
+            return Err(RestoreError::Foreign);
+        }
+        reader.u32(&mut version);
+        reader.check()?;
+        if version != VERSION {
+            return Err(RestoreError::Version(version));
+        }
+        reader.u64s(&mut prints);
+        reader.check()?;
+        if prints[0] != fingerprint(capacity) {
+            return Err(RestoreError::Capacity);
+        }
+        if prints[1] != fingerprint(config) {
+            return Err(RestoreError::Config);
+        }
+        mapper.visit(&mut reader);
+        reader.finish()?;
+        if mapper.rebuild() { Ok(mapper) } else { Err(RestoreError::Damaged) }
+    }
+
+    /// Visits what lives from frame to frame; [`Mapper::rebuild`] must follow a reading.
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self {
+            scene_flow,
+            camera,
+            tracker,
+            objects,
+            background,
+            size,
+            frame,
+            // Told by the caller; a fingerprint stands for them.
+            config: _,
+            capacity,
+            // Of one frame alone.
+            stereo: _,
+            estimator: _,
+            depth_m: _,
+            raycaster: _,
+        } = self;
+        let [mut width, mut height] = size.unwrap_or_default();
+        visitor.u32(frame);
+        visitor.count(&mut width, capacity.image_width);
+        visitor.count(&mut height, capacity.image_height);
+        *size = (width * height > 0).then_some([width, height]);
+        scene_flow.visit(visitor);
+        camera.visit(visitor);
+        tracker.visit(visitor);
+        objects.visit(visitor);
+        background.visit(visitor);
+    }
+
+    /// Rebuilds what is not in a snapshot. Whether what was read can be.
+    fn rebuild(&mut self) -> bool {
+        self.scene_flow.rebuild(&self.config.scene_flow);
+        self.objects.rebuild() && self.background.rebuild()
+    }
+}
+
+/// A digest of a value's `Debug` text: no field can be forgotten, and floats are written to the last bit.
+fn fingerprint(value: &impl fmt::Debug) -> u64 {
+    struct Text(Digest);
+    impl Write for Text {
+        fn write_str(&mut self, text: &str) -> fmt::Result {
+            // Byte by byte: how a formatter cuts its text must not matter.
+            text.bytes().for_each(|byte| self.0.u64(u64::from(byte)));
+            Ok(())
+        }
+    }
+    let mut text = Text(Digest::default());
+    // Writing into a digest cannot fail.
+    let _ = write!(text, "{value:?}");
+    text.0.finish()
+}

@@ -1,0 +1,52 @@
+//! Objects as state.
+
+use super::{Object, ObjectSummary, Objects};
+use crate::{
+    geometry::Transform,
+    state::Visitor,
+    tracking::{Class, State},
+};
+
+impl Objects<'_> {
+    /// Visits all that outlives a frame; [`Objects::rebuild`] must follow a reading.
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { crops, volumes, config: _, report: _ } = self;
+        crops.visit(visitor);
+        volumes.objects.iter_mut().for_each(|object| object.visit(visitor));
+    }
+
+    /// Makes anew what was not stored. Whether what was read can be.
+    pub(crate) fn rebuild(&mut self) -> bool {
+        self.volumes.objects.iter_mut().all(|object| object.volume.rebuild())
+    }
+}
+
+impl Object<'_> {
+    /// Visits the object: the digest of its volume stands for that.
+    pub(super) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { volume, summary } = self;
+        let blank = || ObjectSummary {
+            id: 0,
+            chain: 0,
+            class: Class::Other,
+            state: State::Uncertain,
+            first_frame: 0,
+            last_frame: 0,
+            frames: 0,
+            t_world_object: Transform::IDENTITY,
+        };
+        visitor.option(summary, blank, |visitor, summary| summary.visit(visitor));
+        visitor.content(volume.digest(), |visitor| volume.visit(visitor));
+    }
+}
+
+impl ObjectSummary {
+    /// Visits every field.
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { id, chain, class, state, first_frame, last_frame, frames, t_world_object } = self;
+        visitor.u32s([id, chain, first_frame, last_frame, frames]);
+        visitor.code(class, Class::code, Class::from_code);
+        visitor.code(state, State::code, State::from_code);
+        visitor.transform(t_world_object);
+    }
+}

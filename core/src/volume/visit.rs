@@ -1,0 +1,48 @@
+//! A volume as state: slots as they were given out, what the blocks in use hold, and who was seen when.
+
+use super::Volume;
+use crate::state::Visitor;
+
+impl Volume<'_> {
+    /// Visits every field; [`Volume::rebuild`] must follow a reading.
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self {
+            pool,
+            blocks,
+            visible,
+            history,
+            recency,
+            // Rebuilt, given by the caller, or of one frame alone.
+            index: _,
+            digest: _,
+            config: _,
+            seen: _,
+        } = self;
+        pool.visit(visitor);
+        if !pool.rebuild() {
+            visitor.refuse();
+        }
+        let slots = pool.high_water();
+        for slot in pool.live() {
+            blocks.visit(slot, visitor);
+        }
+        visible.visit(slots, visitor);
+        history.visit(slots, visitor);
+        recency.visit(slots, visitor);
+    }
+
+    /// Enters the blocks that were read into the index, in slot order, and sums their digests. Whether they can be: no place twice, room for all. Nothing that
+    /// comes later depends on the order the index was filled in: it only ever answers for one place, and nothing walks it.
+    pub(crate) fn rebuild(&mut self) -> bool {
+        for slot in self.pool.live() {
+            let Some(coord) = self.blocks.coord(slot) else { return false };
+            if self.index.find(coord, |slot| self.blocks.coord(slot)).is_some()
+                || self.index.insert(coord, slot, |slot| self.blocks.coord(slot)).is_err()
+            {
+                return false;
+            }
+            self.digest = self.digest.wrapping_add(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));
+        }
+        true
+    }
+}
