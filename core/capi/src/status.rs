@@ -62,7 +62,7 @@ impl From<NewError> for DynvoxStatus {
     fn from(error: NewError) -> Self {
         match error {
             NewError::Slab(_) => Self::TooSmall,
-            NewError::Config(_) => Self::Config,
+            NewError::Config(_) | NewError::Rectification(_) => Self::Config,
             _ => Self::Unknown,
         }
     }
@@ -72,7 +72,9 @@ impl From<StepError> for DynvoxStatus {
     fn from(error: StepError) -> Self {
         match error {
             StepError::SizeChanged => Self::SizeChanged,
-            StepError::SizesDiffer | StepError::TooLarge { .. } | StepError::TooSmall { .. } => Self::Size,
+            StepError::SizesDiffer | StepError::RawSizeDiffers { .. } | StepError::TooLarge { .. } | StepError::TooSmall { .. } => {
+                Self::Size
+            }
             StepError::PoseNotFinite | StepError::PoseNotRotation => Self::Pose,
             _ => Self::Unknown,
         }

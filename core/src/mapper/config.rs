@@ -5,6 +5,7 @@ use crate::{
     egomotion::{EgomotionConfig, icp::IcpConfig},
     geometry::{RigProblem, StereoRig},
     problem::{Problems, require},
+    rectify::Rectification,
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
     tracking::InstancesConfig,
@@ -17,6 +18,8 @@ use crate::{
 pub struct Config {
     /// The cameras.
     pub rig: StereoRig,
+    /// How raw pairs become those of `rig`; `None` where they come rectified.
+    pub rectification: Option<Rectification>,
     /// Stereo matching.
     pub stereo: StereoConfig,
     /// Features and their matches over time.
@@ -42,6 +45,7 @@ impl Config {
     pub fn for_rig(rig: StereoRig) -> Self {
         Self {
             rig,
+            rectification: None,
             stereo: StereoConfig::default(),
             scene_flow: SceneFlowConfig::default(),
             egomotion: EgomotionConfig::default(),

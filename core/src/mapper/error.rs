@@ -1,6 +1,6 @@
 //! Why a mapper cannot be made, and why it refuses a frame.
 
-use crate::{memory::SlabError, problem::Problem};
+use crate::{memory::SlabError, problem::Problem, rectify::RectifierError};
 use core::fmt;
 
 /// Least image width the matchers can use, px.
@@ -17,6 +17,8 @@ pub enum NewError {
     Slab(SlabError),
     /// The configuration is not usable: the first problem; [`super::Config::validate`] lists them all.
     Config(Problem),
+    /// The rectification does not fit the capacity.
+    Rectification(RectifierError),
 }
 
 impl From<SlabError> for NewError {
@@ -30,6 +32,7 @@ impl fmt::Display for NewError {
         match self {
             Self::Slab(error) => error.fmt(f),
             Self::Config(problem) => write!(f, "the configuration cannot be used: {problem}"),
+            Self::Rectification(error) => error.fmt(f),
         }
     }
 }
@@ -59,6 +62,13 @@ pub enum StepError {
     },
     /// The frame's size differs from that of the frames before.
     SizeChanged,
+    /// The images of a frame that is to be rectified are not of the size the calibration is for.
+    RawSizeDiffers {
+        /// Width of the left raw image, px.
+        width: usize,
+        /// Height of the left raw image, px.
+        height: usize,
+    },
     /// The frame's pose is not made of finite numbers.
     PoseNotFinite,
     /// The quaternion of the frame's pose does not have length 1.
@@ -76,6 +86,9 @@ impl fmt::Display for StepError {
                 write!(f, "the frame is smaller than the matchers can use: at least {width} x {height} px")
             }
             Self::SizeChanged => f.write_str("the frame is not of the size of those before"),
+            Self::RawSizeDiffers { width, height } => {
+                write!(f, "the frame is not of {width} x {height} px, the size the calibration is for")
+            }
             Self::PoseNotFinite => f.write_str("the pose of the frame is not made of finite numbers"),
             Self::PoseNotRotation => f.write_str("the quaternion of the frame's pose does not have length 1"),
         }

@@ -7,7 +7,8 @@ use crate::{
     tracking::Detection,
 };
 
-/// One stereo frame as the core takes it: rectified, equal sizes, 8 bit.
+/// One stereo frame as the core takes it, 8 bit: rectified images of equal sizes, or raw ones for a mapper that rectifies
+/// ([`crate::Config::rectification`]). Classes, disparities and detections belong to the rectified left image in either case.
 #[derive(Clone, Copy, Debug)]
 pub struct StereoFrame<'a> {
     /// Left grey image.

@@ -27,6 +27,7 @@ use crate::{
     image::{View, ViewMut},
     memory::{Carver, region_bytes},
     objects::{NoSink, Object, ObjectFrame, ObjectSink, ObjectSummary, Objects, Picture},
+    rectify::{Pair, RawCamera, RectifiedImages, Rectifier},
     scene_flow::{FlowMatcher, FlowStatus},
     state::Hasher,
     stereo::StereoMatcher,
@@ -40,6 +41,8 @@ use crate::{
 pub struct Mapper<'s> {
     config: Config,
     capacity: Capacity,
+    rectifier: Rectifier<'s>,
+    rectified: RectifiedImages<'s>,
     stereo: StereoMatcher<'s>,
     scene_flow: FlowMatcher<'s>,
     estimator: Estimator<'s>,
@@ -65,6 +68,8 @@ impl Capacity {
             + region_bytes::<f32>(self.pixels())
             + Volume::bytes(self)
             + Raycaster::bytes(self)
+            + Rectifier::bytes(self)
+            + RectifiedImages::bytes(self)
     }
 
     /// Every region a mapper of this capacity cuts out of its slab.
@@ -98,8 +103,11 @@ impl<'s> Mapper<'s> {
             return Err(NewError::Config(*problem));
         }
         let mut carver = Carver::new(slab, capacity.bytes())?;
-        let mapper = Self::new_in(capacity, config, &mut carver);
+        let mut mapper = Self::new_in(capacity, config, &mut carver);
         carver.check()?;
+        if let Some(rectification) = &config.rectification {
+            mapper.rectifier.prepare(rectification, &config.rig).map_err(NewError::Rectification)?;
+        }
         Ok(mapper)
     }
 
@@ -116,6 +124,8 @@ impl<'s> Mapper<'s> {
             depth_m: carver.alloc("depth_m", capacity.pixels()),
             background: Volume::new_in(capacity, &config.volume, carver),
             raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
+            rectifier: Rectifier::new_in(capacity, carver),
+            rectified: RectifiedImages::new_in(capacity, carver),
             size: None,
             frame: 0,
         }
@@ -138,18 +148,42 @@ impl<'s> Mapper<'s> {
         store: &mut S,
         objects: &mut O,
     ) -> Result<Report, StepError> {
-        let [width, height] = self.admit(frame)?;
+        let size = self.admit(frame)?;
+        let input = frame.digest();
+        // The rectified images are lent out for the step, so that the stages may read them while they change the mapper.
+        let mut images = core::mem::take(&mut self.rectified);
+        let raw = Pair { left: frame.left, right: frame.right, colour: frame.colour };
+        let rectified = executor.stage(Stage::Rectify, || self.rectifier.rectify(&raw, &mut images, executor));
+        let Pair { left, right, colour } = rectified.unwrap_or(raw);
+        let rectification = self.rectifier.report(&Pair { left, right, colour });
+        let frame = StereoFrame { left, right, colour, ..*frame };
+        let report = self.step_rectified(&frame, size, executor, store, objects);
+        self.rectified = images;
+        Ok(report.with_input(input, rectification))
+    }
+
+    /// Takes a rectified frame that was admitted.
+    fn step_rectified<E: Executor, S: BlockStore, O: ObjectSink>(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        [width, height]: [usize; 2],
+        executor: &E,
+        store: &mut S,
+        objects: &mut O,
+    ) -> Report {
         let (config, left, right) = (self.config, frame.left, frame.right);
+        let invalid = self.rectifier.invalid();
+        let invalid = invalid.as_ref();
 
         // (A) Depth from the pair, unless it is given, and (C.1) sparse scene flow over this pair and the last: neither needs the other.
         let (stereo, scene_flow) = executor.join(
             || {
                 executor.stage(Stage::Stereo, || match frame.disparity_q8 {
                     Some(given) => self.stereo.take(given),
-                    None => self.stereo.compute(&config.stereo, left, right, executor),
+                    None => self.stereo.compute_within(&config.stereo, left, right, invalid, executor),
                 })
             },
-            || executor.stage(Stage::SceneFlow, || self.scene_flow.push(&config.scene_flow, left, right, executor)),
+            || executor.stage(Stage::SceneFlow, || self.scene_flow.push_within(&config.scene_flow, left, right, invalid, executor)),
         );
         // (B) What a detector saw, joined to what is tracked, with the matches on it.
         executor.stage(Stage::Instances, || {
@@ -189,10 +223,11 @@ impl<'s> Mapper<'s> {
         // (F) Noise last seen a fixed lag ago goes.
         let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
 
-        let digests = self.digests(frame, egomotion.as_ref());
+        let digests = self.digests(egomotion.as_ref());
         let report = Report {
             frame: self.frame,
             t_world_camera: camera.t_world_camera,
+            rectification: None,
             stereo,
             scene_flow,
             pose,
@@ -207,15 +242,26 @@ impl<'s> Mapper<'s> {
             digest: digests.whole(self.frame),
         };
         self.frame += 1;
-        Ok(report)
+        report
     }
 
     /// Checks a frame against the capacity and the frames before.
     fn admit(&mut self, frame: &StereoFrame<'_>) -> Result<[usize; 2], StepError> {
-        let size = [frame.left.width(), frame.left.height()];
+        let given = [frame.left.width(), frame.left.height()];
+        // Of the left image, of the right one, and of what comes out of them.
+        let [left, right, size] = match self.rectifier.rectification() {
+            None => [given; 3],
+            Some(raw) => {
+                let of = |camera: &RawCamera| [camera.width as usize, camera.height as usize];
+                [of(&raw.left.raw), of(&raw.right.raw), [raw.width as usize, raw.height as usize]]
+            }
+        };
+        if given != left {
+            return Err(StepError::RawSizeDiffers { width: left[0], height: left[1] });
+        }
         let same = |width: usize, height: usize| size == [width, height];
-        let right = same(frame.right.width(), frame.right.height());
-        let colour = frame.colour.is_none_or(|image| same(image.width(), image.height()));
+        let right = right == [frame.right.width(), frame.right.height()];
+        let colour = frame.colour.is_none_or(|image| left == [image.width(), image.height()]);
         let class = frame.class.is_none_or(|image| same(image.width(), image.height()));
         let disparity = frame.disparity_q8.is_none_or(|image| same(image.width(), image.height()));
         if !(right && colour && class && disparity) {
@@ -309,10 +355,10 @@ impl<'s> Mapper<'s> {
         }
     }
 
-    /// Digests of a frame and of what each stage made of it.
-    fn digests(&mut self, frame: &StereoFrame<'_>, egomotion: Option<&MotionEstimate>) -> StageDigests {
+    /// Digests of what each stage made of a frame.
+    fn digests(&mut self, egomotion: Option<&MotionEstimate>) -> StageDigests {
         StageDigests {
-            input: frame.digest(),
+            input: 0,
             disparity: self.stereo.digest(),
             matches: self.scene_flow.digest(),
             egomotion: self.camera.digest(egomotion),
@@ -338,6 +384,11 @@ impl<'s> Mapper<'s> {
     /// The static map.
     pub fn background(&self) -> &Volume<'s> {
         &self.background
+    }
+
+    /// Left and right grey image of the last frame as they were rectified; `None` where pairs come rectified.
+    pub fn rectified_pair(&self) -> Option<[View<'_, u8>; 2]> {
+        self.rectifier.grey(&self.rectified)
     }
 
     /// Disparity of the last frame, 1/256 px, 0 none.

@@ -2,9 +2,11 @@
 
 use super::StageDigests;
 use crate::{
+    digest::Digest,
     egomotion::{MotionEstimate, icp::IcpReport},
     geometry::Transform,
     objects::InstancesReport,
+    rectify::RectifyReport,
     scene_flow::FlowReport,
     stereo::StereoReport,
     volume::{AllocationReport, PruneReport},
@@ -70,6 +72,8 @@ pub struct Report {
     pub frame: u32,
     /// Where the left camera is: camera to world; the first frame's camera is the world.
     pub t_world_camera: Transform,
+    /// What rectification did; `None` where pairs come rectified.
+    pub rectification: Option<RectifyReport>,
     /// The stereo matcher.
     pub stereo: StereoReport,
     /// The scene flow.
@@ -93,7 +97,7 @@ pub struct Report {
     pub blocks: BlockCount,
     /// Digests of what went in and of what each stage made of it.
     pub digests: StageDigests,
-    /// One digest for all stages: [`StageDigests::whole`].
+    /// One digest for all stages: [`StageDigests::whole`], and with it that of the rectified images where there are any.
     pub digest: u64,
 }
 
@@ -109,6 +113,17 @@ impl Report {
         } else {
             Severity::Info
         }
+    }
+
+    /// The report with the digest of what went in and with what rectification made of it.
+    pub(crate) fn with_input(self, input: u64, rectification: Option<RectifyReport>) -> Self {
+        let digest = rectification.map_or(self.digest, |report| {
+            let mut digest = Digest::default();
+            digest.u64(self.digest);
+            digest.u64(report.digest);
+            digest.finish()
+        });
+        Self { digests: StageDigests { input, ..self.digests }, rectification, digest, ..self }
     }
 
     /// Features and matches for which there was no room.

@@ -152,6 +152,8 @@ impl<'s> Mapper<'s> {
             estimator: _,
             depth_m: _,
             raycaster: _,
+            rectifier: _,
+            rectified: _,
         } = self;
         let [mut width, mut height] = size.unwrap_or_default();
         visitor.u32(frame);
@@ -167,7 +169,7 @@ impl<'s> Mapper<'s> {
 
     /// Rebuilds what is not in a snapshot. Whether what was read can be.
     fn rebuild(&mut self) -> bool {
-        self.scene_flow.rebuild(&self.config.scene_flow);
+        self.scene_flow.rebuild(&self.config.scene_flow, self.rectifier.invalid().as_ref());
         self.objects.rebuild() && self.background.rebuild()
     }
 }

@@ -1,6 +1,7 @@
 //! The mapper as a whole, in a room of which everything is known.
 
 mod mutations;
+mod raw;
 mod resume;
 
 use super::*;

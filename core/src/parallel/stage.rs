@@ -3,6 +3,8 @@
 /// A stage of the pipeline, as a name for measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// Raw pair to rectified pair.
+    Rectify,
     /// Disparity from the stereo pair.
     Stereo,
     /// Features and matches over four images.
@@ -23,12 +25,22 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in pipeline order.
-    pub const ALL: [Self; 8] =
-        [Self::Stereo, Self::SceneFlow, Self::Egomotion, Self::Instances, Self::Allocate, Self::Fuse, Self::Prune, Self::Raycast];
+    pub const ALL: [Self; 9] = [
+        Self::Rectify,
+        Self::Stereo,
+        Self::SceneFlow,
+        Self::Egomotion,
+        Self::Instances,
+        Self::Allocate,
+        Self::Fuse,
+        Self::Prune,
+        Self::Raycast,
+    ];
 
     /// Name in tables and files.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Rectify => "rectify",
             Self::Stereo => "stereo",
             Self::SceneFlow => "scene_flow",
             Self::Egomotion => "egomotion",

@@ -49,6 +49,7 @@ pub struct Alignment {
 
 /// Why a raw rig cannot be rectified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RectifyProblem {
     /// The rotation between the cameras, or a given one, is not a rotation.

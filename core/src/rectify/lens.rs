@@ -66,6 +66,7 @@ impl LensModel {
 
 /// Why a lens cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LensProblem {
     /// A focal length is not a positive finite number.

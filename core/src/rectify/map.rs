@@ -117,40 +117,41 @@ pub(super) fn remap<T: Sample>(map: &[u32], camera: &RawCamera, raw: &View<'_, T
     }
     let packing = Packing::of(camera);
     let (data, stride) = raw.strided();
-    let shift = packing.fraction_u + packing.fraction_v;
-    let half = (1 << shift) >> 1;
-    let one = [1 << packing.fraction_u, 1 << packing.fraction_v];
+    // From a pixel to its right lower neighbour, both included.
+    let span = stride + 2;
     for (out, &entry) in out.iter_mut().zip(map) {
-        let ([u, v], [right, lower]) = packing.place(entry);
-        let at = v * stride + u;
-        let (left, upper) = (one[0] - right, one[1] - lower);
-        let weights = [left * upper, right * upper, left * lower, right * lower];
-        *out = match data.get(at..at + stride + 2) {
-            Some(window) if entry != NONE => match (window.first_chunk::<2>(), window.last_chunk::<2>()) {
-                (Some([a, b]), Some([c, d])) => T::mean([*a, *b, *c, *d], weights, half, shift),
-                _ => T::NONE,
-            },
+        let ([u, v], weights) = packing.place(entry);
+        // [`NONE`] names the last column and row there could be: what follows does not lie within the image.
+        let window = data.get(v * stride + u..).and_then(|rest| rest.get(..span));
+        *out = match window.map(|window| (window.first_chunk::<2>(), window.last_chunk::<2>())) {
+            Some((Some(upper), Some(lower))) => T::between(upper, lower, weights, &packing),
             _ => T::NONE,
         };
     }
 }
 
 /// What a remap mixes.
-pub(super) trait Sample: Copy {
+pub(super) trait Sample: Copy + Send + Sync {
     /// What a pixel without cover holds.
     const NONE: Self;
 
-    /// The weighted mean of four neighbours; the weights add up to `1 << shift`, `half` is half of that.
-    fn mean(of: [Self; 4], weights: [u32; 4], half: u32, shift: u32) -> Self;
+    /// The value between two pixels and the two below them, so far to the right and down.
+    fn between(upper: &[Self; 2], lower: &[Self; 2], weights: [u32; 2], packing: &Packing) -> Self;
 }
 
 impl Sample for u8 {
     const NONE: Self = 0;
 
     #[inline(always)]
-    fn mean([a, b, c, d]: [Self; 4], [wa, wb, wc, wd]: [u32; 4], half: u32, shift: u32) -> Self {
-        let wide = u32::from;
-        ((wide(a) * wa + wide(b) * wb + wide(c) * wc + wide(d) * wd + half) >> shift) as u8
+    fn between(upper: &[Self; 2], lower: &[Self; 2], [right, down]: [u32; 2], packing: &Packing) -> Self {
+        // At most 16 bits: 8 of the pixel, 8 of the fraction. A difference may be negative, and wraps back in the sum.
+        let along = |[a, b]: &[u8; 2]| {
+            (u32::from(*a) << packing.fraction_u).wrapping_add(u32::from(*b).wrapping_sub(u32::from(*a)).wrapping_mul(right))
+        };
+        let (upper, lower) = (along(upper), along(lower));
+        let sum = (upper << packing.fraction_v).wrapping_add(lower.wrapping_sub(upper).wrapping_mul(down));
+        let bits = packing.fraction_u + packing.fraction_v;
+        (sum.wrapping_add((1 << bits) >> 1) >> bits) as u8
     }
 }
 
@@ -158,11 +159,9 @@ impl Sample for [u8; 3] {
     const NONE: Self = [0; 3];
 
     #[inline(always)]
-    fn mean([a, b, c, d]: [Self; 4], weights: [u32; 4], half: u32, shift: u32) -> Self {
-        let [a0, a1, a2] = a;
-        let [b0, b1, b2] = b;
-        let [c0, c1, c2] = c;
-        let [d0, d1, d2] = d;
-        [[a0, b0, c0, d0], [a1, b1, c1, d1], [a2, b2, c2, d2]].map(|channel| u8::mean(channel, weights, half, shift))
+    fn between([a, b]: &[Self; 2], [c, d]: &[Self; 2], weights: [u32; 2], packing: &Packing) -> Self {
+        let ([a0, a1, a2], [b0, b1, b2], [c0, c1, c2], [d0, d1, d2]) = (*a, *b, *c, *d);
+        [([a0, b0], [c0, d0]), ([a1, b1], [c1, d1]), ([a2, b2], [c2, d2])]
+            .map(|(upper, lower)| u8::between(&upper, &lower, weights, packing))
     }
 }

@@ -1,16 +1,22 @@
 //! The rectifier: maps, masks and rectified images in the slab.
 
-use super::{MAX_RAW_SIDE, Rectification, RectifyReport, map};
+use super::{
+    MAX_RAW_SIDE, Rectification, RectifyReport, TurnedCamera,
+    map::{self, Sample},
+};
+use core::fmt;
+
 use crate::{
     digest::Digest,
     geometry::StereoRig,
     image::{InvalidPair, InvalidPixels, View},
     memory::{Capacity, Carver, region_bytes},
-    parallel::{Executor, each},
+    parallel::{Bands, Executor, each, zip2},
 };
 
 /// Why a rectification does not fit a capacity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RectifierError {
     /// The raw images are larger than the capacity allows.
@@ -28,6 +34,22 @@ pub enum RectifierError {
         height: usize,
     },
 }
+
+impl fmt::Display for RectifierError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::RawTooLarge { width: 0, .. } => f.write_str("the capacity has no room for raw images: set its raw_width and raw_height"),
+            Self::RawTooLarge { width, height } => {
+                write!(f, "the raw images are larger than the capacity allows: at most {width} x {height} px")
+            }
+            Self::RectifiedTooLarge { width, height } => {
+                write!(f, "the rectified images are larger than the capacity allows: at most {width} x {height} px")
+            }
+        }
+    }
+}
+
+impl core::error::Error for RectifierError {}
 
 /// The images of a pair, raw or rectified.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +70,22 @@ struct Camera<'s> {
     invalid_count: u32,
 }
 
+impl Camera<'_> {
+    /// Fills a rectified image, in bands of rows.
+    fn remap<T: Sample, E: Executor>(
+        &self,
+        turned: &TurnedCamera,
+        [width, height]: [usize; 2],
+        raw: &View<'_, T>,
+        out: &mut [T],
+        executor: &E,
+    ) {
+        let bands = Bands::of(height);
+        let jobs = zip2(bands.split(self.map, width), bands.split_mut(out, width));
+        each(executor, jobs, |(map, out)| map::remap(map, &turned.raw, raw, out));
+    }
+}
+
 /// Room for the rectified images. Apart from the [`Rectifier`], so that a mapper can lend them to its stages.
 #[derive(Debug, Default)]
 pub struct RectifiedImages<'s> {
@@ -64,7 +102,7 @@ impl<'s> RectifiedImages<'s> {
     }
 
     /// Allocates the regions; none without raw pixels.
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let [pixels, _] = lengths(capacity);
         if pixels == 0 {
             return Self::default();
@@ -102,7 +140,7 @@ impl<'s> Rectifier<'s> {
     }
 
     /// Allocates the regions; none without raw pixels. It rectifies nothing until [`Rectifier::prepare`].
-    pub fn carve(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let [pixels, words] = lengths(capacity);
         let mut camera = |[map, invalid]: [&'static str; 2]| {
             if pixels == 0 {
@@ -168,29 +206,27 @@ impl<'s> Rectifier<'s> {
     pub fn rectify<'a, E: Executor>(&self, raw: &Pair<'_>, images: &'a mut RectifiedImages<'_>, executor: &E) -> Option<Pair<'a>> {
         let Rectification { left, right, width, height } = self.rectification.as_ref()?;
         let [width, height] = [*width as usize, *height as usize];
-        let pixels = width * height;
-        // Two bands an image, at rows that depend on its height alone.
-        let middle = height / 2 * width;
-        let [left_map, right_map] = [&self.left, &self.right].map(|camera| camera.map.get(..pixels).unwrap_or(&[]).split_at(middle));
-        let [left_out, right_out] =
-            [&mut *images.left, &mut *images.right].map(|grey| grey.get_mut(..pixels).unwrap_or_default().split_at_mut(middle));
-        let bands = [
-            (left_map.0, &left.raw, &raw.left, left_out.0),
-            (left_map.1, &left.raw, &raw.left, left_out.1),
-            (right_map.0, &right.raw, &raw.right, right_out.0),
-            (right_map.1, &right.raw, &raw.right, right_out.1),
-        ];
-        each(executor, bands, |(map, camera, raw, rectified)| map::remap(map, camera, raw, rectified));
-        let colour = raw.colour.and_then(|raw| {
-            let (upper, lower) = images.colour.get_mut(..pixels)?.split_at_mut(middle);
-            executor.join(|| map::remap(left_map.0, &left.raw, &raw, upper), || map::remap(left_map.1, &left.raw, &raw, lower));
-            View::new(&*images.colour, width, height)
+        let RectifiedImages { left: left_out, right: right_out, colour: colour_out } = images;
+        executor.join(
+            || self.left.remap(left, [width, height], &raw.left, left_out, executor),
+            || self.right.remap(right, [width, height], &raw.right, right_out, executor),
+        );
+        let colour = raw.colour.filter(|_| !colour_out.is_empty()).and_then(|raw| {
+            self.left.remap(left, [width, height], &raw, colour_out, executor);
+            View::new(colour_out, width, height)
         });
         Some(Pair {
-            left: View::new(&*images.left, width, height)?,
-            right: View::new(&*images.right, width, height)?,
+            left: View::new(left_out, width, height)?,
+            right: View::new(right_out, width, height)?,
             colour,
         })
+    }
+
+    /// The grey images, left and right, that the last [`Rectifier::rectify`] left in `images`; `None` without a rectification.
+    pub fn grey<'a>(&self, images: &'a RectifiedImages<'_>) -> Option<[View<'a, u8>; 2]> {
+        let Rectification { width, height, .. } = self.rectification.as_ref()?;
+        let [width, height] = [*width as usize, *height as usize];
+        Some([View::new(&*images.left, width, height)?, View::new(&*images.right, width, height)?])
     }
 
     /// What is reported of each frame; `None` where nothing is rectified.

@@ -97,8 +97,8 @@ fn with_rectifier<R>(
     let mut slab = vec![0u8; bytes + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
-    let mut rectifier = Rectifier::carve(&CAPACITY, &mut carver);
-    let mut images = RectifiedImages::carve(&CAPACITY, &mut carver);
+    let mut rectifier = Rectifier::new_in(&CAPACITY, &mut carver);
+    let mut images = RectifiedImages::new_in(&CAPACITY, &mut carver);
     assert_eq!(carver.footprint().bytes(), bytes);
     carver.check().unwrap();
     rectifier.prepare(rectification, rig).unwrap();
@@ -207,8 +207,8 @@ fn without_raw_pixels_it_costs_nothing_and_takes_nothing() {
     let none = Capacity { raw_width: 0, raw_height: 0, ..CAPACITY };
     assert_eq!(Rectifier::bytes(&none) + RectifiedImages::bytes(&none), 0);
     let mut carver = Carver::without_slab();
-    let mut rectifier = Rectifier::carve(&none, &mut carver);
-    RectifiedImages::carve(&none, &mut carver);
+    let mut rectifier = Rectifier::new_in(&none, &mut carver);
+    RectifiedImages::new_in(&none, &mut carver);
     assert!(carver.footprint().regions().is_empty());
     let raw = raw_rig(lenses()[0]);
     let (rectification, rig) = Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();

@@ -6,7 +6,7 @@ use super::{
     suppression::{Candidate, Field, suppress},
 };
 use crate::{
-    image::View,
+    image::{InvalidPixels, View},
     memory::{Capacity, Carver, region_bytes},
     state::Visitor,
 };
@@ -112,7 +112,7 @@ impl<'s> Camera<'s> {
     }
 
     /// Makes the current frame the previous one and takes in an image no larger than the capacity.
-    pub(super) fn take(&mut self, image: View<'_, u8>, response_min: i16) -> FeatureCount {
+    pub(super) fn take(&mut self, image: View<'_, u8>, invalid: Option<&InvalidPixels<'_>>, response_min: i16) -> FeatureCount {
         self.current = !self.current;
         let [a, b] = &mut self.frames;
         let frame = if self.current { b } else { a };
@@ -120,7 +120,7 @@ impl<'s> Camera<'s> {
         for (kept, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
             kept.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
         }
-        self.describe(width, height, response_min)
+        self.describe(width, height, invalid, response_min)
     }
 
     /// Visits the pixels of the current frame; [`Camera::describe`] finds the rest. The frame before is not
@@ -131,8 +131,8 @@ impl<'s> Camera<'s> {
         pixels.chunks_mut(width.max(1)).take(height).for_each(|row| visitor.bytes(row));
     }
 
-    /// Finds the features of the current frame.
-    pub(super) fn describe(&mut self, width: usize, height: usize, response_min: i16) -> FeatureCount {
+    /// Finds the features of the current frame, none on pixels that are not to be used.
+    pub(super) fn describe(&mut self, width: usize, height: usize, invalid: Option<&InvalidPixels<'_>>, response_min: i16) -> FeatureCount {
         let [a, b] = &mut self.frames;
         let frame = if self.current { b } else { a };
         let pixels = width * height;
@@ -145,6 +145,10 @@ impl<'s> Camera<'s> {
         };
         let Some(image) = View::new(frame.pixels, width, height) else { return FeatureCount::default() };
         filter(image, Responses { gradient, blob, corner }, self.sums);
+        if let Some(invalid) = invalid {
+            silence(invalid, width, blob);
+            silence(invalid, width, corner);
+        }
         let mut found = 0;
         let mut slots = self.candidates.iter_mut();
         suppress(Field { response: blob, width }, Field { response: corner, width }, response_min, self.sums, |candidate| {
@@ -161,6 +165,17 @@ impl<'s> Camera<'s> {
             dense: frame.dense.len() as u32,
             sparse: frame.sparse.len() as u32,
             dropped: dropped as u32,
+        }
+    }
+}
+
+/// Takes away the filter's response at pixels that are not to be used.
+fn silence(invalid: &InvalidPixels<'_>, width: usize, response: &mut [i16]) {
+    for (v, row) in response.chunks_exact_mut(width.max(1)).enumerate() {
+        for u in invalid.in_row(v) {
+            if let Some(response) = row.get_mut(u) {
+                *response = 0;
+            }
         }
     }
 }

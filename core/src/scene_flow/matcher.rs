@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     digest::Digest,
-    image::View,
+    image::{InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, each, zip3},
     state::Visitor,
@@ -206,10 +206,10 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Finds the features of the pair that was read.
-    pub(crate) fn rebuild(&mut self, config: &SceneFlowConfig) {
+    pub(crate) fn rebuild(&mut self, config: &SceneFlowConfig, invalid: Option<&InvalidPair<'_>>) {
         if let Some([width, height]) = self.last {
-            self.left.describe(width, height, response_min(config));
-            self.right.describe(width, height, response_min(config));
+            self.left.describe(width, height, invalid.map(|pair| &pair.left), response_min(config));
+            self.right.describe(width, height, invalid.map(|pair| &pair.right), response_min(config));
         }
     }
 
@@ -220,6 +220,18 @@ impl<'s> FlowMatcher<'s> {
 
     /// Takes in a stereo frame and matches it with the one before.
     pub fn push<E: Executor>(&mut self, config: &SceneFlowConfig, left: View<'_, u8>, right: View<'_, u8>, executor: &E) -> FlowReport {
+        self.push_within(config, left, right, None, executor)
+    }
+
+    /// As [`FlowMatcher::push`], for a frame of which some pixels show nothing: no feature is found there.
+    pub fn push_within<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        left: View<'_, u8>,
+        right: View<'_, u8>,
+        invalid: Option<&InvalidPair<'_>>,
+        executor: &E,
+    ) -> FlowReport {
         self.clear();
         let size = [left.width(), left.height()];
         if size != [right.width(), right.height()] || size[0] > self.capacity[0] || size[1] > self.capacity[1] {
@@ -227,7 +239,9 @@ impl<'s> FlowMatcher<'s> {
             return FlowReport { status: FlowStatus::Refused, ..FlowReport::default() };
         }
         let response_min = response_min(config);
-        let (left, right) = executor.join(|| self.left.take(left, response_min), || self.right.take(right, response_min));
+        let [invalid_left, invalid_right] = [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
+        let (left, right) =
+            executor.join(|| self.left.take(left, invalid_left, response_min), || self.right.take(right, invalid_right, response_min));
         let mut report = FlowReport { left, right, ..FlowReport::default() };
         if self.last.replace(size) != Some(size) {
             report.status = FlowStatus::First;

@@ -8,7 +8,7 @@ use super::{
     descriptor::{Descriptor, Gradients},
     gaps,
     gaps::Filling,
-    gradient, median, plausible, prior,
+    gradient, invalid, median, plausible, prior,
     prior::{CellGrid, DisparitySet, PlaneCost},
     smooth, speckle,
     speckle::Scratch,
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     digest::Digest,
-    image::{DISPARITY_ONE_PX, View},
+    image::{DISPARITY_ONE_PX, InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{BANDS, Bands, Executor, each, zip3},
     problem::Problems,
@@ -133,12 +133,36 @@ impl<'s> StereoMatcher<'s> {
         self.compute_observed(config, left, right, executor, |_| ())
     }
 
+    /// As [`StereoMatcher::compute`], for a pair of which some pixels show nothing: they get no disparity, nor do those whose partner in the
+    /// right image is one of them.
+    pub fn compute_within<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        left: View<'_, u8>,
+        right: View<'_, u8>,
+        invalid: Option<&InvalidPair<'_>>,
+        executor: &E,
+    ) -> StereoReport {
+        self.compute_steps(config, [left, right], invalid, executor, |_| ())
+    }
+
     /// As [`StereoMatcher::compute`], calling `done` after each step: no clock enters the core, so whoever times the steps does it there.
     pub fn compute_observed<E: Executor>(
         &mut self,
         config: &StereoConfig,
         left: View<'_, u8>,
         right: View<'_, u8>,
+        executor: &E,
+        done: impl FnMut(StereoStep),
+    ) -> StereoReport {
+        self.compute_steps(config, [left, right], None, executor, done)
+    }
+
+    fn compute_steps<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        [left, right]: [View<'_, u8>; 2],
+        invalid: Option<&InvalidPair<'_>>,
         executor: &E,
         mut done: impl FnMut(StereoStep),
     ) -> StereoReport {
@@ -147,7 +171,7 @@ impl<'s> StereoMatcher<'s> {
         if report.status != StereoStatus::Matched {
             return report;
         }
-        self.find_gradients(left, right, executor);
+        self.find_gradients(left, right, invalid, executor);
         done(StereoStep::Gradients);
         self.match_support(config, executor, &mut report);
         done(StereoStep::Support);
@@ -167,7 +191,7 @@ impl<'s> StereoMatcher<'s> {
         done(StereoStep::Gaps);
         self.smooth(config, executor);
         done(StereoStep::Smoothing);
-        self.finish(&mut report);
+        self.finish(invalid, &mut report);
         done(StereoStep::Output);
         report
     }
@@ -216,12 +240,17 @@ impl<'s> StereoMatcher<'s> {
         }
     }
 
-    fn find_gradients<E: Executor>(&mut self, left: View<'_, u8>, right: View<'_, u8>, executor: &E) {
+    fn find_gradients<E: Executor>(&mut self, left: View<'_, u8>, right: View<'_, u8>, invalid: Option<&InvalidPair<'_>>, executor: &E) {
         let (width, bands) = (self.width, Bands::of(self.height));
         let [left_du, left_dv, right_du, right_dv] = split_planes(self.gradients, width * self.height);
-        for (image, du, dv) in [(left, left_du, left_dv), (right, right_du, right_dv)] {
+        let [left_invalid, right_invalid] = [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
+        for (image, invalid, du, dv) in [(left, left_invalid, left_du, left_dv), (right, right_invalid, right_du, right_dv)] {
             let jobs = zip3(bands.first(), bands.split_mut(du, width), bands.split_mut(dv, width));
             each(executor, jobs, |(first, du, dv)| gradient::gradients(image, first, du, dv));
+            if let Some(invalid) = invalid {
+                invalid::flatten(invalid, width, du);
+                invalid::flatten(invalid, width, dv);
+            }
         }
     }
 
@@ -333,13 +362,17 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Turns working units into the result's.
-    fn finish(&mut self, report: &mut StereoReport) {
-        for disparity in self.disparity.iter_mut().take(self.width * self.height) {
+    fn finish(&mut self, invalid: Option<&InvalidPair<'_>>, report: &mut StereoReport) {
+        let disparities = self.disparity.get_mut(..self.width * self.height).unwrap_or(&mut []);
+        for disparity in disparities.iter_mut() {
             let working = *disparity as i16;
             // Smoothed values stay between those they come from: 0..=255 px.
             *disparity = if working == NONE { 0 } else { working as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16) };
-            report.valid += u32::from(*disparity != 0);
         }
+        if let Some(invalid) = invalid {
+            invalid::remove(invalid, self.width, disparities);
+        }
+        report.valid = disparities.iter().filter(|disparity| **disparity != 0).count() as u32;
     }
 }
 

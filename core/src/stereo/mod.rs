@@ -55,6 +55,7 @@ mod dense;
 mod descriptor;
 mod gaps;
 mod gradient;
+mod invalid;
 mod matcher;
 mod median;
 mod plausible;

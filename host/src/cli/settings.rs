@@ -79,6 +79,7 @@ impl Settings {
         } = self;
         Config {
             rig,
+            rectification: None,
             stereo: *stereo,
             scene_flow: *scene_flow,
             egomotion: *egomotion,

@@ -160,6 +160,9 @@ pub(super) fn refused(profile: &str, error: NewError) -> RunError {
 pub(super) fn step_reason(error: StepError) -> String {
     match error {
         StepError::SizesDiffer => "its images differ in size".to_owned(),
+        StepError::RawSizeDiffers { width, height } => {
+            format!("its images are not of {width} x {height} px, the size the calibration is for")
+        }
         StepError::SizeChanged => "its images have another size than those before".to_owned(),
         StepError::PoseNotFinite => "its pose holds numbers that are none".to_owned(),
         StepError::PoseNotRotation => "the quaternion of its pose does not have length 1".to_owned(),

@@ -14,7 +14,9 @@ fn named(change: impl Fn(&mut Mapper<'_>)) -> Option<Digested> {
 
 fn named_by(walk: &Walk, mapper: &mut Mapper<'_>, reports: &[Report], change: impl Fn(&mut Mapper<'_>)) -> Option<Digested> {
     let last = reports.last().unwrap();
-    let digests = |mapper: &mut Mapper<'_>| walk.with_frame(FRAMES - 1, |frame| mapper.digests(frame, last.egomotion.as_ref()));
+    let digests = |mapper: &mut Mapper<'_>| {
+        walk.with_frame(FRAMES - 1, |frame| StageDigests { input: frame.digest(), ..mapper.digests(last.egomotion.as_ref()) })
+    };
     assert_eq!(digests(mapper), last.digests, "nothing changes by itself");
     change(mapper);
     let after = digests(mapper);

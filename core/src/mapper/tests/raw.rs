@@ -1,0 +1,125 @@
+//! Raw pairs: the mapper's own rectification, and pixels that show nothing.
+
+use super::*;
+use crate::{
+    Digested,
+    image::InvalidPixels,
+    rectify::{Lens, LensModel, RawCamera, RawRig, Rectification, RectifierError, Sizing},
+};
+use nalgebra::Matrix3;
+
+const RAW: Capacity = Capacity { raw_width: WIDTH, raw_height: HEIGHT, ..CAPACITY };
+
+/// The walk's pictures taken for those of bent lenses, the right camera rolled: what they show is of no matter here.
+fn config(focal_px: Option<f64>) -> Config {
+    let model = LensModel::RadialTangential { radial: [-0.05, 0.01, 0.0, 0.0, 0.0, 0.0], tangential: [1e-4, 0.0] };
+    let lens = Lens::new([RIG.focal_px; 2], [RIG.center_u_px, RIG.center_v_px], model).unwrap();
+    let camera = RawCamera { lens, width: WIDTH as u32, height: HEIGHT as u32 };
+    let (sine, cosine) = (0.004f64.sin(), 0.004f64.cos());
+    let raw = RawRig {
+        left: camera,
+        right: camera,
+        r_right_left: Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0),
+        t_right_left_m: Vector3::new(-RIG.baseline_m, 0.0, 0.0),
+    };
+    let sizing = Sizing::Given { width: WIDTH as u32, height: HEIGHT as u32, focal_px };
+    let (rectification, rig) = Rectification::of(&raw, sizing).unwrap();
+    Config { rig, rectification: Some(rectification), ..Walk::config() }
+}
+
+fn with_raw_mapper<R>(config: &Config, test: impl FnOnce(&mut Mapper<'_>) -> R) -> R {
+    let mut slab = vec![0u8; RAW.bytes() + SLAB_ALIGN];
+    test(&mut Mapper::new(&RAW, config, &mut slab).unwrap())
+}
+
+#[test]
+fn a_raw_pair_is_mapped_as_the_rectified_pair_is() {
+    let (walk, config) = (Walk::new(4), config(None));
+    let mut rectified = Vec::new();
+    let raw: Vec<Report> = with_raw_mapper(&config, |mapper| {
+        assert!(mapper.rectifier.invalid().is_none());
+        let step = |at| {
+            let report = walk.step(at, mapper);
+            rectified.push(mapper.rectified_pair().unwrap().map(|image| image.pixels().to_vec()));
+            report
+        };
+        (0..4).map(step).collect()
+    });
+    let ready = Walk { pairs: rectified, ..walk };
+    let plain = Config { rectification: None, ..config };
+    let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
+    let mut mapper = Mapper::new(&CAPACITY, &plain, &mut slab).unwrap();
+    for (at, raw) in raw.iter().enumerate() {
+        let report = ready.step(at, &mut mapper);
+        assert_eq!(raw.digests.first_difference(&report.digests), Some(Digested::Input), "the input alone differs");
+        assert_eq!(StageDigests { input: 0, ..raw.digests }, StageDigests { input: 0, ..report.digests });
+        assert!(raw.rectification.is_some() && report.rectification.is_none() && raw.digest != report.digest);
+    }
+}
+
+#[test]
+fn pixels_that_show_nothing_have_neither_disparity_nor_match() {
+    let (walk, config) = (Walk::new(3), config(Some(0.7 * RIG.focal_px)));
+    with_raw_mapper(&config, |mapper| {
+        let mut valid = 0;
+        for at in 0..3 {
+            let report = walk.step(at, mapper);
+            assert!(report.rectification.unwrap().invalid_left > 1_000);
+            let invalid = mapper.rectifier.invalid().unwrap();
+            for (v, row) in mapper.disparity_q8().rows().enumerate() {
+                valid += row.iter().filter(|disparity| **disparity != 0).count();
+                assert!(invalid.left.in_row(v).all(|u| row[u] == 0), "row {v}");
+            }
+            let shows = |invalid: &InvalidPixels<'_>, at: [f32; 2]| !invalid.contains(at[0] as usize, at[1] as usize);
+            assert!(
+                mapper.scene_flow.sparse().iter().all(|m| shows(&invalid.left, m.current_left) && shows(&invalid.right, m.current_right))
+            );
+        }
+        assert!(valid > WIDTH * HEIGHT / 4 && !mapper.scene_flow.sparse().is_empty());
+    });
+}
+
+#[test]
+fn a_raw_mapper_goes_on_from_its_snapshot_and_refuses_other_sizes() {
+    let (walk, config) = (Walk::new(4), config(Some(0.7 * RIG.focal_px)));
+    let mut saved = Vec::new();
+    let next = with_raw_mapper(&config, |mapper| {
+        for at in 0..3 {
+            walk.step(at, mapper);
+        }
+        let mut sink = |bytes: &[u8]| {
+            saved.extend_from_slice(bytes);
+            Ok::<(), ()>(())
+        };
+        mapper.save(&mut sink).unwrap();
+        walk.step(3, mapper)
+    });
+    let mut slab = vec![0u8; RAW.bytes() + SLAB_ALIGN];
+    let mut rest = saved.as_slice();
+    let mut source = |bytes: &mut [u8]| {
+        let (now, later) = rest.split_at_checked(bytes.len()).ok_or(())?;
+        bytes.copy_from_slice(now);
+        rest = later;
+        Ok::<(), ()>(())
+    };
+    let mut mapper = Mapper::restore(&RAW, &config, &mut slab, &mut source).unwrap();
+    let restored = walk.step(3, &mut mapper);
+    assert_eq!((restored.digest, restored.digests), (next.digest, next.digests));
+
+    let small = vec![0u8; 100 * 80];
+    let small = View::new(&small, 100, 80).unwrap();
+    let refused = mapper.step(&StereoFrame::pair(small, small), &Serial);
+    assert_eq!(refused.unwrap_err(), StepError::RawSizeDiffers { width: WIDTH, height: HEIGHT });
+    let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
+    let refused = Mapper::new(&CAPACITY, &config, &mut slab).unwrap_err();
+    assert_eq!(refused, NewError::Rectification(RectifierError::RawTooLarge { width: 0, height: 0 }));
+}
+
+#[test]
+fn bytes_are_those_of_the_regions() {
+    assert_eq!(RAW.footprint().bytes(), RAW.bytes());
+    let pixels = CAPACITY.pixels();
+    let words = WIDTH.div_ceil(64) * HEIGHT;
+    let whole = |bytes: usize| bytes.next_multiple_of(SLAB_ALIGN);
+    assert_eq!(RAW.bytes() - CAPACITY.bytes(), 2 * (whole(4 * pixels) + whole(8 * words) + whole(pixels)));
+}
