@@ -1,4 +1,4 @@
-//! What digests cost: a block's and an image's, to be held against a frame's time.
+//! What digests cost: a block's and an image's, to compare with a frame's time.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::digest::Digest;

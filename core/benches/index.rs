@@ -1,6 +1,6 @@
-//! The block index against a plain table: linear probes and deletion by shifting back, at no more bytes. A drive's churn: blocks ahead are
-//! entered, those behind struck, and around each there are lookups. Besides the mean it prints how long single insertions take: cleaning in
-//! place must not become a spike.
+//! The block index against a plain table: linear probes and deletion by shifting back, at no more bytes. The churn of a moving camera: blocks ahead are
+//! entered, those behind removed, and around each there are lookups. Besides the mean it prints how long single insertions take: cleaning in
+//! home must not become a spike.
 
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a bench may stop at what it does not expect")]
 
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// Blocks of the `onboard` profile.
 const BLOCKS: usize = 53_000;
-/// Blocks across the street: a slice of it enters while another is struck.
+/// Blocks across the street: a slice of it is inserted while another is removed.
 const SLICE: usize = 1_000;
 const SLOTS: usize = 1 << 17;
 
@@ -42,7 +42,7 @@ impl Table for BlockIndex<'_> {
 /// Slots + 1 by hash; 0 is none.
 struct Plain(Vec<u32>);
 
-fn place(coord: BlockCoord) -> usize {
+fn home(coord: BlockCoord) -> usize {
     let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
     let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
@@ -51,7 +51,7 @@ fn place(coord: BlockCoord) -> usize {
 
 impl Plain {
     fn seek(&self, coords: &[BlockCoord], coord: BlockCoord) -> Result<usize, usize> {
-        let mut at = place(coord);
+        let mut at = home(coord);
         while self.0[at] != 0 {
             if coords[self.0[at] as usize - 1] == coord {
                 return Ok(at);
@@ -68,7 +68,7 @@ impl Table for Plain {
     }
 
     fn insert(&mut self, coords: &[BlockCoord], coord: BlockCoord, slot: Slot) {
-        let mut at = place(coord);
+        let mut at = home(coord);
         while self.0[at] != 0 {
             at = (at + 1) & (SLOTS - 1);
         }
@@ -82,8 +82,8 @@ impl Table for Plain {
         loop {
             at = (at + 1) & (SLOTS - 1);
             let Some(slot) = self.0[at].checked_sub(1) else { break };
-            // It may move into the hole unless its own place lies behind the hole.
-            if (at.wrapping_sub(place(coords[slot as usize])) & (SLOTS - 1)) >= (at.wrapping_sub(hole) & (SLOTS - 1)) {
+            // It may move into the hole unless its own home lies behind the hole.
+            if (at.wrapping_sub(home(coords[slot as usize])) & (SLOTS - 1)) >= (at.wrapping_sub(hole) & (SLOTS - 1)) {
                 self.0[hole] = self.0[at];
                 hole = at;
             }
@@ -108,20 +108,20 @@ struct Drive<T> {
 
 impl<T: Table> Drive<T> {
     fn new(table: T) -> Self {
-        let mut drive = Self {
+        let mut churn = Self {
             table,
             coords: vec![BlockCoord::default(); BLOCKS],
             entered: 0,
             insertions_ns: Vec::new(),
         };
         for _ in 0..40 * BLOCKS / SLICE {
-            drive.slice();
+            churn.slice();
         }
-        drive.insertions_ns.clear();
-        drive
+        churn.insertions_ns.clear();
+        churn
     }
 
-    /// One slice ahead: strikes the oldest blocks, enters new ones, looks each up four times.
+    /// One slice ahead: removes the oldest blocks, inserts new ones, looks each up four times.
     fn slice(&mut self) -> Duration {
         let begin = Instant::now();
         for number in self.entered..self.entered + SLICE {

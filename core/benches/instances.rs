@@ -1,7 +1,7 @@
 //! What objects add to a frame at KITTI size on one thread: CPU time of the stage `instances` and of the whole step, with 0, 1, 4 and 8 cars
-//! detected in the same pictures. A street of textured boxes is rendered from a camera in motion; the cars drive along with it, 8 to 15 m away, so
+//! detected in the same pictures. A street of textured boxes is rendered from a camera in motion; the cars map_frames along with it, 8 to 15 m away, so
 //! that in every frame measured every car detected is tracked, followed by its own matches and fused (the bench fails where one is not). Poses
-//! are given: cars nobody detects must not lead the camera astray.
+//! are given: undetected cars must not lead the camera astray.
 //!
 //! `cargo bench -p dynvox-core --bench instances`
 #![allow(
@@ -170,7 +170,7 @@ impl Executor for Timed {
 }
 
 /// Drives past, `count` cars detected; CPU time of the stage and of the step, summed over the frames measured.
-fn drive(frames: &[Frame], slab: &mut [u8], count: usize) -> [Duration; 2] {
+fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize) -> [Duration; 2] {
     let mut mapper = Mapper::new(&Capacity::ONBOARD, &Config::for_rig(RIG), slab).unwrap();
     let mut spent = [Duration::ZERO; 2];
     for (at, frame) in frames.iter().enumerate() {
@@ -199,8 +199,8 @@ fn bench(criterion: &mut Criterion) {
     for (what, count) in [("instances", 0), ("instances", 1), ("instances", 4), ("instances", 8), ("step", 0), ("step", 8)] {
         criterion.bench_function(&format!("{what}/{count} cars"), |bencher| {
             bencher.iter_custom(|times| {
-                let drives = (0..times).map(|_| drive(&frames, &mut slab[start..], count));
-                drives.map(|[instances, step]| if what == "step" { step } else { instances }).sum::<Duration>() / MEASURED as u32
+                let runs = (0..times).map(|_| map_frames(&frames, &mut slab[start..], count));
+                runs.map(|[instances, step]| if what == "step" { step } else { instances }).sum::<Duration>() / MEASURED as u32
             });
         });
     }

@@ -1,4 +1,4 @@
-//! Pruning, per 10,000 blocks visited, at `onboard`'s block layout (with colour): blocks without a faint voxel, blocks of which some voxels
+//! Pruning, per 10,000 blocks visited, at `onboard`'s block layout (with colour): blocks without a voxel of low weight, blocks with some voxels
 //! go, and blocks that go as a whole. CPU time of one thread.
 
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a bench may stop at what it does not expect")]
@@ -60,7 +60,7 @@ fn bench(criterion: &mut Criterion) {
         volume.fuse(&view, seen, &Serial);
     };
     // Shifts of the walls fused before each pruning; what only one frame saw goes.
-    for (name, shifts) in [("nothing_faint", &[0.0, 0.0][..]), ("some_faint", &[0.0, 0.0, 0.8]), ("all_freed", &[0.0])] {
+    for (name, shifts) in [("no_low_weight", &[0.0, 0.0][..]), ("some_low_weight", &[0.0, 0.0, 0.8]), ("all_freed", &[0.0])] {
         criterion.bench_function(&format!("prune_10000_blocks/{name}"), |bencher| {
             bencher.iter_custom(|iterations| {
                 let mut spent = Duration::ZERO;
@@ -69,7 +69,7 @@ fn bench(criterion: &mut Criterion) {
                     let begin = ThreadTime::now();
                     let report = volume.prune_whole(1);
                     spent += begin.elapsed() * 10_000 / report.visited.max(1);
-                    assert!(report.visited > 10_000 && (report.voxels_reset > 0) == (name != "nothing_faint"), "{report:?}");
+                    assert!(report.visited > 10_000 && (report.voxels_reset > 0) == (name != "no_low_weight"), "{report:?}");
                     volume.prune_whole(u8::MAX);
                 }
                 spent

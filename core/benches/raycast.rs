@@ -61,12 +61,12 @@ fn depth(x: f64, y: f64, z: f64) -> f64 {
 }
 
 fn view(frame: usize) -> Viewpoint {
-    let turn = 0.05 * (frame as f64 * 0.2).sin();
-    let t_world_camera = Transform::new(Vector3::new(0.0, turn, 0.0), Vector3::new(0.0, 0.0, frame as f64 * STEP_M));
+    let yaw_rad = 0.05 * (frame as f64 * 0.2).sin();
+    let t_world_camera = Transform::new(Vector3::new(0.0, yaw_rad, 0.0), Vector3::new(0.0, 0.0, frame as f64 * STEP_M));
     Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera }
 }
 
-fn drive(volume: &mut Volume<'_>) {
+fn fill(volume: &mut Volume<'_>) {
     let mut depth_m = vec![0.0f32; WIDTH * HEIGHT];
     let mut grey = vec![0u8; WIDTH * HEIGHT];
     for frame in 0..FRAMES {
@@ -103,7 +103,7 @@ fn bench(criterion: &mut Criterion) {
     let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
     let mut volume = Volume::new_in(&capacity, &VolumeConfig::default(), &mut carver);
     let mut caster = Raycaster::new_in(&capacity, &RaycastConfig::default(), &mut carver);
-    drive(&mut volume);
+    fill(&mut volume);
 
     let mut at = 0;
     criterion.bench_function("raycast", |bencher| {

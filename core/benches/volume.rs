@@ -89,7 +89,7 @@ fn bench(criterion: &mut Criterion) {
     let start = slab.as_ptr().align_offset(64);
     let mut volume = Volume::new_in(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
 
-    let mut drive = |criterion: &mut Criterion, name: &str, only_fuse: bool| {
+    let mut bench = |criterion: &mut Criterion, name: &str, only_fuse: bool| {
         let mut at = 0;
         criterion.bench_function(name, |bencher| {
             bencher.iter_custom(|iterations| {
@@ -110,8 +110,8 @@ fn bench(criterion: &mut Criterion) {
             });
         });
     };
-    drive(criterion, "allocate", false);
-    drive(criterion, "fuse", true);
+    bench(criterion, "allocate", false);
+    bench(criterion, "fuse", true);
     println!("blocks {}, visible in the last frame {}", volume.pool().len(), volume.visible().slots().len());
 }
 

@@ -1,4 +1,4 @@
-//! Writes the matches of a drive through the synthetic street as the lines of a fixture's `matches.csv`: how `fixtures/matches-640x192` was made.
+//! Writes the matches of a sequence of the synthetic street as the lines of a fixture's `matches.csv`: how `fixtures/matches-640x192` was made.
 
 use dynvox::synth::{Street, StreetConfig};
 use dynvox_core::{

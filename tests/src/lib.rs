@@ -47,7 +47,7 @@ impl Clip {
     pub fn stereo(&self) -> impl Iterator<Item = StereoFrame<'_>> {
         let (width, height) = (self.street.config().width as usize, self.street.config().height as usize);
         self.frames.iter().map(move |frame| {
-            let view = |pixels| View::new(pixels, width, height).expect("a whole image");
+            let view = |pixels| View::new(pixels, width, height).expect("a image image");
             StereoFrame::pair(view(&frame.left_grey), view(&frame.right_grey))
         })
     }
@@ -55,10 +55,10 @@ impl Clip {
     /// What a detector without faults would see in each frame.
     pub fn sightings(&self) -> Vec<Vec<InstanceMask>> {
         let of = |frame: &SynthFrame| {
-            let whole = PixelBox { left: 0, top: 0, width: frame.width as i32, height: frame.height as i32 };
+            let image = PixelBox { left: 0, top: 0, width: frame.width as i32, height: frame.height as i32 };
             let holds = |car: usize, u: i32, v: i32| usize::from(frame.instances[v as usize * frame.width + u as usize]) == car + 1;
             let cars = frame.objects.iter().enumerate();
-            cars.filter_map(|(car, _)| InstanceMask::from_predicate(Class::Car, 0.9, whole, |u, v| holds(car, u, v))).collect()
+            cars.filter_map(|(car, _)| InstanceMask::from_predicate(Class::Car, 0.9, image, |u, v| holds(car, u, v))).collect()
         };
         self.frames.iter().map(of).collect()
     }
@@ -68,9 +68,9 @@ impl Clip {
         self.frames[frame].left_grey[pixel] ^= 1;
     }
 
-    /// Runs `drive` with a mapper of that capacity.
-    pub fn with_mapper<R>(&self, capacity: &Capacity, drive: impl FnOnce(&mut Mapper<'_>) -> R) -> R {
+    /// Runs `run` with a mapper of that capacity.
+    pub fn with_mapper<R>(&self, capacity: &Capacity, run: impl FnOnce(&mut Mapper<'_>) -> R) -> R {
         let mut slab = HeapSlab::of(capacity);
-        drive(&mut Mapper::new(capacity, &self.config(), slab.bytes()).expect("the slab fits the capacity"))
+        run(&mut Mapper::new(capacity, &self.config(), slab.bytes()).expect("the slab fits the capacity"))
     }
 }

@@ -21,7 +21,7 @@ pub fn files(extensions: &[&str]) -> Vec<PathBuf> {
             }
             if kind.is_dir() && name != "target" && name != "out" {
                 folders.push(path);
-            } else if path.extension().is_some_and(|extension| extensions.iter().any(|&wanted| extension == wanted)) {
+            } else if path.extension().is_some_and(|extension| extensions.iter().any(|&known| extension == known)) {
                 found.push(path.strip_prefix(&root).expect("below the root").to_owned());
             }
         }

@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 
-# Where core's panics begin. Whatever else calls the panic handler is a place of its own.
+# Where core's panics begin. Every other caller of the panic handler is listed by itself.
 PANICKING = re.compile(r"\bpanicking::|::(expect|unwrap|len_mismatch|slice_\w+)_failed?\b|::slice_index_fail\b|::len_mismatch_fail\b|handle_alloc_error|capacity_overflow|panic_const|::panic_\w+$")
 HANDLER = re.compile(r"rust_begin_unwind$")
 CALL = re.compile(r"^(bl|blx|b|b[a-z]{2})(\.w|\.n)?$")
@@ -121,7 +121,7 @@ def main():
     program, allow, failures = Program(options.elf), allowed(options.allow), []
     nice = program.nice
 
-    # Calls through pointers become calls to whatever the allow-list says they reach.
+    # Calls through pointers become calls to what the allow-list says they reach.
     for function, addresses in program.pointers.items():
         entry = next((entry for entry in allow if entry[0] == "pointer" and entry[1][0].search(nice[function])), None)
         if entry:

@@ -25,7 +25,7 @@ need() {
     >"$build/apt.log" 2>&1 || skip "$wanted is missing and $* cannot be installed: $(tail -n 1 "$build/apt.log")"
 }
 
-# A compiler that has its library's source beside it, to build the library for targets nobody ships it for: the toolchain in
+# A compiler that has its library's source beside it, to build the library for targets without a shipped one: the toolchain in
 # use where it has that component, else Debian's. And the linker that all of them share.
 cross_toolchain() {
   local sysroot

@@ -7,7 +7,7 @@ use dynvox_core::{
 use dynvox_tests::{Clip, HeapSlab};
 
 #[test]
-fn the_footprint_is_what_was_cut_to_the_byte() {
+fn the_footprint_matches_the_formula_to_the_byte() {
     let clip = Clip::street(320, 96, 1);
     for (name, capacity) in Capacity::PROFILES {
         clip.with_mapper(&capacity, |mapper| {
@@ -30,7 +30,7 @@ fn a_slab_too_small_is_refused_with_the_bytes_it_lacks() {
 }
 
 #[test]
-fn use_grows_with_the_map_and_never_beyond_what_was_cut() {
+fn use_grows_with_the_map_and_never_beyond_its_regions() {
     let clip = Clip::street(320, 96, 6);
     clip.with_mapper(&Capacity::TINY, |mapper| {
         let mut last = 0;

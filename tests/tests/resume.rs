@@ -1,4 +1,4 @@
-//! A drive through traffic that stops at a frame and goes on in another slab gives the digests on file.
+//! A sequence with traffic that is saved at a frame and restored in another slab gives the digests on file.
 
 use dynvox::fixtures::pack;
 use dynvox_clip::{CAPACITY, Clip, Frame, FrameDigests, Pair, config};
@@ -49,8 +49,8 @@ fn the_street_stopped_at_any_frame_and_resumed_gives_the_digests_on_file() {
         let (mut slab, mut rest) = (HeapSlab::of(&CAPACITY), &bytes[..]);
         slab.bytes().fill(0xA5);
         let mut source = |piece: &mut [u8]| -> Result<(), ()> {
-            let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(())?;
-            piece.copy_from_slice(taken);
+            let (front, behind) = rest.split_at_checked(piece.len()).ok_or(())?;
+            piece.copy_from_slice(front);
             rest = behind;
             Ok(())
         };

@@ -46,7 +46,7 @@ fn painted<R>(work: impl FnOnce() -> R) -> (R, usize) {
 
 #[test]
 fn making_a_mapper_a_step_saving_and_restoring_stay_within_32_kib_of_stack() {
-    let drive = || {
+    let measured = || {
         let clip = Clip::street(320, 96, 12);
         let mut slab = HeapSlab::of(&Capacity::TINY);
         let config = clip.config();
@@ -76,7 +76,7 @@ fn making_a_mapper_a_step_saving_and_restoring_stay_within_32_kib_of_stack() {
         assert!(restored.is_ok());
         [("making", making), ("a step", step), ("saving", saving), ("restoring", restoring)]
     };
-    let peaks = thread::Builder::new().stack_size(4 << 20).spawn(drive).expect("a thread").join().expect("no panic");
+    let peaks = thread::Builder::new().stack_size(4 << 20).spawn(measured).expect("a thread").join().expect("no panic");
     println!("stack, bytes at most: {peaks:?}; the mapper itself: {}", size_of::<Mapper<'_>>());
     for (what, peak) in peaks {
         assert!(peak > 1_000, "{what}: the paint shows something");

@@ -1,4 +1,4 @@
-//! A drive that outgrows its pool, with a file beside it.
+//! A map that outgrows its pool, with a file for the blocks that leave.
 
 use dynvox::run::store::{BlockFile, mesh};
 use dynvox_core::objects::NoSink;
@@ -35,7 +35,7 @@ fn bits(Triangle { vertices }: Triangle) -> Bits {
     })
 }
 
-fn drive<S: BlockStore>(clip: &Clip, mapper: &mut Mapper<'_>, store: &mut S) -> Vec<Report> {
+fn map_clip<S: BlockStore>(clip: &Clip, mapper: &mut Mapper<'_>, store: &mut S) -> Vec<Report> {
     clip.stereo().map(|frame| mapper.step_with(&frame, &Serial, store, &mut NoSink).expect("a good frame")).collect()
 }
 
@@ -50,7 +50,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let mut unbounded = Vec::new();
     let mut slab = HeapSlab::of(&LARGE);
     let mut mapper = Mapper::new(&LARGE, &config, slab.bytes()).expect("a slab that fits");
-    let reports = drive(&clip, &mut mapper, &mut NoStore);
+    let reports = map_clip(&clip, &mut mapper, &mut NoStore);
     assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0, "the large pool holds it all");
     mapper.triangles(&mut |triangle| unbounded.push(bits(triangle)));
 
@@ -58,7 +58,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let (mut store, mut streamed) = (file(&folder), Vec::new());
     let mut slab = HeapSlab::of(&SMALL);
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
-    let reports = drive(&clip, &mut mapper, &mut store);
+    let reports = map_clip(&clip, &mut mapper, &mut store);
     let evicted = sum(&reports, |report| report.allocation.eviction.kept);
     assert!(evicted > 2_000, "{evicted} blocks left: the pool is outgrown");
     assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0);
@@ -84,7 +84,7 @@ fn a_full_disk_is_told_from_the_first_lost_block_on_and_the_drive_goes_on() {
     store.limit(300_000);
     let mut slab = HeapSlab::of(&SMALL);
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
-    let reports = drive(&clip, &mut mapper, &mut store);
+    let reports = map_clip(&clip, &mut mapper, &mut store);
     assert!(store.failure().is_some() && store.bytes() <= 300_000);
     let kept = sum(&reports, |report| report.allocation.eviction.kept);
     assert!(kept > 0 && sum(&reports, |report| report.allocation.eviction.lost) > 0);
@@ -108,7 +108,7 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
         let mut store = file(&folder);
         let mut slab = HeapSlab::of(&capacity);
         let mut mapper = Mapper::new(&capacity, &config, slab.bytes()).expect("a slab that fits");
-        let reports = drive(&clip, &mut mapper, &mut store);
+        let reports = map_clip(&clip, &mut mapper, &mut store);
         let pruned = mapper.finish();
         let last = reports.last().expect("frames were taken");
         let made = sum(&reports, |report| report.allocation.made);

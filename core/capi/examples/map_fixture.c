@@ -46,7 +46,7 @@ static void count(void *context, const DynvoxTriangle *triangle) {
   ++*(uint64_t *)context;
 }
 
-static bool keep(void *context, const DynvoxBlock *block) {
+static bool store_block(void *context, const DynvoxBlock *block) {
   (void)block;
   ++*(uint32_t *)context;
   return true;
@@ -129,17 +129,17 @@ int main(int argc, char **argv) {
   check(dynvox_raycast(mapper, &pose, &picture), "raycast");
   size_t seen = 0;
   for (size_t i = 0; i < width * height; ++i) seen += depth_m[i] > 0;
-  uint64_t triangles = 0, said = 0;
-  check(dynvox_triangles(mapper, count, &triangles, &said), "triangles");
-  uint32_t left = 0, kept = 0, lost = 0;
-  DynvoxStore store = {&left, keep, NULL};
+  uint64_t triangles = 0, reported = 0;
+  check(dynvox_triangles(mapper, count, &triangles, &reported), "triangles");
+  uint32_t left = 0, stored = 0, lost = 0;
+  DynvoxStore store = {&left, store_block, NULL};
   check(dynvox_finish(mapper), "finish");
-  check(dynvox_stream_out(mapper, &store, &kept, &lost), "stream out");
+  check(dynvox_stream_out(mapper, &store, &stored, &lost), "stream out");
   check(dynvox_destroy(mapper), "destroy");
   fprintf(stderr, "%zu of %zu pixels show the map, %llu triangles, %u blocks left\n", seen, width * height, (unsigned long long)triangles,
           (unsigned)left);
   free(depth_m);
   free(buffer);
   free(clip);
-  return triangles == said && left == kept && lost == 0 && seen > 0 ? 0 : 1;
+  return triangles == reported && left == stored && lost == 0 && seen > 0 ? 0 : 1;
 }

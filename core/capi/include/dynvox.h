@@ -11,13 +11,13 @@
 //   dynvox_triangles(mapper, print, NULL, NULL);
 //   dynvox_destroy(mapper);
 //
-// Ownership: the buffer is the mapper's from dynvox_create to dynvox_destroy; nobody else may touch, move or free it meanwhile. All else
-// that is handed over is read, or written, during the call alone. Nothing is ever allocated, and nothing of a mapper lies elsewhere.
+// Ownership: the buffer is the mapper's from dynvox_create to dynvox_destroy; nothing else may touch, move or free it meanwhile. All other
+// arguments are read, or written, during the call only. Nothing is ever allocated, and nothing of a mapper lies elsewhere.
 // Alignment: the buffer begins at a multiple of dynvox_alignment(); everything else at its type's.
-// Threads: a mapper may move between threads, but one at a time may use it; mappers do not know of each other. There are no globals.
+// Threads: a mapper may move between threads, but one at a time may use it; mappers are independent. There are no globals.
 // Callbacks run on the calling thread and must not call their own mapper.
-// Errors: every function says DYNVOX_STATUS_OK or why not; dynvox_status_text turns it into a sentence. Null pointers, misalignment, wrong
-// sizes, numbers that are not, and calls from a callback are statuses. Undefined, as everywhere in C: pointers to less memory than they
+// Errors: every function returns DYNVOX_STATUS_OK or the reason; dynvox_status_text turns it into a sentence. Null pointers, misalignment, wrong
+// sizes, numbers that are not finite, and calls from a callback are statuses. Undefined, as everywhere in C: pointers to less memory than they
 // say, handles whose buffer is gone, two threads in one mapper.
 //
 // Written by cbindgen from core/capi/src; DYNVOX_BLESS=1 cargo test -p dynvox-capi --test header writes it anew.
@@ -30,7 +30,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// What a call comes back with. Whatever is not DYNVOX_STATUS_OK has changed nothing.
+// The result of a call. A call that does not return DYNVOX_STATUS_OK has changed nothing.
 typedef enum {
   // Done.
   DYNVOX_STATUS_OK = 0,
@@ -46,7 +46,7 @@ typedef enum {
   DYNVOX_STATUS_BUSY,
   // A frame's memory lies within the mapper's buffer.
   DYNVOX_STATUS_OVERLAP,
-  // There is no such profile, class or the like.
+  // An unknown profile, class or track.
   DYNVOX_STATUS_UNKNOWN,
   // The configuration cannot be used: dynvox_config_problem says why. A calibration that is not finite is one reason.
   DYNVOX_STATUS_CONFIG,
@@ -58,7 +58,7 @@ typedef enum {
   DYNVOX_STATUS_SIZE_CHANGED,
   // More detections than a frame can have (64).
   DYNVOX_STATUS_TOO_MANY,
-  // There has been no frame yet.
+  // No frame yet.
   DYNVOX_STATUS_NO_FRAME,
 } DynvoxStatus;
 
@@ -87,7 +87,7 @@ typedef struct {
   double baseline_m;
 } DynvoxRig;
 
-// What is most often told a mapper. dynvox_config_default fills it.
+// The settings that are changed most often. dynvox_config_default fills it.
 typedef struct {
   // The cameras.
   DynvoxRig rig;
@@ -103,11 +103,11 @@ typedef struct {
   uint8_t prune_weight;
   // Length of the window, frames.
   uint32_t prune_lag;
-  // Whether detections are followed and kept out of the static map.
+  // Whether detections are tracked and kept out of the static map.
   bool dynamic;
 } DynvoxConfig;
 
-// How large a mapper is. Numbers as in dynvox's own table of profiles.
+// Size of a mapper. Numbers as in dynvox's own table of profiles.
 typedef uint32_t DynvoxProfile;
 
 // An image of one byte a pixel, three for a colour image: red, green, blue.
@@ -132,11 +132,11 @@ typedef struct {
   uint32_t width;
   // Rows of the box, px.
   uint32_t height;
-  // `width` times `height` bytes, row by row; a pixel belongs to the thing unless its byte is 0.
+  // `width` times `height` bytes, row by row; a pixel belongs to the object unless its byte is 0.
   const uint8_t *mask;
 } DynvoxDetection;
 
-// Where a camera is: a rotation as a quaternion of length 1 and a translation, camera to world. Camera axes: x right, y down, z forward.
+// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world. Camera axes: x right, y down, z forward.
 typedef struct {
   // w, x, y, z.
   double rotation[4];
@@ -156,7 +156,7 @@ typedef struct {
   DynvoxImage right;
   // Left image in colour, or null pixels.
   DynvoxImage colour;
-  // Detections in any order; null where there are none.
+  // Detections in any order; null without detections.
   const DynvoxDetection *detections;
   // How many.
   size_t detection_count;
@@ -164,9 +164,9 @@ typedef struct {
   const DynvoxPose *t_world_camera;
 } DynvoxFrame;
 
-// A block of 8 x 8 x 8 voxels that leaves the map; x runs fastest, then y, then z. For the length of the call alone.
+// An evicted block of 8 x 8 x 8 voxels; x runs fastest, then y, then z. Valid during the call.
 typedef struct {
-  // Its place, blocks.
+  // Coordinates, blocks.
   int16_t coord[3];
   // 512 signed distances, 1/32767 of the truncation.
   const int16_t *sdf;
@@ -176,9 +176,9 @@ typedef struct {
   const uint8_t *colour;
 } DynvoxBlock;
 
-// A block that is made again, to be filled in with what was kept of it. All zero as it comes. For the length of the call alone.
+// A block that becomes visible again, all zero, to be filled from the store. Valid during the call.
 typedef struct {
-  // Its place, blocks.
+  // Coordinates, blocks.
   int16_t coord[3];
   // 512 signed distances.
   int16_t *sdf;
@@ -186,17 +186,18 @@ typedef struct {
   uint8_t *weight;
   // 512 reds, greens and blues, plane by plane; null where the map has no colour.
   uint8_t *colour;
-} DynvoxReturningBlock;
+} DynvoxLoadedBlock;
 
-// The caller's memory for blocks. Called on the thread of the step, which waits for it; must not call the same mapper, which answers
+// The caller's store of blocks. Called on the thread of the step, which waits for it; must not call the same mapper, which answers
 // DYNVOX_STATUS_BUSY then.
 typedef struct {
   // Handed to both functions.
   void *context;
-  // Keeps a block that leaves; keeping it again replaces what was kept. False when it cannot: then it is lost, and counted. Null: all are.
-  bool (*keep)(void *context, const DynvoxBlock *block);
-  // Fills in a block that is made again; false when nothing was kept of it. Null: nothing ever was.
-  bool (*bring_back)(void *context, const DynvoxReturningBlock *block);
+  // Stores an evicted block; the last one stored at its coordinates counts. False when it cannot: the block is lost, and counted. Null: all
+  // are lost.
+  bool (*store)(void *context, const DynvoxBlock *block);
+  // Fills a block; false when none is stored at its coordinates. Null: none is.
+  bool (*load)(void *context, const DynvoxLoadedBlock *block);
 } DynvoxStore;
 
 // What one step did.
@@ -217,9 +218,9 @@ typedef struct {
   uint32_t blocks;
   // Most blocks ever in use.
   uint32_t blocks_peak;
-  // Blocks there is room for.
+  // Blocks the pool holds.
   uint32_t blocks_capacity;
-  // Blocks refused in this step: no room, or beyond the map.
+  // Blocks refused in this step: pool full, or beyond the map.
   uint32_t blocks_refused;
   // Blocks that left in this step and were kept by the store.
   uint32_t blocks_kept;
@@ -233,10 +234,10 @@ typedef struct {
   uint64_t digest;
 } DynvoxReport;
 
-// What the map looks like from somewhere: rooms of the caller's, any of which may be null. The picture is as large as the frames were;
-// its rows follow each other without padding.
+// A rendered view of the map: buffers of the caller, any may be null. The view has the size of the frames; its rows follow each other
+// without padding.
 typedef struct {
-  // Pixels there is room for in every room that is not null.
+  // Pixels that each buffer holds, unless it is null.
   size_t capacity;
   // Depth, m; 0 where there is no surface.
   float *depth_m;
@@ -244,7 +245,7 @@ typedef struct {
   int8_t *normal;
   // Three bytes a pixel: red, green, blue.
   uint8_t *colour;
-  // How often the surface was seen.
+  // How often the surface was observed.
   uint8_t *weight;
   // Written: columns.
   size_t width;
@@ -254,13 +255,13 @@ typedef struct {
 
 // A corner of a triangle.
 typedef struct {
-  // Place in the world, m.
+  // Position in the world, m.
   float position_m[3];
   // Red, green, blue.
   uint8_t colour[3];
 } DynvoxVertex;
 
-// A piece of the map's surface, its corners counter-clockwise seen from free space.
+// A triangle of the map's surface, its corners counter-clockwise seen from free space.
 typedef struct {
   // The corners.
   DynvoxVertex vertices[3];
@@ -291,11 +292,11 @@ const char *dynvox_status_text(uint32_t status);
 // Writes all defaults for a rig.
 //
 // # Safety
-// `rig` is null or points to a rig, `config` is null or to room for a configuration.
+// `rig` is null or points to a rig, `config` is null or points to a configuration.
 DynvoxStatus dynvox_config_default(const DynvoxRig *rig, DynvoxConfig *config);
 
-// Writes the first thing wrong with a configuration as text that ends in a zero byte, cut off at `len` bytes; the empty text when
-// nothing is.
+// Writes the first problem of a configuration as text that ends in a zero byte, truncated to `len` bytes; the empty text without a
+// problem.
 //
 // # Safety
 // `config` is null or points to a configuration, `text` is null or to `len` bytes.
@@ -309,14 +310,14 @@ size_t dynvox_alignment(void);
 // Writes how many bytes of buffer a mapper of that profile takes.
 //
 // # Safety
-// `bytes` is null or points to room for a number.
+// `bytes` is null or points to a number.
 DynvoxStatus dynvox_bytes(DynvoxProfile profile, size_t *bytes);
 
-// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nobody else may read,
+// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nothing else may read,
 // write, move or free it. What it holds before does not matter. Takes less than 32 KiB of stack, as a step does.
 //
 // # Safety
-// `config` is null or points to a configuration, `buffer` is null or to `len` bytes that are nobody else's, `mapper` is null or to room for
+// `config` is null or points to a configuration, `buffer` is null or points to `len` bytes used by nothing else, `mapper` is null or points to
 // a pointer.
 DynvoxStatus dynvox_create(DynvoxProfile profile,
                            const DynvoxConfig *config,
@@ -324,37 +325,37 @@ DynvoxStatus dynvox_create(DynvoxProfile profile,
                            size_t len,
                            DynvoxMapper **mapper);
 
-// Ends a mapper; its buffer is the caller's again. Whoever wants the map takes it first.
+// Ends a mapper; its buffer is the caller's again. Read the map out before.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there.
 DynvoxStatus dynvox_destroy(DynvoxMapper *mapper);
 
-// Takes one frame, on the calling thread: depth, motion, map. Blocks that must leave go to `store`, or are lost and counted where it is
-// null. What could not be done is counted in `report`, which may be null.
+// Processes one frame, on the calling thread: depth, motion, map. Evicted blocks go to `store`, or are lost and counted where it is null.
+// What was refused is counted in `report`, which may be null.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `frame` is null or points to a
-// frame whose images, detections and masks are as large as it says; `store` is null or points to a store; `report` is null or to room for
+// frame whose images, detections and masks are as large as it says; `store` is null or points to a store; `report` is null or points to
 // a report.
 DynvoxStatus dynvox_step(DynvoxMapper *mapper,
                          const DynvoxFrame *frame,
                          const DynvoxStore *store,
                          DynvoxReport *report);
 
-// Writes where the left camera was in the last frame; the identity before the first.
+// Writes the left camera's pose in the last frame; the identity before the first.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to
-// room for a pose.
+// a pose.
 DynvoxStatus dynvox_pose(DynvoxMapper *mapper,
                          DynvoxPose *pose);
 
-// Looks at the static map from a pose.
+// Renders the static map from a pose.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to a
-// pose; `picture` is null or points to a picture whose rooms are as large as it says and overlap nothing.
+// pose; `picture` is null or points to a picture whose buffers are as large as it says and overlap nothing.
 DynvoxStatus dynvox_raycast(DynvoxMapper *mapper,
                             const DynvoxPose *pose,
                             DynvoxPicture *picture);
@@ -362,25 +363,25 @@ DynvoxStatus dynvox_raycast(DynvoxMapper *mapper,
 // Hands every triangle of the static map to `sink`, and writes how many there were to `count`, which may be null.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or to room for
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or points to
 // a number.
 DynvoxStatus dynvox_triangles(DynvoxMapper *mapper,
                               DynvoxTriangleSink sink,
                               void *context,
                               uint64_t *count);
 
-// Lets every block of the static map leave into `store`, so that the store holds the whole map. Writes how many it kept to `kept` and
-// how many it did not to `lost`; either may be null.
+// Evicts every block of the static map into `store`, which holds the entire map then. Writes the number of stored blocks to `stored` and
+// of those the store refused to `lost`; either may be null.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `store` is null or points to a
-// store; `kept` and `lost` are null or to room for a number.
+// store; `stored` and `lost` are null or point to a number.
 DynvoxStatus dynvox_stream_out(DynvoxMapper *mapper,
                                const DynvoxStore *store,
-                               uint32_t *kept,
+                               uint32_t *stored,
                                uint32_t *lost);
 
-// Ends a drive: prunes what is still in the window. The map can be looked at and taken away as before.
+// Ends a sequence: prunes what is still in the window. The map can be rendered and read out as before.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
@@ -389,7 +390,7 @@ DynvoxStatus dynvox_finish(DynvoxMapper *mapper);
 // Writes a pose as the upper three rows of its matrix, row by row: twelve numbers.
 //
 // # Safety
-// `pose` is null or points to a pose, `matrix` is null or to room for twelve numbers.
+// `pose` is null or points to a pose, `matrix` is null or points to twelve numbers.
 DynvoxStatus dynvox_pose_matrix(const DynvoxPose *pose, double *matrix);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-//! Reading what a caller hands over: every pointer is checked for null and alignment here, and nowhere else.
+//! Reading a caller's pointers: every pointer is checked for null and alignment here, and nowhere else.
 
 use crate::DynvoxStatus;
 use core::{ops::Range, slice};
@@ -24,7 +24,7 @@ pub unsafe fn read<T: Copy>(pointer: *const T) -> Result<T, DynvoxStatus> {
 /// The pointer, when a value can be written there.
 ///
 /// # Safety
-/// None is needed to look; whoever writes needs room for a `T`.
+/// None for the check; writing needs a pointer to a `T`.
 pub unsafe fn output<T>(pointer: *mut T) -> Result<*mut T, DynvoxStatus> {
     if pointer.is_null() {
         Err(DynvoxStatus::Null)
@@ -38,7 +38,7 @@ pub unsafe fn output<T>(pointer: *mut T) -> Result<*mut T, DynvoxStatus> {
 /// Items of a caller's that must not lie in `forbidden`, the mapper's own buffer.
 ///
 /// # Safety
-/// `pointer` is null, misaligned or points to `len` items that nobody writes to for 'a.
+/// `pointer` is null, misaligned or points to `len` items that nothing writes to for 'a.
 pub unsafe fn items<'a, T>(pointer: *const T, len: usize, forbidden: &Range<usize>) -> Result<&'a [T], DynvoxStatus> {
     if len == 0 {
         return Ok(&[]);
@@ -62,13 +62,13 @@ pub unsafe fn items<'a, T>(pointer: *const T, len: usize, forbidden: &Range<usiz
 /// As [`items`], to be written to.
 ///
 /// # Safety
-/// `pointer` is null, misaligned or points to `len` items that nobody else reads or writes for 'a.
+/// `pointer` is null, misaligned or points to `len` items that nothing else reads or writes for 'a.
 pub unsafe fn items_mut<'a, T>(pointer: *mut T, len: usize, forbidden: &Range<usize>) -> Result<&'a mut [T], DynvoxStatus> {
     // SAFETY: the same promise, and more.
     unsafe { items(pointer.cast_const(), len, forbidden)? };
     if len == 0 {
         return Ok(&mut []);
     }
-    // SAFETY: checked above; nobody else uses them by the caller's promise.
+    // SAFETY: checked above; nothing else uses them by the caller's promise.
     Ok(unsafe { slice::from_raw_parts_mut(pointer, len) })
 }

@@ -43,13 +43,13 @@ pub extern "C" fn dynvox_alignment() -> usize {
 /// Writes how many bytes of buffer a mapper of that profile takes.
 ///
 /// # Safety
-/// `bytes` is null or points to room for a number.
+/// `bytes` is null or points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_bytes(profile: DynvoxProfile, bytes: *mut usize) -> DynvoxStatus {
     // SAFETY: only looked at.
     match (capacity(profile), unsafe { output(bytes) }) {
         (Ok(capacity), Ok(bytes)) => {
-            // SAFETY: checked; room for one by the caller's promise.
+            // SAFETY: checked; of the right type by the caller's promise.
             unsafe { bytes.write(self::bytes(&capacity)) };
             DynvoxStatus::Ok
         }
@@ -57,11 +57,11 @@ pub unsafe extern "C" fn dynvox_bytes(profile: DynvoxProfile, bytes: *mut usize)
     }
 }
 
-/// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nobody else may read,
+/// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nothing else may read,
 /// write, move or free it. What it holds before does not matter. Takes less than 32 KiB of stack, as a step does.
 ///
 /// # Safety
-/// `config` is null or points to a configuration, `buffer` is null or to `len` bytes that are nobody else's, `mapper` is null or to room for
+/// `config` is null or points to a configuration, `buffer` is null or points to `len` bytes used by nothing else, `mapper` is null or points to
 /// a pointer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_create(
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn dynvox_create(
     DynvoxStatus::Ok
 }
 
-/// Ends a mapper; its buffer is the caller's again. Whoever wants the map takes it first.
+/// Ends a mapper; its buffer is the caller's again. Read the map out before.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there.

@@ -13,14 +13,14 @@ extern crate std;
 mod callback;
 mod given;
 mod handle;
-mod look;
+mod map;
 mod status;
 mod step;
 mod types;
 
-pub use callback::{DynvoxBlock, DynvoxReturningBlock, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink, DynvoxVertex};
+pub use callback::{DynvoxBlock, DynvoxLoadedBlock, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink, DynvoxVertex};
 pub use handle::{DynvoxMapper, dynvox_alignment, dynvox_bytes, dynvox_create, dynvox_destroy};
-pub use look::{DynvoxPicture, dynvox_finish, dynvox_pose_matrix, dynvox_raycast, dynvox_stream_out, dynvox_triangles};
+pub use map::{DynvoxPicture, dynvox_finish, dynvox_pose_matrix, dynvox_raycast, dynvox_stream_out, dynvox_triangles};
 pub use status::{DynvoxStatus, dynvox_status_text};
 pub use step::{dynvox_pose, dynvox_step};
 pub use types::{

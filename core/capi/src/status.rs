@@ -1,9 +1,9 @@
-//! What a call comes back with.
+//! The result of a call.
 
 use core::ffi::{CStr, c_char};
 use dynvox_core::{NewError, StepError, view::RaycastError};
 
-/// What a call comes back with. Whatever is not DYNVOX_STATUS_OK has changed nothing.
+/// The result of a call. A call that does not return DYNVOX_STATUS_OK has changed nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum DynvoxStatus {
@@ -21,7 +21,7 @@ pub enum DynvoxStatus {
     Busy,
     /// A frame's memory lies within the mapper's buffer.
     Overlap,
-    /// There is no such profile, class or the like.
+    /// An unknown profile, class or track.
     Unknown,
     /// The configuration cannot be used: dynvox_config_problem says why. A calibration that is not finite is one reason.
     Config,
@@ -33,7 +33,7 @@ pub enum DynvoxStatus {
     SizeChanged,
     /// More detections than a frame can have (64).
     TooMany,
-    /// There has been no frame yet.
+    /// No frame yet.
     NoFrame,
 }
 
@@ -44,16 +44,16 @@ impl DynvoxStatus {
             Self::Null => c"a pointer is null: give one",
             Self::Misaligned => c"a pointer is misaligned: buffers begin at a multiple of dynvox_alignment()",
             Self::TooSmall => c"a buffer is too small: dynvox_bytes says how much is needed",
-            Self::NoMapper => c"this is no mapper: create one, and use none that is destroyed",
+            Self::NoMapper => c"the handle is not a mapper's: create one, and do not use a destroyed one",
             Self::Busy => c"a callback called its own mapper: call it after the callback has returned",
             Self::Overlap => c"a frame lies within the mapper's buffer: keep it elsewhere",
-            Self::Unknown => c"there is no such value: see the enumeration in the header",
+            Self::Unknown => c"an unknown value: see the enumeration in the header",
             Self::Config => c"the configuration cannot be used: dynvox_config_problem says why",
             Self::Pose => c"a pose is not finite, not a rotation, or beyond the map",
             Self::Size => c"an image's size does not suit the profile",
             Self::SizeChanged => c"a frame's size differs from that of the frames before: create another mapper",
             Self::TooMany => c"too many detections: give the best 64",
-            Self::NoFrame => c"there has been no frame yet: step first",
+            Self::NoFrame => c"no frame yet: step first",
         }
     }
 }

@@ -13,12 +13,12 @@ use dynvox_core::{
     tracking::{Class, Detection, MAX_DETECTIONS},
 };
 
-/// Takes one frame, on the calling thread: depth, motion, map. Blocks that must leave go to `store`, or are lost and counted where it is
-/// null. What could not be done is counted in `report`, which may be null.
+/// Processes one frame, on the calling thread: depth, motion, map. Evicted blocks go to `store`, or are lost and counted where it is null.
+/// What was refused is counted in `report`, which may be null.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `frame` is null or points to a
-/// frame whose images, detections and masks are as large as it says; `store` is null or points to a store; `report` is null or to room for
+/// frame whose images, detections and masks are as large as it says; `store` is null or points to a store; `report` is null or points to
 /// a report.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_step(
@@ -33,17 +33,17 @@ pub unsafe extern "C" fn dynvox_step(
             let frame = read(frame)?;
             let mut store = if store.is_null() { DynvoxStore::NONE } else { read(store)? };
             let report = if report.is_null() { None } else { Some(output(report)?) };
-            let mut room = [NOTHING; MAX_DETECTIONS];
-            let taken = StereoFrame {
+            let mut buffered = [NOTHING; MAX_DETECTIONS];
+            let frame_in_core = StereoFrame {
                 left: image(&frame, frame.left, buffer)?.ok_or(DynvoxStatus::Null)?,
                 right: image(&frame, frame.right, buffer)?.ok_or(DynvoxStatus::Null)?,
                 colour: image(&frame, frame.colour, buffer)?,
                 class: None,
-                detections: detections(&frame, &mut room, buffer)?,
+                detections: detections(&frame, &mut buffered, buffer)?,
                 disparity_q8: None,
                 t_world_camera: if frame.t_world_camera.is_null() { None } else { Some(read(frame.t_world_camera)?.transform()?) },
             };
-            let done = mapper.step_with(&taken, &Serial, &mut store, &mut NoSink)?;
+            let done = mapper.step_with(&frame_in_core, &Serial, &mut store, &mut NoSink)?;
             if let Some(report) = report {
                 report.write((&done).into());
             }
@@ -52,11 +52,11 @@ pub unsafe extern "C" fn dynvox_step(
     }
 }
 
-/// Writes where the left camera was in the last frame; the identity before the first.
+/// Writes the left camera's pose in the last frame; the identity before the first.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to
-/// room for a pose.
+/// a pose.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_pose(mapper: *mut DynvoxMapper, pose: *mut DynvoxPose) -> DynvoxStatus {
     // SAFETY: the caller's promise.
@@ -85,24 +85,24 @@ unsafe fn image<'a, T>(frame: &DynvoxFrame, image: DynvoxImage, buffer: &Range<u
 
 const NOTHING: Detection<'static> = Detection { class: Class::Other, score: 0.0, left: 0, top: 0, width: 0, height: 0, mask: &[] };
 
-/// The frame's detections, in `room`.
+/// The frame's detections, copied to `buffered`.
 ///
 /// # Safety
 /// There are as many as the frame says, and their masks are as large as they say.
 unsafe fn detections<'a>(
     frame: &DynvoxFrame,
-    room: &'a mut [Detection<'a>; MAX_DETECTIONS],
+    buffered: &'a mut [Detection<'a>; MAX_DETECTIONS],
     buffer: &Range<usize>,
 ) -> Result<&'a [Detection<'a>], DynvoxStatus> {
     // SAFETY: the caller's promise.
     let given: &[DynvoxDetection] = unsafe { items(frame.detections, frame.detection_count, buffer)? };
-    let room = room.get_mut(..given.len()).ok_or(DynvoxStatus::TooMany)?;
-    for (slot, &DynvoxDetection { class_code, score, left, top, width, height, mask }) in room.iter_mut().zip(given) {
+    let buffered = buffered.get_mut(..given.len()).ok_or(DynvoxStatus::TooMany)?;
+    for (slot, &DynvoxDetection { class_code, score, left, top, width, height, mask }) in buffered.iter_mut().zip(given) {
         let class = *Class::ALL.get(usize::from(class_code)).ok_or(DynvoxStatus::Unknown)?;
         let len = (width as usize).checked_mul(height as usize).ok_or(DynvoxStatus::Size)?;
         // SAFETY: the caller's promise.
         let mask = unsafe { items(mask, len, buffer)? };
         *slot = Detection { class, score, left, top, width, height, mask };
     }
-    Ok(room)
+    Ok(buffered)
 }

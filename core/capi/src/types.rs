@@ -1,4 +1,4 @@
-//! Plain values that cross the border.
+//! Plain values of the interface.
 
 use crate::{
     DynvoxStatus,
@@ -7,7 +7,7 @@ use crate::{
 use core::ffi::c_char;
 use dynvox_core::{Capacity, Config, Report, Severity, geometry::StereoRig, geometry::Transform};
 
-/// How large a mapper is. Numbers as in dynvox's own table of profiles.
+/// Size of a mapper. Numbers as in dynvox's own table of profiles.
 pub type DynvoxProfile = u32;
 /// Below 8 MiB, images up to 320 x 96, no colour.
 pub const DYNVOX_PROFILE_TINY: DynvoxProfile = 0;
@@ -37,7 +37,7 @@ pub struct DynvoxRig {
     pub baseline_m: f64,
 }
 
-/// What is most often told a mapper. dynvox_config_default fills it.
+/// The settings that are changed most often. dynvox_config_default fills it.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxConfig {
@@ -55,7 +55,7 @@ pub struct DynvoxConfig {
     pub prune_weight: u8,
     /// Length of the window, frames.
     pub prune_lag: u32,
-    /// Whether detections are followed and kept out of the static map.
+    /// Whether detections are tracked and kept out of the static map.
     pub dynamic: bool,
 }
 
@@ -77,7 +77,7 @@ impl DynvoxConfig {
 /// Writes all defaults for a rig.
 ///
 /// # Safety
-/// `rig` is null or points to a rig, `config` is null or to room for a configuration.
+/// `rig` is null or points to a rig, `config` is null or points to a configuration.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_config_default(rig: *const DynvoxRig, config: *mut DynvoxConfig) -> DynvoxStatus {
     // SAFETY: the caller's promise.
@@ -97,13 +97,13 @@ pub unsafe extern "C" fn dynvox_config_default(rig: *const DynvoxRig, config: *m
         prune_lag: defaults.volume.prune_lag,
         dynamic: defaults.instances.dynamic,
     };
-    // SAFETY: not null and aligned, as checked; room for one, as promised.
+    // SAFETY: not null and aligned, as checked; of the right type, as promised.
     unsafe { config.write(value) };
     DynvoxStatus::Ok
 }
 
-/// Writes the first thing wrong with a configuration as text that ends in a zero byte, cut off at `len` bytes; the empty text when
-/// nothing is.
+/// Writes the first problem of a configuration as text that ends in a zero byte, truncated to `len` bytes; the empty text without a
+/// problem.
 ///
 /// # Safety
 /// `config` is null or points to a configuration, `text` is null or to `len` bytes.
@@ -117,11 +117,11 @@ pub unsafe extern "C" fn dynvox_config_problem(config: *const DynvoxConfig, text
     if text.is_null() {
         return DynvoxStatus::Null;
     }
-    let Some(room) = len.checked_sub(1) else { return DynvoxStatus::TooSmall };
+    let Some(most) = len.checked_sub(1) else { return DynvoxStatus::TooSmall };
     let problems = config.resolved().validate();
     let parts = problems.first().map_or(["", "", ""], |problem| [problem.key, " ", problem.rule]);
     let mut written = 0;
-    for byte in parts.into_iter().flat_map(str::bytes).take(room) {
+    for byte in parts.into_iter().flat_map(str::bytes).take(most) {
         // SAFETY: below `len`.
         unsafe { text.add(written).write(byte as c_char) };
         written += 1;
@@ -131,7 +131,7 @@ pub unsafe extern "C" fn dynvox_config_problem(config: *const DynvoxConfig, text
     DynvoxStatus::Ok
 }
 
-/// Where a camera is: a rotation as a quaternion of length 1 and a translation, camera to world. Camera axes: x right, y down, z forward.
+/// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world. Camera axes: x right, y down, z forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct DynvoxPose {
@@ -183,7 +183,7 @@ pub struct DynvoxDetection {
     pub width: u32,
     /// Rows of the box, px.
     pub height: u32,
-    /// `width` times `height` bytes, row by row; a pixel belongs to the thing unless its byte is 0.
+    /// `width` times `height` bytes, row by row; a pixel belongs to the object unless its byte is 0.
     pub mask: *const u8,
 }
 
@@ -201,7 +201,7 @@ pub struct DynvoxFrame {
     pub right: DynvoxImage,
     /// Left image in colour, or null pixels.
     pub colour: DynvoxImage,
-    /// Detections in any order; null where there are none.
+    /// Detections in any order; null without detections.
     pub detections: *const DynvoxDetection,
     /// How many.
     pub detection_count: usize,
@@ -241,9 +241,9 @@ pub struct DynvoxReport {
     pub blocks: u32,
     /// Most blocks ever in use.
     pub blocks_peak: u32,
-    /// Blocks there is room for.
+    /// Blocks the pool holds.
     pub blocks_capacity: u32,
-    /// Blocks refused in this step: no room, or beyond the map.
+    /// Blocks refused in this step: pool full, or beyond the map.
     pub blocks_refused: u32,
     /// Blocks that left in this step and were kept by the store.
     pub blocks_kept: u32,

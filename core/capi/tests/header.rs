@@ -7,9 +7,9 @@ use std::{fs, path::Path};
 fn the_header_is_what_the_source_says() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(here.join("cbindgen.toml")).expect("the configuration can be read");
-    let rooms = ["status", "types", "callback", "handle", "step", "look"];
-    let builder = rooms.iter().fold(cbindgen::Builder::new().with_config(config), |builder, room| {
-        builder.with_src(here.join("src").join(room).with_extension("rs"))
+    let modules = ["status", "types", "callback", "handle", "step", "map"];
+    let builder = modules.iter().fold(cbindgen::Builder::new().with_config(config), |builder, module| {
+        builder.with_src(here.join("src").join(module).with_extension("rs"))
     });
     let mut bytes = Vec::new();
     builder.generate().expect("the source can be read").write(&mut bytes);

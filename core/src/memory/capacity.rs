@@ -19,13 +19,13 @@ pub struct Capacity {
     pub blocks: usize,
     /// Blocks visible in one frame. Further ones are not fused in that frame, and counted.
     pub visible_blocks: usize,
-    /// Frames the visible history spans. A longer `prune_lag` is cut to this, and each frame pruned early is counted.
+    /// Frames the visible history spans. A longer `prune_lag` is shortened to this, and each frame pruned early is counted.
     pub history_frames: usize,
-    /// Detections taken in one frame, at most [`crate::tracking::MAX_DETECTIONS`]. Of more the lowest scores are refused and counted.
+    /// Detections accepted in one frame, at most [`crate::tracking::MAX_DETECTIONS`]. Beyond, the lowest scores are refused and counted.
     pub detections: usize,
     /// Words of 64 pixels for the masks of one frame. Further masks are refused and counted.
     pub mask_words: usize,
-    /// Things tracked. When all are taken the one unseen for longest goes; one seen lately stays and the new one is refused and counted.
+    /// Tracks. When all are in use the one unseen for longest is dropped, unless it was seen lately: then the new one is refused and counted.
     pub tracks: usize,
     /// Objects reconstructed at once, at most [`crate::objects::MAX_OBJECTS`]. The one fused longest ago is handed over for another.
     pub objects: usize,
@@ -95,7 +95,7 @@ impl Capacity {
         crop_pixels: 800_000,
         colour: true,
     };
-    /// Below 2 GiB: a drive of some hundred metres at full size, in colour.
+    /// Below 2 GiB: some hundred metres of road at full size, in colour.
     pub const DESKTOP: Self = Self {
         image_width: 1_920,
         image_height: 1_088,

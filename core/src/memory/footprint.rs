@@ -2,15 +2,15 @@
 
 use heapless::Vec;
 
-/// Most regions one slab can be cut into.
+/// Most regions of one slab.
 const MAX_REGIONS: usize = 96;
 
 /// One named region of the slab. All figures in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
-    /// `room.what`, as `volume.sdf`.
+    /// `stage.what`, as `volume.sdf`.
     pub name: &'static str,
-    /// Bytes cut for it, padding to the next region included.
+    /// Bytes allocated for it, padding to the next region included.
     pub bytes: usize,
     /// Bytes in use now. Working images count as used throughout.
     pub used: usize,
@@ -18,14 +18,14 @@ pub struct Region {
     pub peak: usize,
 }
 
-/// The list of all regions, in the order in which they were cut.
+/// The list of all regions, in slab order.
 #[derive(Clone, Debug, Default)]
 pub struct Footprint {
     regions: Vec<Region, MAX_REGIONS>,
 }
 
 impl Footprint {
-    /// Records so many bytes under a name: to the last region if that is its name, else to a new one. Whether there was room for it.
+    /// Records so many bytes under a name: to the last region if that is its name, else to a new one. Whether the list holds it.
     pub(super) fn record(&mut self, name: &'static str, bytes: usize) -> bool {
         if let Some(last) = self.regions.last_mut().filter(|last| last.name == name) {
             (last.bytes, last.used, last.peak) = (last.bytes + bytes, last.used + bytes, last.peak + bytes);
@@ -44,7 +44,7 @@ impl Footprint {
         self.regions.iter().find(|region| region.name == name)
     }
 
-    /// Bytes cut in all.
+    /// Bytes of all regions.
     pub fn bytes(&self) -> usize {
         self.regions.iter().map(|region| region.bytes).sum()
     }

@@ -1,6 +1,6 @@
-//! The slab and what is cut from it.
+//! The slab and its regions.
 //!
-//! A caller owns all memory: one aligned byte slab, cut once into named, typed regions ([`Carver`]), counted to the byte
+//! A caller owns all memory: one byte slab, divided once into named, typed regions ([`Carver`]), counted to the byte
 //! ([`Footprint`]) and sized by one table of bounds ([`Capacity`]). Nothing here grows; full is a value.
 
 mod capacity;

@@ -105,16 +105,16 @@ pub struct Carver<'s> {
 }
 
 impl<'s> Carver<'s> {
-    /// Starts at the first aligned byte of `slab`, of which `wanted` bytes will be used.
+    /// Starts at the first aligned byte of `slab` and will use `needed` bytes.
     ///
     /// # Errors
-    /// [`SlabError::TooSmall`]: fewer than `wanted` bytes follow the first aligned one.
-    pub fn new(slab: &'s mut [u8], wanted: usize) -> Result<Self, SlabError> {
+    /// [`SlabError::TooSmall`]: fewer than `needed` bytes follow the first aligned one.
+    pub fn new(slab: &'s mut [u8], needed: usize) -> Result<Self, SlabError> {
         let skipped = slab.as_ptr().align_offset(SLAB_ALIGN);
         let len = slab.len();
         match slab.get_mut(skipped..) {
-            Some(aligned) if aligned.len() >= wanted => Ok(Self { rest: Some(aligned), ..Self::without_slab() }),
-            _ => Err(SlabError::TooSmall { missing: skipped.saturating_add(wanted) - len }),
+            Some(aligned) if aligned.len() >= needed => Ok(Self { rest: Some(aligned), ..Self::without_slab() }),
+            _ => Err(SlabError::TooSmall { missing: skipped.saturating_add(needed) - len }),
         }
     }
 
@@ -229,7 +229,7 @@ mod tests {
         assert_eq!(carver.alloc::<u8>("a", 64).len(), 64);
         assert_eq!(carver.alloc::<u8>("b", 200).len(), 0);
         assert_eq!(carver.alloc::<u8>("c", 1_000).len(), 0);
-        assert_eq!(carver.alloc::<u8>("d", 1).len(), 0, "although there is room");
+        assert_eq!(carver.alloc::<u8>("d", 1).len(), 0, "although it would fit");
         assert_eq!(carver.check(), Err(SlabError::TooSmall { missing: 256 - 128 }));
         assert_eq!(carver.footprint().bytes(), 64);
     }
@@ -268,13 +268,13 @@ mod tests {
     #[test]
     fn skips_to_the_first_aligned_byte() {
         let mut slab = std::boxed::Box::new(Slab([0u8; 192]));
-        for lead in 1..=64 {
-            let wanted = 128;
-            let mut carver = Carver::new(&mut slab[lead..], wanted).unwrap();
+        for offset in 1..=64 {
+            let needed = 128;
+            let mut carver = Carver::new(&mut slab[offset..], needed).unwrap();
             assert_eq!(carver.alloc::<u64>("a", 16).as_ptr().align_offset(SLAB_ALIGN), 0);
             assert_eq!(carver.check(), Ok(()));
-            let short = Carver::new(&mut slab[lead..], wanted + 1).unwrap_err();
-            assert_eq!(short, SlabError::TooSmall { missing: 1 }, "{lead} bytes behind an aligned one");
+            let short = Carver::new(&mut slab[offset..], needed + 1).unwrap_err();
+            assert_eq!(short, SlabError::TooSmall { missing: 1 }, "{offset} bytes behind an aligned one");
         }
         assert_eq!(Carver::new(&mut slab[1..3], 0).unwrap_err(), SlabError::TooSmall { missing: 61 });
     }

@@ -25,9 +25,9 @@ fn recursion(seed: usize) -> u64 {
 
 #[inline(never)]
 fn frame(seed: usize) -> u64 {
-    let mut room = [0u8; 100_000];
-    black_box(&mut room);
-    room.get(seed).copied().map_or(0, u64::from)
+    let mut frame = [0u8; 100_000];
+    black_box(&mut frame);
+    frame.get(seed).copied().map_or(0, u64::from)
 }
 
 /// An allocation.

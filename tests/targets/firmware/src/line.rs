@@ -1,6 +1,6 @@
 //! A line of text without `core::fmt`, which would bring panics along.
 
-/// Room for a frame's digests with sixteen objects.
+/// Space for a frame's digests with sixteen objects.
 const LONGEST: usize = 512;
 
 /// A line under construction; what does not fit is cut off.
@@ -35,7 +35,7 @@ impl Line {
 
     /// Adds a number in sixteen hexadecimal digits.
     pub fn hex(mut self, value: u64) -> Self {
-        for digit in (0..16).rev().map(|place| (value >> (4 * place)) as u8 & 15) {
+        for digit in (0..16).rev().map(|digit_at| (value >> (4 * digit_at)) as u8 & 15) {
             self.push(if digit < 10 { b'0' + digit } else { b'a' - 10 + digit });
         }
         self

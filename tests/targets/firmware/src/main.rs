@@ -41,10 +41,10 @@ fn run() -> u8 {
     let (Some(slab), Ok(clip)) = (SLAB.try_take(), Clip::new(CLIP)) else { return 2 };
     let mut expected = Lines(DIGESTS.as_bytes()).filter(|line| line.first() != Some(&b'#'));
     let mut paint = Paint::below();
-    let (mut wrong, mut whole, mut step) = (0u32, 0, 0);
+    let (mut wrong, mut most, mut step) = (0u32, 0, 0);
     let done = replay(&clip, &mut slab.0, &Serial, |frame| {
         let bytes = paint.used_below();
-        whole = paint.used_in_all().max(whole);
+        most = paint.used_in_all().max(most);
         // What the first frame shows is mostly the making of the mapper.
         step = if frame.frame == 0 { 0 } else { bytes.max(step) };
         let digests = written(frame);
@@ -63,13 +63,13 @@ fn run() -> u8 {
         platform::put(&Line::new().str("snapshot ").hex(snapshot).str("\n"));
         wrong += u32::from(snapshot == 0);
     }
-    platform::put(&Line::new().str("stack of a step ").decimal(step).str(", of everything ").decimal(whole).str("\n"));
+    platform::put(&Line::new().str("stack of a step ").decimal(step).str(", of everything ").decimal(most).str("\n"));
     #[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
     platform::put(&Line::new().hex(faults::all(CLIP.len())).str("\n"));
     match (done, wrong + missing) {
         (Err(_), _) => 2,
         (Ok(()), 1..) => 1,
-        (Ok(()), 0) if whole > STACK => 3,
+        (Ok(()), 0) if most > STACK => 3,
         (Ok(()), 0) => 0,
     }
 }

@@ -72,15 +72,15 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
         digest.u64(report.severity() as u64);
     }
     let pose = *mapper.t_world_camera();
-    let mut look = |seen: Option<&Raycaster<'_>>| {
+    let mut hash_view = |seen: Option<&Raycaster<'_>>| {
         let depth_m = seen.and_then(Raycaster::depth_m).into_iter().flat_map(|image| image.rows()).flatten();
         depth_m.for_each(|&depth_m| digest.f64(f64::from(depth_m)));
         let normals = seen.and_then(Raycaster::normal).into_iter().flat_map(|image| image.rows()).flatten();
         normals.for_each(|normal| digest.bytes(&normal.map(|x| x as u8)));
     };
-    look(mapper.raycast(&pose, &Serial).ok());
-    look(mapper.raycast_composed(&pose, &Serial).ok());
-    look(mapper.raycast_object(black_box(1), &pose, &Serial).ok());
+    hash_view(mapper.raycast(&pose, &Serial).ok());
+    hash_view(mapper.raycast_composed(&pose, &Serial).ok());
+    hash_view(mapper.raycast_object(black_box(1), &pose, &Serial).ok());
     let triangles = mapper.triangles(&mut |triangle| {
         triangle.vertices.iter().flat_map(|vertex| vertex.position_m).for_each(|x| digest.f64(f64::from(x)));
     });

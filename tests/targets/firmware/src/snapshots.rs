@@ -7,7 +7,7 @@ use static_cell::ConstStaticCell;
 
 /// Frames before the snapshot: tracks, an object, a full pruning window and blocks that left are in it.
 const FRAMES: usize = 14;
-/// Room for a snapshot of a map whose pool is full.
+/// Space for a snapshot of a map whose pool is full.
 const MOST_BYTES: usize = 6 << 20;
 
 static BYTES: ConstStaticCell<[u8; MOST_BYTES]> = ConstStaticCell::new([0; MOST_BYTES]);
@@ -21,9 +21,9 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
     digest.bytes(bytes.get(..len).unwrap_or_default());
     let mut from = 0;
     let mut source = |piece: &mut [u8]| {
-        let taken = bytes.get(from..len).and_then(|rest| rest.get(..piece.len())).ok_or(())?;
-        piece.copy_from_slice(taken);
-        from += taken.len();
+        let front = bytes.get(from..len).and_then(|rest| rest.get(..piece.len())).ok_or(())?;
+        piece.copy_from_slice(front);
+        from += front.len();
         Ok::<(), ()>(())
     };
     let mut made = Mapper::restore(&CAPACITY, &config(clip), slab, &mut source);
@@ -47,8 +47,8 @@ fn saved(clip: &Clip<'_>, slab: &mut [u8], bytes: &mut [u8]) -> Option<usize> {
     }
     let mut len = 0;
     let mut sink = |piece: &[u8]| {
-        let room = bytes.get_mut(len..).and_then(|rest| rest.get_mut(..piece.len())).ok_or(())?;
-        room.copy_from_slice(piece);
+        let target = bytes.get_mut(len..).and_then(|rest| rest.get_mut(..piece.len())).ok_or(())?;
+        target.copy_from_slice(piece);
         len += piece.len();
         Ok::<(), ()>(())
     };

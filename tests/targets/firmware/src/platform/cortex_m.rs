@@ -1,4 +1,4 @@
-//! A bare Cortex-M under semihosting: text and the exit code go to whoever watches (a debugger, QEMU).
+//! A bare Cortex-M under semihosting: text and the exit code go to the debugger or QEMU.
 
 use core::arch::asm;
 

@@ -4,7 +4,7 @@ use core::arch::asm;
 #[cfg(not(target_arch = "powerpc64"))]
 use core::arch::global_asm;
 
-/// A system call of three arguments; what it returns is nobody's business here.
+/// A system call of three arguments; what it returns is not used.
 ///
 /// # Safety
 /// The arguments must be what the call of that number reads.

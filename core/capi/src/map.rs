@@ -1,4 +1,4 @@
-//! Looking at the map and taking it away.
+//! Rendering the map and reading it out.
 
 use crate::{
     DynvoxMapper, DynvoxPose, DynvoxStatus, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink,
@@ -8,12 +8,12 @@ use crate::{
 use core::{ffi::c_void, ops::Range};
 use dynvox_core::{Serial, image::View};
 
-/// What the map looks like from somewhere: rooms of the caller's, any of which may be null. The picture is as large as the frames were;
-/// its rows follow each other without padding.
+/// A rendered view of the map: buffers of the caller, any may be null. The view has the size of the frames; its rows follow each other
+/// without padding.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxPicture {
-    /// Pixels there is room for in every room that is not null.
+    /// Pixels that each buffer holds, unless it is null.
     pub capacity: usize,
     /// Depth, m; 0 where there is no surface.
     pub depth_m: *mut f32,
@@ -21,7 +21,7 @@ pub struct DynvoxPicture {
     pub normal: *mut i8,
     /// Three bytes a pixel: red, green, blue.
     pub colour: *mut u8,
-    /// How often the surface was seen.
+    /// How often the surface was observed.
     pub weight: *mut u8,
     /// Written: columns.
     pub width: usize,
@@ -29,11 +29,11 @@ pub struct DynvoxPicture {
     pub height: usize,
 }
 
-/// Looks at the static map from a pose.
+/// Renders the static map from a pose.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to a
-/// pose; `picture` is null or points to a picture whose rooms are as large as it says and overlap nothing.
+/// pose; `picture` is null or points to a picture whose buffers are as large as it says and overlap nothing.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_raycast(mapper: *mut DynvoxMapper, pose: *const DynvoxPose, picture: *mut DynvoxPicture) -> DynvoxStatus {
     // SAFETY: the caller's promise.
@@ -57,22 +57,22 @@ pub unsafe extern "C" fn dynvox_raycast(mapper: *mut DynvoxMapper, pose: *const 
     }
 }
 
-/// Copies an image into a room, unless the room is null.
+/// Copies an image into a buffer, unless the buffer is null.
 ///
 /// # Safety
-/// `room` is null or to as many pixels as the image has, which nobody else uses.
-unsafe fn fill<T: Copy>(seen: Option<View<'_, T>>, room: *mut T, buffer: &Range<usize>) -> Result<(), DynvoxStatus> {
-    let Some(seen) = seen.filter(|_| !room.is_null()) else { return Ok(()) };
+/// `output` is null or points to as many pixels as the image has, which nothing else uses.
+unsafe fn fill<T: Copy>(image: Option<View<'_, T>>, output: *mut T, mapper: &Range<usize>) -> Result<(), DynvoxStatus> {
+    let Some(image) = image.filter(|_| !output.is_null()) else { return Ok(()) };
     // SAFETY: the caller's promise.
-    let room = unsafe { items_mut(room, seen.width() * seen.height(), buffer)? };
-    room.iter_mut().zip(seen.rows().flatten()).for_each(|(to, from)| *to = *from);
+    let output = unsafe { items_mut(output, image.width() * image.height(), mapper)? };
+    output.iter_mut().zip(image.rows().flatten()).for_each(|(to, from)| *to = *from);
     Ok(())
 }
 
 /// Hands every triangle of the static map to `sink`, and writes how many there were to `count`, which may be null.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or to room for
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or points to
 /// a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_triangles(
@@ -98,28 +98,28 @@ pub unsafe extern "C" fn dynvox_triangles(
     }
 }
 
-/// Lets every block of the static map leave into `store`, so that the store holds the whole map. Writes how many it kept to `kept` and
-/// how many it did not to `lost`; either may be null.
+/// Evicts every block of the static map into `store`, which holds the entire map then. Writes the number of stored blocks to `stored` and
+/// of those the store refused to `lost`; either may be null.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `store` is null or points to a
-/// store; `kept` and `lost` are null or to room for a number.
+/// store; `stored` and `lost` are null or point to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_stream_out(
     mapper: *mut DynvoxMapper,
     store: *const DynvoxStore,
-    kept: *mut u32,
+    stored: *mut u32,
     lost: *mut u32,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, _| {
             let mut store = read(store)?;
-            let kept = if kept.is_null() { None } else { Some(output(kept)?) };
+            let stored = if stored.is_null() { None } else { Some(output(stored)?) };
             let lost = if lost.is_null() { None } else { Some(output(lost)?) };
             let report = mapper.stream_out(&mut store);
-            if let Some(kept) = kept {
-                kept.write(report.kept);
+            if let Some(stored) = stored {
+                stored.write(report.kept);
             }
             if let Some(lost) = lost {
                 lost.write(report.lost);
@@ -129,7 +129,7 @@ pub unsafe extern "C" fn dynvox_stream_out(
     }
 }
 
-/// Ends a drive: prunes what is still in the window. The map can be looked at and taken away as before.
+/// Ends a sequence: prunes what is still in the window. The map can be rendered and read out as before.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn dynvox_finish(mapper: *mut DynvoxMapper) -> DynvoxStatu
 /// Writes a pose as the upper three rows of its matrix, row by row: twelve numbers.
 ///
 /// # Safety
-/// `pose` is null or points to a pose, `matrix` is null or to room for twelve numbers.
+/// `pose` is null or points to a pose, `matrix` is null or points to twelve numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_pose_matrix(pose: *const DynvoxPose, matrix: *mut f64) -> DynvoxStatus {
     // SAFETY: the caller's promise.
