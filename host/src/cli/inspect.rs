@@ -14,12 +14,13 @@ pub struct InspectArgs {
 }
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
-    let (kind, found) = match input::survey(&args.path, args.dataset) {
+    let (layout, found) = match input::survey(&args.path, args.dataset) {
         // What cannot be mapped may be good for something else.
         Err(error @ InputError::Layout { .. }) => return other(&args.path).unwrap_or(Err(error.into())),
         survey => survey?,
     };
-    println!("{}: {} ({} sequence{})", args.path.display(), kind.name(), found.len(), if found.len() == 1 { "" } else { "s" });
+    println!("{}: {} ({} sequence{})", args.path.display(), layout.name(), found.len(), if found.len() == 1 { "" } else { "s" });
+    println!("  {}", layout.describe(&args.path));
     for one in &found {
         println!();
         if let Some(sequence) = &one.sequence {

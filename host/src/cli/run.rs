@@ -8,7 +8,7 @@ use crate::evaluate::objects::Medians;
 use crate::formats;
 use crate::input::depth::{self, DepthChoice};
 use crate::input::masks::{self, MaskChoice};
-use crate::input::{self, CameraPair, FrameSource, Layout, Scaled};
+use crate::input::{self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking};
 use crate::observe::Reference;
 use crate::report::{self, Summary};
 use crate::run::{self, FolderError, HOST_OVERHEAD_BYTES, Plan, RunError, RunFolder, RunRecord, Stopped, Streaming};
@@ -32,6 +32,15 @@ pub struct RunArgs {
     /// Camera pair of KITTI odometry
     #[arg(long, value_enum, default_value_t)]
     images: CameraPair,
+    /// Significant bits of 16-bit images, 8 to 16; told from the largest value of some of them otherwise
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=16))]
+    bits: Option<u32>,
+    /// Both images of a pair lie in one file [default: told from the calibration]
+    #[arg(long, value_enum, value_name = "HOW")]
+    stacked: Option<Stacking>,
+    /// Calibration in place of the recording's own: KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Byte budget: tiny, small, onboard or desktop
     #[arg(long, default_value = "onboard", value_name = "NAME")]
     profile: String,
@@ -139,9 +148,20 @@ impl RunArgs {
         self.quiet || self.json
     }
 
+    fn options(&self) -> OpenOptions {
+        OpenOptions {
+            layout: self.dataset,
+            sequence: self.sequence.clone(),
+            cameras: self.images,
+            bits: self.bits,
+            stacking: self.stacked,
+            calibration: self.calibration.clone(),
+        }
+    }
+
     fn open(&self, settings: &Settings) -> anyhow::Result<Box<dyn FrameSource>> {
         let dataset: Box<dyn FrameSource> = match &self.path {
-            Some(path) => input::open(path, self.dataset, self.sequence.as_deref(), self.images)?,
+            Some(path) => input::open(path, &self.options())?,
             None if self.dataset.is_some() || self.sequence.is_some() => {
                 bail!("--dataset and --sequence need a data set. Give its path: `dynvox run PATH`")
             }

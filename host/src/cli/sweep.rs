@@ -1,7 +1,7 @@
 //! `dynvox sweep`.
 
 use super::run::{self, RunArgs};
-use crate::input::{self, CameraPair};
+use crate::input::{self, OpenOptions};
 use crate::sweep::{Data, Kind, Plan, RunResult, SweepFolder, Wanted, merge};
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
@@ -121,7 +121,7 @@ impl SweepArgs {
 /// What the map of a data set can be held against.
 fn reference(data: &Data) -> anyhow::Result<Option<&'static str>> {
     let Some(path) = &data.path else { return Ok(Some("exact")) };
-    let dataset = input::open(path, None, data.sequence.as_deref(), CameraPair::Auto)?;
+    let dataset = input::open(path, &OpenOptions { sequence: data.sequence.clone(), ..OpenOptions::default() })?;
     Ok((0..dataset.len()).any(|index| dataset.has_lidar(index)).then_some("lidar"))
 }
 

@@ -8,7 +8,9 @@ mod error;
 mod image;
 mod opencv_xml;
 mod pfm;
+mod picture;
 mod ply;
+mod png_numbers;
 mod poses;
 pub mod rle;
 mod rows;
@@ -16,9 +18,13 @@ mod rows;
 mod tests;
 
 pub use error::{FormatError, read_text};
-pub use image::{Decoded, Image, luma, png_size, read_png, read_png_deep, read_png_u16};
+pub use image::{Image, luma};
 pub use opencv_xml::read_opencv_depth;
 pub use pfm::read_pfm;
+pub use picture::{
+    Decoded, ENDINGS as PICTURE_ENDINGS, Picture, SAMPLE_BITS, decode_picture, picture_size, read_picture, significant_bits,
+};
 pub use ply::{Mesh, PlyWriter};
+pub use png_numbers::{read_png_deep, read_png_u16};
 pub use poses::{Trajectory, read_poses, write_kitti, write_numbered, write_tum};
-pub use rows::read_times;
+pub use rows::{parse_seconds, read_stamped_names, read_times};

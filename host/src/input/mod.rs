@@ -9,7 +9,7 @@ pub mod layouts;
 pub mod masks;
 pub mod source;
 
-pub use layouts::{CameraPair, Found, Layout, Sequence, StreetFrames, open, sequences_at, survey};
+pub use layouts::{CameraPair, Found, Layout, OpenOptions, Sequence, Stacking, StreetFrames, open, sequences_at, survey};
 pub use source::{
     AvailableMasks, DepthRefusals, ExactFrame, FrameMasks, FrameSource, GivenDepth, InputError, InstanceMask, LidarScan, MaskRefusals,
     ObjectsTruth, Scaled, StereoImages, TrueObject, read_given_poses,

@@ -2,7 +2,7 @@
 
 use crate::cli::settings::Settings;
 use crate::evaluate::stereo::{BAD_PX, StereoFigures, StereoPair, StereoTally, filled, find_stereo_set};
-use crate::formats::{Image, read_png, read_png_deep, read_png_u16};
+use crate::formats::{Image, read_picture, read_png_deep, read_png_u16};
 use crate::run::{HostSlab, Threads};
 use anyhow::bail;
 use dynvox_core::Capacity;
@@ -70,7 +70,7 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
 
 /// The core's own disparity of a pair.
 fn matched(pair: &StereoPair, config: &StereoConfig, threads: &Threads) -> anyhow::Result<Image<u16>> {
-    let [left, right] = [read_png(&pair.images[0])?.grey, read_png(&pair.images[1])?.grey];
+    let [left, right] = [read_picture(&pair.images[0])?.to_8_bit(None).grey, read_picture(&pair.images[1])?.to_8_bit(None).grey];
     let (width, height) = (left.width(), left.height());
     if (right.width(), right.height()) != (width, height) {
         bail!("{} and {} differ in size. Fetch the pair anew", pair.images[0].display(), pair.images[1].display());

@@ -7,11 +7,14 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments a run is begun with; with `--resume` they are those it was begun with. The others change nothing in the result.
-pub const BEGUN: [&str; 24] = [
+pub const BEGUN: [&str; 27] = [
     "path",
     "sequence",
     "dataset",
     "images",
+    "bits",
+    "stacked",
+    "calibration",
     "profile",
     "start",
     "frames",

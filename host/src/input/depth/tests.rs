@@ -4,7 +4,7 @@ use super::files::read;
 use super::*;
 use crate::formats::{Image, read_opencv_depth, read_pfm};
 use crate::input::source::{DepthRefusals, Quantity, to_disparity};
-use crate::input::{self, CameraPair, FrameSource, InputError, Scaled, StreetFrames};
+use crate::input::{self, FrameSource, InputError, OpenOptions, Scaled, StreetFrames};
 use crate::synth::StreetConfig;
 use dynvox_core::geometry::StereoRig;
 use std::fs;
@@ -130,7 +130,7 @@ fn rig(folder: &str, name: &str, file: &str) -> TempDir {
 
 fn laid_over(root: &TempDir, choice: &str) -> Result<Box<dyn FrameSource>, InputError> {
     let choice = choice.replace("ROOT", &root.path().display().to_string());
-    attach(input::open(root.path(), None, None, CameraPair::Auto)?, &choice.parse().unwrap())
+    attach(input::open(root.path(), &OpenOptions::default())?, &choice.parse().unwrap())
 }
 
 #[test]

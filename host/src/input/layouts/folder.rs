@@ -1,23 +1,36 @@
-//! A plain stereo folder: `left/*.png`, `right/*.png` (same names), `calib.txt`, and if known `times.txt` and `poses.txt`.
+//! Any two folders of images, one folder with prefixes or suffixes, or images that hold both cameras; beside them `calib.txt`, and if known
+//! `times.txt` and `poses.txt`.
 
-use super::kitti::present;
-use super::sequence::{Parts, Sequence};
-use crate::formats::{calibration, read_poses, read_times};
+use super::OpenOptions;
+use super::camera_folders::{camera_in, side_folders, split_by_mark};
+use super::names::pictures_in;
+use super::pairing::CameraFiles;
+use super::sequence::{ImageFiles, Parts, Sequence, camera_files, present, stamps_in_names};
+use super::stacked::Stacking;
+use crate::formats::{calibration, picture_size, read_poses, read_times};
 use crate::input::source::InputError;
-use std::path::Path;
+use dynvox_core::geometry::StereoRig;
+use std::path::{Path, PathBuf};
+
+/// How far a principal point lies from the middle of an image at most, as a share of its side.
+const CENTRAL: f64 = 0.2;
 
 /// Opens the folder. `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see [`calibration::read_rig`]).
-pub fn open(path: &Path) -> Result<Sequence, InputError> {
-    let action =
-        "A stereo folder has left/, right/ with the same file names, and calib.txt with focal_px, center_u_px, center_v_px, baseline_m";
-    let optional = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
+pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+    let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and cam1/, one folder with left_ and right_ before the \
+                  names, or both images in one file), and calib.txt with focal_px, center_u_px, center_v_px, baseline_m";
+    let file = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
+    let rig = match &options.calibration {
+        Some(given) => calibration::read_rig(given)?,
+        None => calibration::read_rig(&present(path.join("calib.txt"), action)?)?,
+    };
     Sequence::from_parts(Parts {
         name: path.canonicalize().ok().and_then(|full| Some(full.file_name()?.to_string_lossy().into_owned())).unwrap_or("folder".into()),
-        left: present(path.join("left"), action)?,
-        right: present(path.join("right"), action)?,
-        rig: calibration::read_rig(&present(path.join("calib.txt"), action)?)?,
-        times: optional("times.txt").map(|file| read_times(&file).map(|times| (file, times))).transpose()?,
-        poses: optional("poses.txt").map(|file| read_poses(&file).map(|read| (file, read.poses))).transpose()?,
+        images: images(path, action, options.stacking, &rig)?,
+        bits: options.bits,
+        rig,
+        times: file("times.txt").map(|file| read_times(&file).map(|times| (file, times))).transpose()?,
+        poses: file("poses.txt").map(|file| read_poses(&file).map(|read| (file, read.poses))).transpose()?,
         numbered: false,
         notes: Vec::new(),
         instances: path.join("instances"),
@@ -28,5 +41,46 @@ pub fn open(path: &Path) -> Result<Sequence, InputError> {
 
 /// Whether the folder has this layout.
 pub fn is_stereo_folder(path: &Path) -> bool {
-    path.join("left").is_dir() || path.join("right").is_dir()
+    side_folders(path).is_some() || (path.join("calib.txt").is_file() && pictures_in(path).is_ok())
+}
+
+/// How the images lie there, as `inspect` says it.
+pub fn describe(path: &Path) -> String {
+    let name = |folder: &PathBuf| folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    match side_folders(path) {
+        Some([left, right]) => format!("two folders, {} and {}", name(&left), name(&right)),
+        None if pictures_in(path).is_ok_and(|files| split_by_mark(&files).is_some()) => {
+            "one folder, the camera in the files' names".to_owned()
+        }
+        None => "one folder, both images in one file".to_owned(),
+    }
+}
+
+fn images(path: &Path, action: &str, stacking: Option<Stacking>, rig: &StereoRig) -> Result<ImageFiles, InputError> {
+    if let Some([left, right]) = side_folders(path) {
+        return Ok(ImageFiles::Cameras([camera_in(&present(left, action)?)?, camera_in(&present(right, action)?)?]));
+    }
+    let files = pictures_in(path)?;
+    if stacking.is_none()
+        && let Some(sides) = split_by_mark(&files)
+    {
+        return Ok(ImageFiles::Cameras(sides.map(|files| CameraFiles { stamps_ns: stamps_in_names(&files), files })));
+    }
+    let stacking = match (stacking, files.first()) {
+        (Some(stacking), _) => Some(stacking),
+        (None, Some(first)) => told_stacking(picture_size(first).map_err(InputError::image)?, rig),
+        (None, None) => None,
+    };
+    let stacking = stacking.ok_or_else(|| InputError::OneCamera { path: path.to_path_buf() })?;
+    Ok(ImageFiles::Stacked(camera_files(path)?, stacking))
+}
+
+/// Two images lie in one where the calibration's principal point is near the middle of a half, and not of the whole.
+fn told_stacking(size: (usize, usize), rig: &StereoRig) -> Option<Stacking> {
+    let central = |(width, height): (usize, usize)| {
+        let off = |center_px: f64, side: usize| (center_px / side as f64 - 0.5).abs();
+        off(rig.center_u_px, width) <= CENTRAL && off(rig.center_v_px, height) <= CENTRAL
+    };
+    let both = [Stacking::SideBySide, Stacking::TopBottom];
+    both.into_iter().find(|stacking| central(stacking.size_of_one(size)) && !central(size))
 }

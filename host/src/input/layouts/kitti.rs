@@ -1,9 +1,10 @@
 //! KITTI's layouts: odometry and tracking.
 
-use super::CameraPair;
 use super::labels;
 use super::lidar::LidarFiles;
-use super::sequence::{Parts, Sequence};
+use super::names::{natural_order, pictures_in};
+use super::sequence::{ImageFiles, Parts, Sequence, present};
+use super::{CameraPair, OpenOptions};
 use crate::formats::calibration::KittiCalibration;
 use crate::formats::{read_poses, read_times};
 use crate::input::source::{InputError, read_failed};
@@ -14,15 +15,15 @@ use std::path::{Path, PathBuf};
 const LABELS_INTERVAL_S: f64 = 0.1;
 
 /// Opens a sequence of the odometry benchmark. `path` is its root (with `sequences/`), the `sequences` folder or one sequence.
-pub fn open_odometry(path: &Path, sequence: Option<&str>, images: CameraPair) -> Result<Sequence, InputError> {
-    let folder = odometry_folder(path, sequence)?;
+pub fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+    let folder = odometry_folder(path, options.sequence.as_deref())?;
     let number = folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let calibration =
         KittiCalibration::read(&present(folder.join("calib.txt"), "Every sequence needs its calib.txt: copy it from the benchmark")?)?;
     let has = |cameras: [&str; 2]| cameras.iter().all(|camera| folder.join(camera).is_dir());
     let (grey, colour) = (has(["image_0", "image_1"]), has(["image_2", "image_3"]));
     let mut notes = Vec::new();
-    let (left, right) = match images {
+    let (left, right) = match options.cameras {
         CameraPair::Grey => (0, 1),
         CameraPair::Colour => (2, 3),
         CameraPair::Auto if grey => {
@@ -54,9 +55,9 @@ pub fn open_odometry(path: &Path, sequence: Option<&str>, images: CameraPair) ->
     };
     Sequence::from_parts(Parts {
         name: format!("kitti-odometry-{number}"),
-        left: left_folder,
-        right: right_folder,
-        rig: calibration.rig(left, right)?,
+        images: ImageFiles::in_folders(&left_folder, &right_folder)?,
+        bits: options.bits,
+        rig: options.rig_or(|| calibration.rig(left, right))?,
         times,
         poses,
         numbered: true,
@@ -68,10 +69,10 @@ pub fn open_odometry(path: &Path, sequence: Option<&str>, images: CameraPair) ->
 }
 
 /// Opens a sequence of the tracking benchmark. `path` is its root, its `training` or `testing` folder.
-pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, InputError> {
+pub fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let split = tracking_split(path).ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
     let names = tracking_sequences(&split)?;
-    let name = chosen(path, sequence, &names)?;
+    let name = chosen(path, options.sequence.as_deref(), &names)?;
     let action = "The tracking benchmark keeps left images in image_02/NNNN, right ones in image_03/NNNN: fetch what is missing";
     let calibration =
         KittiCalibration::read(&present(split.join("calib").join(format!("{name}.txt")), "Fetch the benchmark's calibration files")?)?;
@@ -85,9 +86,12 @@ pub fn open_tracking(path: &Path, sequence: Option<&str>) -> Result<Sequence, In
         None => Vec::new(),
     };
     Sequence::from_parts(Parts {
-        left: present(split.join("image_02").join(&name), action)?,
-        right: present(split.join("image_03").join(&name), action)?,
-        rig: calibration.rig(2, 3)?,
+        images: ImageFiles::in_folders(
+            &present(split.join("image_02").join(&name), action)?,
+            &present(split.join("image_03").join(&name), action)?,
+        )?,
+        bits: options.bits,
+        rig: options.rig_or(|| calibration.rig(2, 3))?,
         times: None,
         poses: if poses.is_file() { Some((poses.clone(), read_poses(&poses)?.poses)) } else { None },
         numbered: true,
@@ -118,7 +122,7 @@ pub fn is_odometry_sequence(path: &Path) -> bool {
 pub fn tracking_split(path: &Path) -> Option<PathBuf> {
     let is_split = |folder: &Path| {
         // Images directly below image_02 would be another layout: here each sequence has a folder of its own.
-        folder.join("image_02").is_dir() && super::sequence::png_files(&folder.join("image_02")).is_err()
+        folder.join("image_02").is_dir() && pictures_in(&folder.join("image_02")).is_err()
     };
     [path.to_path_buf(), path.join("training"), path.join("testing")].into_iter().find(|folder| is_split(folder))
 }
@@ -132,7 +136,7 @@ pub fn sequences(folder: &Path) -> Result<Vec<String>, InputError> {
             names.push(entry.file_name().to_string_lossy().into_owned());
         }
     }
-    names.sort();
+    names.sort_by(|a, b| natural_order(a, b));
     Ok(names)
 }
 
@@ -174,9 +178,4 @@ fn chosen(root: &Path, wanted: Option<&str>, names: &[String]) -> Result<String,
         (None, []) => Err(InputError::Layout { path: root.to_path_buf(), below: Vec::new() }),
         (None, _) => Err(InputError::Choice { root: root.to_path_buf(), known }),
     }
-}
-
-/// The path, when it is there.
-pub(super) fn present(path: PathBuf, action: &str) -> Result<PathBuf, InputError> {
-    if path.exists() { Ok(path) } else { Err(InputError::Part { path, action: action.to_owned() }) }
 }

@@ -1,17 +1,22 @@
 //! Recordings, by how they lie on the disk: KITTI odometry and tracking, a plain stereo folder; and the synthetic street.
 
+mod camera_folders;
 mod folder;
 mod kitti;
 mod labels;
 mod lidar;
+mod names;
 mod open;
+mod pairing;
 mod sequence;
+mod stacked;
 mod street;
 #[cfg(test)]
 mod tests;
 
-pub use open::{Found, Layout, open, sequences_at, survey};
+pub use open::{Found, Layout, OpenOptions, open, sequences_at, survey};
 pub use sequence::Sequence;
+pub use stacked::Stacking;
 pub use street::StreetFrames;
 
 /// Which camera pair of KITTI odometry to use.

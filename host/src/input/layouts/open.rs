@@ -1,8 +1,10 @@
 //! Guessing a layout from its path, and saying what was found.
 
-use super::{CameraPair, folder, kitti};
+use super::{CameraPair, Stacking, folder, kitti};
+use crate::formats::{FormatError, calibration};
 use crate::input::source::{FrameSource, InputError};
-use std::path::Path;
+use dynvox_core::geometry::StereoRig;
+use std::path::{Path, PathBuf};
 
 /// Data sets named at most where a folder is none itself but holds some.
 const HINTS: usize = 8;
@@ -17,7 +19,7 @@ pub enum Layout {
     KittiOdometry,
     /// KITTI tracking: `training/{image_02,image_03}/NNNN`, `training/calib/NNNN.txt`.
     KittiTracking,
-    /// A folder with `left/`, `right/`, `calib.txt`.
+    /// Two folders of images, one with prefixes or suffixes, or images that hold both cameras; and `calib.txt`.
     Folder,
 }
 
@@ -28,6 +30,15 @@ impl Layout {
             Self::KittiOdometry => "kitti-odometry",
             Self::KittiTracking => "kitti-tracking",
             Self::Folder => "folder",
+        }
+    }
+
+    /// How the images lie at `path`, for `inspect`.
+    pub fn describe(self, path: &Path) -> String {
+        match self {
+            Self::KittiOdometry => "KITTI odometry: image_0 to image_3 of each sequence".to_owned(),
+            Self::KittiTracking => "KITTI tracking: image_02 and image_03 of each sequence".to_owned(),
+            Self::Folder => folder::describe(path),
         }
     }
 
@@ -62,16 +73,46 @@ impl Layout {
     }
 }
 
-/// Opens the data set at `path`; the layout is guessed unless `kind` says it.
-pub fn open(path: &Path, kind: Option<Layout>, sequence: Option<&str>, images: CameraPair) -> Result<Box<dyn FrameSource>, InputError> {
+/// What to open of a recording, and how.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct OpenOptions {
+    /// The layout; guessed from the path where it is not said.
+    pub layout: Option<Layout>,
+    /// Sequence within the recording.
+    pub sequence: Option<String>,
+    /// Camera pair of KITTI odometry.
+    pub cameras: CameraPair,
+    /// Significant bits of 16-bit images; told from the data where they are not said.
+    pub bits: Option<u32>,
+    /// How both images of a pair lie in one file; told from the calibration where it is not said.
+    pub stacking: Option<Stacking>,
+    /// Calibration in place of the recording's own.
+    pub calibration: Option<PathBuf>,
+}
+
+impl OpenOptions {
+    /// The rig of the given calibration, else the recording's own.
+    ///
+    /// # Errors
+    /// Neither can be used.
+    pub fn rig_or(&self, own: impl FnOnce() -> Result<StereoRig, FormatError>) -> Result<StereoRig, FormatError> {
+        self.calibration.as_deref().map_or_else(own, calibration::read_rig)
+    }
+}
+
+/// Opens the recording at `path`.
+///
+/// # Errors
+/// What is not there, or cannot be used.
+pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>, InputError> {
     if !path.exists() {
         return Err(InputError::Absent { path: path.to_path_buf() });
     }
-    let kind = kind.map_or_else(|| Layout::guess(path), Ok)?;
-    Ok(match kind {
-        Layout::KittiOdometry => Box::new(kitti::open_odometry(path, sequence, images)?),
-        Layout::KittiTracking => Box::new(kitti::open_tracking(path, sequence)?),
-        Layout::Folder => Box::new(folder::open(path)?),
+    let layout = options.layout.map_or_else(|| Layout::guess(path), Ok)?;
+    Ok(match layout {
+        Layout::KittiOdometry => Box::new(kitti::open_odometry(path, options)?),
+        Layout::KittiTracking => Box::new(kitti::open_tracking(path, options)?),
+        Layout::Folder => Box::new(folder::open(path, options)?),
     })
 }
 
@@ -84,8 +125,8 @@ pub struct Found {
 }
 
 /// The names of the sequences at `path`; empty where the path is one sequence itself.
-pub fn sequences_at(path: &Path, kind: Layout) -> Result<Vec<String>, InputError> {
-    match kind {
+pub fn sequences_at(path: &Path, layout: Layout) -> Result<Vec<String>, InputError> {
+    match layout {
         Layout::KittiOdometry => kitti::odometry_root(path).map_or(Ok(Vec::new()), |root| kitti::sequences(&root)),
         Layout::KittiTracking => kitti::tracking_split(path).map_or(Ok(Vec::new()), |split| kitti::tracking_sequences(&split)),
         Layout::Folder => Ok(Vec::new()),
@@ -93,10 +134,13 @@ pub fn sequences_at(path: &Path, kind: Layout) -> Result<Vec<String>, InputError
 }
 
 /// Opens everything at `path`.
-pub fn survey(path: &Path, kind: Option<Layout>) -> Result<(Layout, Vec<Found>), InputError> {
-    let kind = kind.map_or_else(|| Layout::guess(path), Ok)?;
-    let names = sequences_at(path, kind)?;
+pub fn survey(path: &Path, layout: Option<Layout>) -> Result<(Layout, Vec<Found>), InputError> {
+    let layout = layout.map_or_else(|| Layout::guess(path), Ok)?;
+    let names = sequences_at(path, layout)?;
     let names: Vec<Option<String>> = if names.is_empty() { vec![None] } else { names.into_iter().map(Some).collect() };
-    let found = |sequence: Option<String>| Found { opened: open(path, Some(kind), sequence.as_deref(), CameraPair::Auto), sequence };
-    Ok((kind, names.into_iter().map(found).collect()))
+    let found = |sequence: Option<String>| {
+        let options = OpenOptions { layout: Some(layout), sequence: sequence.clone(), ..OpenOptions::default() };
+        Found { opened: open(path, &options), sequence }
+    };
+    Ok((layout, names.into_iter().map(found).collect()))
 }

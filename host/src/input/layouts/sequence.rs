@@ -1,23 +1,35 @@
-//! A sequence of image files: two lists of PNGs with a rig, times and, where known, poses. Every layout on disk ends up here.
+//! A sequence of image files: stereo pairs with a rig, times and, where known, poses. Every layout on disk ends up here.
 
 use super::lidar::LidarFiles;
-use crate::formats::{Image, png_size, read_png};
-use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, read_failed};
+use super::names::{pictures_in, stamp_in_name, stem_of};
+use super::pairing::{CameraFiles, Pairing};
+use super::stacked::Stacking;
+use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
+use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages};
 use dynvox_core::geometry::{StereoRig, Transform};
 use std::path::{Path, PathBuf};
 
 /// Frames per second where the data set has no times.
-const ASSUMED_HZ: f64 = 10.0;
+pub const ASSUMED_HZ: f64 = 10.0;
+/// Pictures whose largest value tells how many bits of 16 are significant.
+const RANGE_PICTURES: usize = 8;
+const NS_PER_S: f64 = 1e9;
 
 /// Stereo pairs in files.
 #[derive(Debug)]
 pub struct Sequence {
     name: String,
-    left: Vec<PathBuf>,
-    right: Vec<PathBuf>,
+    pairs: Vec<[PathBuf; 2]>,
+    /// How the two images lie in one file, where they do: both paths of a pair are then the same.
+    stacking: Option<Stacking>,
     size: (usize, usize),
+    /// Significant bits of 16-bit images.
+    bits: Option<u32>,
     rig: StereoRig,
-    times_s: Vec<f64>,
+    /// One a frame, ns; `None` where nothing tells them.
+    stamps_ns: Option<Vec<u64>>,
+    /// Numbers of the frames, by which times are assumed where there are none.
+    numbers: Vec<usize>,
     truth: Option<Vec<Transform>>,
     masks: AvailableMasks,
     objects: Vec<ObjectsTruth>,
@@ -25,14 +37,43 @@ pub struct Sequence {
     notes: Vec<String>,
 }
 
+/// The image files of a sequence.
+#[derive(Clone, Debug)]
+pub(super) enum ImageFiles {
+    /// One file for each camera's image.
+    Cameras([CameraFiles; 2]),
+    /// One file for both images of a pair.
+    Stacked(CameraFiles, Stacking),
+}
+
+impl ImageFiles {
+    /// The images of two folders. Where all names are time stamps, these are the times.
+    pub fn in_folders(left: &Path, right: &Path) -> Result<Self, InputError> {
+        Ok(Self::Cameras([camera_files(left)?, camera_files(right)?]))
+    }
+}
+
+/// The images of a folder.
+pub(super) fn camera_files(folder: &Path) -> Result<CameraFiles, InputError> {
+    let files = pictures_in(folder)?;
+    Ok(CameraFiles { stamps_ns: stamps_in_names(&files), files })
+}
+
+/// The stamps in the names of files; `None` where a name holds none or they do not increase.
+pub(super) fn stamps_in_names(files: &[PathBuf]) -> Option<Vec<u64>> {
+    let stamps: Option<Vec<u64>> = files.iter().map(|path| stamp_in_name(&stem_of(path))).collect();
+    stamps.filter(|stamps| stamps.is_sorted_by(|a, b| a < b))
+}
+
 /// What a layout's loader found, before it is checked.
 pub(super) struct Parts {
     pub name: String,
-    pub left: PathBuf,
-    pub right: PathBuf,
+    pub images: ImageFiles,
+    /// Whether this is significant bits of 16-bit images; told from the data otherwise.
+    pub bits: Option<u32>,
     pub rig: StereoRig,
-    /// Times and poses as read: one row per frame number, or `None` without a file.
-    pub times: Option<(PathBuf, Vec<f64>)>,
+    /// Times (ns) and poses as read: one row for each image of the left folder or frame number, or `None` without a file.
+    pub times: Option<(PathBuf, Vec<u64>)>,
     pub poses: Option<(PathBuf, Vec<Transform>)>,
     /// Whether file names are frame numbers, as in KITTI: row `n` of the tables then belongs to file `n`.
     pub numbered: bool,
@@ -45,44 +86,48 @@ pub(super) struct Parts {
 }
 
 impl Sequence {
-    /// Pairs the images by name and gives each its time and pose.
+    /// Pairs the images and gives each pair its time and pose.
     pub(super) fn from_parts(parts: Parts) -> Result<Self, InputError> {
-        let left = png_files(&parts.left)?;
-        let right = paired(&left, &parts.left, &parts.right)?;
-        let first = left.first().ok_or_else(|| InputError::Empty { path: parts.left.clone() })?;
-        let size = png_size(first).map_err(InputError::image)?;
         let mut notes = parts.notes;
-        let rows = left.iter().enumerate().map(|(at, path)| if parts.numbered { frame_number(path).unwrap_or(at) } else { at });
-        let rows: Vec<usize> = rows.collect();
-        let times_s = match parts.times {
-            Some((path, times)) => {
-                rows.iter().map(|&row| times.get(row).copied()).collect::<Option<Vec<f64>>>().ok_or_else(|| InputError::Table {
-                    reason: format!("it has {} times, but there are images up to number {}", times.len(), rows.iter().max().unwrap_or(&0)),
-                    action: "Give one line per image, or move the file away: 10 Hz are then assumed".into(),
-                    path,
-                })?
-            }
-            None => {
-                notes.push(format!("no times.txt: {ASSUMED_HZ} frames a second are assumed"));
-                rows.iter().map(|&row| row as f64 / ASSUMED_HZ).collect()
-            }
+        let (pairs, stacking, left, places) = paired(parts.images, &mut notes)?;
+        let first = &pairs.first().ok_or_else(|| InputError::Empty { path: PathBuf::from(&parts.name) })?[0];
+        let size = picture_size(first).map_err(InputError::image)?;
+        let size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
+        let bits = match parts.bits {
+            Some(bits) => Some(bits),
+            None => told_bits(&pairs, &mut notes)?,
         };
+        let number = |&at: &usize| if parts.numbered { frame_number(&left.files[at]).unwrap_or(at) } else { at };
+        let numbers: Vec<usize> = places.iter().map(number).collect();
+        let stamps_ns = match parts.times {
+            Some((path, times)) => Some(rows_of(&times, &numbers).ok_or_else(|| InputError::Table {
+                reason: format!("it has {} times, but there are images up to number {}", times.len(), numbers.iter().max().unwrap_or(&0)),
+                action: format!("Give one line per image, or move the file away: {ASSUMED_HZ} Hz are then assumed"),
+                path,
+            })?),
+            None => left.stamps_ns.as_ref().and_then(|stamps| rows_of(stamps, &places)),
+        };
+        if stamps_ns.is_none() {
+            notes.push(format!("no times of the images: {ASSUMED_HZ} frames a second are assumed"));
+        }
         let truth = parts.poses.and_then(|(path, poses)| {
-            let found: Option<Vec<Transform>> = rows.iter().map(|&row| poses.get(row).copied()).collect();
+            let found = rows_of(&poses, &numbers);
             if found.is_none() {
-                notes.push(format!("{} has only {} poses for {} images: left aside", path.display(), poses.len(), rows.len()));
+                notes.push(format!("{} has only {} poses for {} images: not used", path.display(), poses.len(), numbers.len()));
             }
             found
         });
         let masks = if parts.instances.is_dir() { AvailableMasks::Folder(parts.instances) } else { AvailableMasks::Absent };
-        let objects = rows.iter().map_while(|&row| parts.objects.get(row).cloned()).collect();
+        let objects = numbers.iter().map_while(|&row| parts.objects.get(row).cloned()).collect();
         Ok(Self {
             name: parts.name,
-            left,
-            right,
+            pairs,
+            stacking,
             size,
+            bits,
             rig: parts.rig,
-            times_s,
+            stamps_ns,
+            numbers,
             truth,
             masks,
             objects,
@@ -90,6 +135,75 @@ impl Sequence {
             notes,
         })
     }
+
+    /// The two images of a pair, both of the sequence's size.
+    fn images(&self, [left, right]: &[PathBuf; 2]) -> Result<[Decoded; 2], InputError> {
+        let read = |path: &Path| Ok::<_, InputError>(read_picture(path).map_err(InputError::image)?.to_8_bit(self.bits));
+        let images = match self.stacking {
+            None => [read(left)?, read(right)?],
+            Some(stacking) => stacking.split(&read(left)?).ok_or_else(|| InputError::Image {
+                path: left.clone(),
+                reason: format!("it cannot be cut into two equal images {}", stacking.name()),
+            })?,
+        };
+        for (path, image) in [left, right].into_iter().zip(&images) {
+            let ((found_width, found_height), (width, height)) = ((image.grey.width(), image.grey.height()), self.size);
+            if (found_width, found_height) != (width, height) {
+                return Err(InputError::Size { path: path.clone(), found_width, found_height, width, height });
+            }
+        }
+        Ok(images)
+    }
+}
+
+/// The pairs, how two images lie in one file, the left camera's files, and the position of each pair's left image among them.
+type Paired = (Vec<[PathBuf; 2]>, Option<Stacking>, CameraFiles, Vec<usize>);
+
+fn paired(images: ImageFiles, notes: &mut Vec<String>) -> Result<Paired, InputError> {
+    let [left, right] = match images {
+        ImageFiles::Stacked(files, stacking) => {
+            let pairs = files.files.iter().map(|path| [path.clone(), path.clone()]).collect();
+            let places = (0..files.files.len()).collect();
+            return Ok((pairs, Some(stacking), files, places));
+        }
+        ImageFiles::Cameras(cameras) => cameras,
+    };
+    let pairing = Pairing::of(&left, &right).ok_or_else(|| {
+        let example = |camera: &CameraFiles| camera.files.first().cloned().unwrap_or_default();
+        InputError::Pairs {
+            left: example(&left),
+            right: example(&right),
+            counts: (left.files.len(), right.files.len()),
+        }
+    })?;
+    notes.extend(pairing.note());
+    let pairs = pairing.pairs.iter().map(|&(l, r)| [left.files[l].clone(), right.files[r].clone()]).collect();
+    let places = pairing.pairs.iter().map(|&(at, _)| at).collect();
+    Ok((pairs, None, left, places))
+}
+
+/// How many bits of 16-bit images are significant, from pictures spread over the sequence; `None` where the first is of 8 bit. A picture that
+/// cannot be read is passed over: it is refused when its turn comes.
+fn told_bits(pairs: &[[PathBuf; 2]], notes: &mut Vec<String>) -> Result<Option<u32>, InputError> {
+    let step = pairs.len().div_ceil(RANGE_PICTURES).max(1);
+    let mut largest = None;
+    for (at, [path, _]) in pairs.iter().step_by(step).enumerate() {
+        let sample = read_picture(path).ok().and_then(|picture| picture.largest_sample());
+        if at == 0 && sample.is_none() {
+            return Ok(None);
+        }
+        largest = largest.max(sample);
+    }
+    let bits = largest.map(significant_bits);
+    if let (Some(bits), Some(largest)) = (bits, largest) {
+        notes.push(format!("16-bit images: {bits} bits are taken as significant, by the largest value {largest} of {RANGE_PICTURES} images; --bits says otherwise"));
+    }
+    Ok(bits)
+}
+
+/// The chosen rows of a table; `None` where one is missing.
+fn rows_of<T: Copy>(table: &[T], rows: &[usize]) -> Option<Vec<T>> {
+    rows.iter().map(|&row| table.get(row).copied()).collect()
 }
 
 impl FrameSource for Sequence {
@@ -98,7 +212,7 @@ impl FrameSource for Sequence {
     }
 
     fn len(&self) -> usize {
-        self.left.len()
+        self.pairs.len()
     }
 
     fn size(&self) -> (usize, usize) {
@@ -110,7 +224,7 @@ impl FrameSource for Sequence {
     }
 
     fn stem(&self, index: usize) -> Option<String> {
-        Some(self.left.get(index)?.file_stem()?.to_string_lossy().into_owned())
+        self.pairs.get(index).map(|[left, _]| stem_of(left))
     }
 
     fn masks(&self) -> AvailableMasks {
@@ -118,21 +232,18 @@ impl FrameSource for Sequence {
     }
 
     fn time_s(&self, index: usize) -> f64 {
-        self.times_s.get(index).copied().unwrap_or_default()
+        match &self.stamps_ns {
+            Some(stamps_ns) => stamps_ns.get(index).map_or(0.0, |&stamp_ns| stamp_ns as f64 / NS_PER_S),
+            None => self.numbers.get(index).map_or(0.0, |&number| number as f64 / ASSUMED_HZ),
+        }
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let absent = || InputError::Absent { path: PathBuf::from(format!("{} frame {index}", self.name)) };
-        let left_path = self.left.get(index).ok_or_else(absent)?;
-        let right_path = self.right.get(index).ok_or_else(absent)?;
-        let left = read_png(left_path).map_err(InputError::image)?;
-        let right = read_png(right_path).map_err(InputError::image)?.grey;
-        for (path, image) in [(left_path, &left.grey), (right_path, &right)] {
-            check_size(path, image, self.size)?;
-        }
+        let [left, right] = self.images(self.pairs.get(index).ok_or_else(absent)?)?;
         Ok(StereoImages {
             left: left.grey,
-            right,
+            right: right.grey,
             colour: left.colour,
             depth: None,
             exact: None,
@@ -159,49 +270,12 @@ impl FrameSource for Sequence {
     }
 }
 
-fn check_size(path: &Path, image: &Image<u8>, (width, height): (usize, usize)) -> Result<(), InputError> {
-    if (image.width(), image.height()) == (width, height) {
-        return Ok(());
-    }
-    Err(InputError::Size {
-        path: path.to_path_buf(),
-        found_width: image.width(),
-        found_height: image.height(),
-        width,
-        height,
-    })
-}
-
-/// The PNG files of a folder, by name.
-pub(super) fn png_files(folder: &Path) -> Result<Vec<PathBuf>, InputError> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(read_failed(folder))? {
-        let path = entry.map_err(read_failed(folder))?.path();
-        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
-            files.push(path);
-        }
-    }
-    if files.is_empty() {
-        return Err(InputError::Empty { path: folder.to_path_buf() });
-    }
-    files.sort();
-    Ok(files)
-}
-
-/// The right images of the left ones, by name. An image without partner on either side is an error: frames would shift against times.
-fn paired(left: &[PathBuf], left_folder: &Path, right_folder: &Path) -> Result<Vec<PathBuf>, InputError> {
-    let right = png_files(right_folder)?;
-    let partner = |image: &Path, folder: &Path| folder.join(image.file_name().unwrap_or_default());
-    for (images, others, folder) in [(left, right.as_slice(), right_folder), (&right, left, left_folder)] {
-        let lonely = images.iter().map(|image| (image, partner(image, folder))).find(|(_, partner)| others.binary_search(partner).is_err());
-        if let Some((image, partner)) = lonely {
-            return Err(InputError::Partner { image: image.clone(), partner });
-        }
-    }
-    Ok(right)
-}
-
 /// `000123.png` is frame 123.
 fn frame_number(path: &Path) -> Option<usize> {
-    path.file_stem()?.to_str()?.parse().ok()
+    stem_of(path).parse().ok()
+}
+
+/// The path, when it is there.
+pub(super) fn present(path: PathBuf, action: &str) -> Result<PathBuf, InputError> {
+    if path.exists() { Ok(path) } else { Err(InputError::Part { path, action: action.to_owned() }) }
 }

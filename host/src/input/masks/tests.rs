@@ -3,7 +3,7 @@
 use super::*;
 use crate::formats::rle;
 use crate::input::source::{FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals};
-use crate::input::{self, CameraPair, FrameSource, InputError, StreetFrames};
+use crate::input::{self, FrameSource, InputError, OpenOptions, StreetFrames};
 use crate::synth::StreetConfig;
 use dynvox_core::masks::PixelBox;
 use image::{ImageBuffer, Luma};
@@ -42,7 +42,7 @@ fn labels(path: &Path, values: &[u16], deep: bool) {
 }
 
 fn laid_over(root: &Path, choice: &MaskChoice) -> Result<Box<dyn FrameSource>, InputError> {
-    attach(input::open(root, None, None, CameraPair::Auto)?, choice)
+    attach(input::open(root, &OpenOptions::default())?, choice)
 }
 
 fn first(root: &Path, choice: &MaskChoice) -> Result<FrameMasks, InputError> {
@@ -119,7 +119,7 @@ fn masks_of_another_size_without_a_list_or_in_colour_are_refused() {
     ImageBuffer::from_pixel(WIDTH, HEIGHT, image::Rgb([1u8, 2, 3])).save(&png).unwrap();
     assert!(said(first(root.path(), &MaskChoice::Auto)).contains("colour image"));
     fs::write(&png, "no picture").unwrap();
-    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("cannot be read"));
+    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("cannot be used"));
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn scaled_images_have_scaled_masks() {
     }
     picture.save(folder.join("000000.png")).unwrap();
     fs::write(folder.join("000000.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
-    let half = input::Scaled::new(input::open(root.path(), None, None, CameraPair::Auto).unwrap(), 0.5).unwrap();
+    let half = input::Scaled::new(input::open(root.path(), &OpenOptions::default()).unwrap(), 0.5).unwrap();
     let masks = attach(Box::new(half), &MaskChoice::Auto).unwrap().frame(0).unwrap().masks;
     assert_eq!(masks.instances.len(), 1);
     assert_eq!(masks.instances[0].pixels, PixelBox { left: 4, top: 6, width: 8, height: 4 });
@@ -364,7 +364,7 @@ fn masks_of_the_real_clips_are_read_whole() {
         std::env::var_os("DYNVOX_DATA").map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
     let clips = [("kitti-odometry", "06"), ("kitti-odometry", "r1405"), ("kitti-tracking", "0003"), ("kitti-tracking", "0005")];
     for (root, sequence) in clips {
-        let Ok(clip) = input::open(&data.join(root), None, Some(sequence), CameraPair::Auto) else {
+        let Ok(clip) = input::open(&data.join(root), &OpenOptions { sequence: Some(sequence.into()), ..OpenOptions::default() }) else {
             println!("skipped: masks_of_the_real_clips_are_read_whole {root} {sequence}");
             continue;
         };

@@ -16,7 +16,8 @@ pub enum InputError {
     /// No known layout.
     #[error(
         "the layout of {path} is unknown. Known are KITTI odometry (sequences/NN/image_0), KITTI tracking \
-         (training/image_02/NNNN) and a folder with left/, right/ and calib.txt; --dataset says which one is meant{}",
+         (training/image_02/NNNN), two folders of images (left/ and right/, cam0/ and cam1/, infra1/ and infra2/, ...), and one folder of images \
+         with calib.txt; --dataset says which one is meant{}",
         hint(below)
     )]
     Layout {
@@ -65,16 +66,30 @@ pub enum InputError {
         /// Names there.
         known: String,
     },
-    /// An image of one side has no partner on the other.
-    #[error("{image} has no partner {partner}. Add the missing image or remove this one; --start and --frames skip frames at the ends")]
-    Partner {
-        /// The image that is there.
-        image: PathBuf,
-        /// The one that is not.
-        partner: PathBuf,
+    /// Images of two cameras of which nothing tells which belong together.
+    #[error(
+        "{left} and {right} cannot be paired: neither their names nor time stamps tell which images belong together, and there are {} left and \
+         {} right ones. Give both images of a pair one name, or one number with a prefix or suffix for the side", counts.0, counts.1
+    )]
+    Pairs {
+        /// The first left image.
+        left: PathBuf,
+        /// The first right image.
+        right: PathBuf,
+        /// Images of each side.
+        counts: (usize, usize),
+    },
+    /// One image a frame, of one camera.
+    #[error(
+        "{path} holds one image a frame, and it cannot be told whether both cameras are in it. Say so with --stacked side-by-side or --stacked \
+         top-bottom, or give the images of the right camera: a stereo mapper needs two"
+    )]
+    OneCamera {
+        /// Folder looked at.
+        path: PathBuf,
     },
     /// No image at all.
-    #[error("{path} holds no PNG image. Images must be 8-bit PNG files, as `convert x.jpg x.png` makes them")]
+    #[error("{path} holds no image. PNG, JPEG, PGM, PPM, TIFF and BMP are read, of 8 or 16 bit")]
     Empty {
         /// Folder looked at.
         path: PathBuf,

@@ -1,0 +1,50 @@
+//! PNG files whose grey values are numbers: of instances, of disparity, of depth.
+
+use super::picture::plain;
+use super::{FormatError, Image};
+use image::{DynamicImage, ImageReader};
+use std::path::Path;
+
+/// What to do about a file that cannot be decoded.
+const FETCH_ANEW: &str = "Fetch or convert this image anew";
+
+/// Reads a grey PNG of 8 or 16 bit as numbers.
+///
+/// # Errors
+/// The file cannot be read or decoded, or has colours.
+pub fn read_png_u16(path: &Path) -> Result<Image<u16>, FormatError> {
+    let decoded = decode(path)?;
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    let pixels = match decoded {
+        DynamicImage::ImageLuma8(image) => image.into_raw().into_iter().map(u16::from).collect(),
+        DynamicImage::ImageLuma16(image) => image.into_raw(),
+        _ => return Err(FormatError::content(path, "it is a colour image", "Numbers of instances are grey, 8 or 16 bit")),
+    };
+    owned(path, width, height, pixels)
+}
+
+/// Reads a grey PNG of 16 bit as numbers; one of 8 bit, such as a picture of a depth image, is refused.
+///
+/// # Errors
+/// The file cannot be read or decoded, or is not of one channel of 16 bit.
+pub fn read_png_deep(path: &Path) -> Result<Image<u16>, FormatError> {
+    match decode(path)? {
+        DynamicImage::ImageLuma16(image) => owned(path, image.width() as usize, image.height() as usize, image.into_raw()),
+        other => {
+            let color = other.color();
+            let bits = 8 * color.bytes_per_pixel() / color.channel_count().max(1);
+            let reason = format!("it is of {} channel(s) of {bits} bit, not of one of 16", color.channel_count());
+            Err(FormatError::content(path, reason, FETCH_ANEW))
+        }
+    }
+}
+
+fn decode(path: &Path) -> Result<DynamicImage, FormatError> {
+    let mut reader = ImageReader::open(path).map_err(FormatError::read(path))?;
+    reader.set_format(image::ImageFormat::Png);
+    reader.decode().map_err(|error| FormatError::content(path, plain(&error), FETCH_ANEW))
+}
+
+fn owned(path: &Path, width: usize, height: usize, pixels: Vec<u16>) -> Result<Image<u16>, FormatError> {
+    Image::new(width, height, pixels).ok_or_else(|| FormatError::content(path, "it has no pixels", FETCH_ANEW))
+}
