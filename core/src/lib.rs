@@ -33,8 +33,8 @@ pub mod view;
 pub mod volume;
 
 pub use mapper::{
-    BlockCount, Config, Digested, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report,
-    RestoreError, Severity, StageDigests, StepError, StereoFrame,
+    BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, Digested, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest,
+    ObjectDigests, PoseOrigin, Report, RestoreError, Severity, StageDigests, StepError, StereoFrame,
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial, Stage};

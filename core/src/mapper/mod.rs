@@ -1,5 +1,6 @@
 //! The loop of the paper (Section III), one line per stage.
 
+mod budget;
 mod camera;
 mod config;
 mod digests;
@@ -12,6 +13,7 @@ pub mod snapshot;
 #[cfg(test)]
 mod tests;
 
+pub use budget::{BudgetError, BudgetOptions, CapacityProblem, MAX_SIDE};
 pub use config::Config;
 pub use digests::{Digested, ObjectDigest, ObjectDigests, StageDigests};
 pub use error::{MIN_HEIGHT, MIN_WIDTH, NewError, StepError};

@@ -1,8 +1,9 @@
 //! `dynvox budget`.
 
+use super::capacity::{Bytes, ImageSize, to_json, to_toml};
 use crate::report::html::grouped;
-use dynvox_core::Capacity;
 use dynvox_core::volume::{BLOCK_SIDE, VolumeConfig};
+use dynvox_core::{BudgetOptions, Capacity};
 use std::fmt::Write;
 
 /// Speed of the drive in the table, m/s.
@@ -13,21 +14,87 @@ const BLOCKS_PER_M: u32 = 1_000;
 #[derive(Debug, clap::Args)]
 pub struct BudgetArgs {
     /// Show this profile region by region
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["memory", "image"])]
     profile: Option<String>,
+    /// Find the bounds that fit so many bytes: 48MiB, 1GiB
+    #[arg(long, value_name = "BYTES", requires = "image")]
+    memory: Option<Bytes>,
+    /// Largest image, px: 752x480
+    #[arg(long, value_name = "WxH", requires = "memory")]
+    image: Option<ImageSize>,
+    /// Side of a voxel, m
+    #[arg(long, value_name = "M", requires = "memory", default_value_t = VolumeConfig::default().voxel_size_m)]
+    voxel: f32,
+    /// Keep colour, even where it costs most blocks
+    #[arg(long, requires = "memory", conflicts_with = "no_colour")]
+    colour: bool,
+    /// Keep no colour
+    #[arg(long, requires = "memory")]
+    no_colour: bool,
+    /// Objects reconstructed at once [default: as many as a fifth of the bytes allows]
+    #[arg(long, value_name = "N", requires = "memory")]
+    objects: Option<usize>,
+    /// Write the bounds to standard output as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
-    match &args.profile {
-        None => overview(),
-        Some(name) => regions(name, &super::profile(name)?),
+    if let (Some(memory), Some(ImageSize(width, height))) = (args.memory, args.image) {
+        let colour = if args.colour { Some(true) } else { args.no_colour.then_some(false) };
+        let options = BudgetOptions {
+            colour,
+            objects: args.objects,
+            voxel_size_m: Some(args.voxel),
+            ..BudgetOptions::default()
+        };
+        return solved(args, memory, &super::capacity::solve(memory, (width, height), &options)?);
     }
+    match &args.profile {
+        None if args.json => println!("{}", serde_json::to_string_pretty(&profiles_json()?)?),
+        None => overview(),
+        Some(name) => {
+            let (name, capacity) = super::profile(name)?;
+            regions(&name, &capacity, args.json)?;
+        }
+    }
+    Ok(())
+}
+
+fn profiles_json() -> anyhow::Result<serde_json::Value> {
+    let profiles = Capacity::PROFILES.iter().map(|(name, capacity)| {
+        let mut value = to_json(capacity)?;
+        value["bytes"] = capacity.bytes().into();
+        Ok(((*name).to_owned(), value))
+    });
+    Ok(serde_json::Value::Object(profiles.collect::<anyhow::Result<_>>()?))
+}
+
+/// Shows the bounds a budget gives: what they hold, as Rust and as TOML.
+fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Result<()> {
+    let volume = VolumeConfig { voxel_size_m: args.voxel, ..VolumeConfig::default() };
+    let drive_m = drive_m(capacity.blocks, &volume);
+    if args.json {
+        let mut value = to_json(capacity)?;
+        value["bytes"] = capacity.bytes().into();
+        value["drive_m"] = drive_m.into();
+        println!("{}", serde_json::to_string_pretty(&value)?);
+        return Ok(());
+    }
+    println!("{} of {} bytes ({memory})", grouped(capacity.bytes() as u64), grouped(memory.0 as u64));
+    println!("  drive before blocks leave the pool: about {drive_m:.0} m, by the synthetic street's blocks a metre");
+    println!("  pruning window: {} frames", capacity.history_frames);
+    println!("  objects reconstructed at once: {}, of {} blocks each", capacity.objects, grouped(capacity.object_blocks as u64));
+    println!("\nas a file for `dynvox run --capacity FILE`:\n\n{}", to_toml(capacity)?);
+    println!("as Rust:\n\nconst CAPACITY: Capacity = {capacity:#?};");
     Ok(())
 }
 
 fn overview() {
     print!("{}", table(&VolumeConfig::default()));
-    println!("\n`dynvox budget --profile NAME` shows a profile region by region.");
+    println!(
+        "\n`dynvox budget --profile NAME` shows a profile region by region; `dynvox budget --memory 48MiB --image 752x480` finds bounds for other cases."
+    );
 }
 
 /// All profiles with what they hold.
@@ -65,6 +132,12 @@ pub fn table(volume: &VolumeConfig) -> String {
     table
 }
 
+/// Metres of driving until so many blocks are full: surfaces of the same extent take fewer blocks of larger voxels, by the square of their side.
+fn drive_m(blocks: usize, volume: &VolumeConfig) -> f64 {
+    let coarser = f64::from(volume.voxel_size_m) / f64::from(VolumeConfig::default().voxel_size_m);
+    blocks as f64 / f64::from(BLOCKS_PER_M) * coarser * coarser
+}
+
 /// Seconds of driving until so many blocks are full; known for the voxels it was measured with.
 fn drive_s(blocks: usize, volume: &VolumeConfig) -> Option<f64> {
     let measured = VolumeConfig::default();
@@ -73,11 +146,18 @@ fn drive_s(blocks: usize, volume: &VolumeConfig) -> Option<f64> {
     same.then(|| blocks as f64 / f64::from(BLOCKS_PER_M) / SPEED_M_S)
 }
 
-fn regions(name: &str, capacity: &Capacity) {
+fn regions(name: &str, capacity: &Capacity, json: bool) -> anyhow::Result<()> {
     let (bytes, footprint) = (capacity.bytes(), capacity.footprint());
+    if json {
+        let regions: Vec<_> =
+            footprint.regions().iter().map(|region| serde_json::json!({ "name": region.name, "bytes": region.bytes })).collect();
+        println!("{}", serde_json::to_string_pretty(&serde_json::json!({ "profile": name, "bytes": bytes, "regions": regions }))?);
+        return Ok(());
+    }
     println!("{:<34}{:>16}{:>10}", format!("region of {name}"), "bytes", "share");
     for region in footprint.regions() {
         println!("{:<34}{:>16}{:>8.1} %", region.name, grouped(region.bytes as u64), 100.0 * region.bytes as f64 / bytes as f64);
     }
     println!("{:<34}{:>16}{:>8.1} %", "slab", grouped(footprint.bytes() as u64), 100.0 * footprint.bytes() as f64 / bytes as f64);
+    Ok(())
 }

@@ -2,6 +2,7 @@
 
 use crate::evaluate::stereo::{StereoSetError, find_stereo_set};
 use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout};
+use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -94,15 +95,20 @@ fn describe(dataset: &dyn FrameSource, command: &str) {
     for note in dataset.notes() {
         println!("  note: {note}");
     }
-    let fits = |capacity: &dynvox_core::Capacity| width <= capacity.image_width && height <= capacity.image_height;
-    let profiles: Vec<&str> =
-        dynvox_core::Capacity::PROFILES.iter().filter(|(_, capacity)| fits(capacity)).map(|(name, _)| *name).collect();
-    if profiles.is_empty() {
-        println!("  no profile takes images of this size: shrink them with --scale");
-    } else {
-        println!("  fits the profiles {}", profiles.join(", "));
+    match least_memory(width, height) {
+        Ok(least) => println!("  memory: 256 MiB unless --memory says otherwise; at least --memory {}MiB", least.div_ceil(1 << 20)),
+        Err(error) => println!("  cannot be mapped at this size: {error}. Shrink the images with --scale"),
     }
     println!("  map it: {command}{}", if evaluate { " --evaluate lidar" } else { "" });
+}
+
+/// Bytes of the least slab for images of a size.
+fn least_memory(width: usize, height: usize) -> Result<usize, BudgetError> {
+    match Capacity::for_budget(0, width, height, &BudgetOptions::default()) {
+        Ok(capacity) => Ok(capacity.bytes()),
+        Err(BudgetError::TooSmall { least }) => Ok(least),
+        Err(other) => Err(other),
+    }
 }
 
 fn masks(dataset: &dyn FrameSource) -> String {

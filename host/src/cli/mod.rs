@@ -1,6 +1,7 @@
 //! The command line. Errors become sentences here and nowhere else.
 
 mod budget;
+mod capacity;
 mod diff;
 mod egomotion;
 mod evaluate;
@@ -27,6 +28,8 @@ Examples:
   dynvox run ~/kitti --sequence 06 --snapshot-every 100 --out out/long
   dynvox run --resume out/long                  what stopped goes on from its last snapshot
   dynvox budget --profile small                 where the bytes of a profile go
+  dynvox budget --memory 48MiB --image 752x480  bounds that fit a number of bytes
+  dynvox run ~/my-rig --memory 48MiB            the same, for the images that come
   dynvox run ~/kitti --sequence 06 --evaluate lidar     accuracy and completeness of input and map
   dynvox evaluate trajectory out/kitti-odometry-06-001 ~/kitti/poses/06.txt
   dynvox evaluate stereo ~/kitti-stereo-2015        D1 and coverage of the matcher, by region
@@ -88,10 +91,11 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// The profile of that name.
-fn profile(name: &str) -> anyhow::Result<dynvox_core::Capacity> {
+/// The profile of that name, in any case, and its name.
+fn profile(name: &str) -> anyhow::Result<(String, dynvox_core::Capacity)> {
     let known = dynvox_core::Capacity::PROFILES;
-    known.iter().find(|(known, _)| *known == name).map(|(_, capacity)| *capacity).ok_or_else(|| {
+    let found = known.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
+    found.map(|(name, capacity)| ((*name).to_owned(), *capacity)).ok_or_else(|| {
         let names = known.map(|(name, _)| name).join(", ");
         anyhow::anyhow!("there is no profile {name}. Choose one of {names}; `dynvox budget` shows them")
     })

@@ -2,6 +2,7 @@
 
 mod resume;
 
+use super::capacity::CapacityArgs;
 use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
 use crate::evaluate::objects::Medians;
@@ -41,9 +42,8 @@ pub struct RunArgs {
     /// Calibration in place of the recording's own: KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
-    /// Byte budget: tiny, small, onboard or desktop
-    #[arg(long, default_value = "onboard", value_name = "NAME")]
-    profile: String,
+    #[command(flatten)]
+    bounds: CapacityArgs,
     /// Threads; the result does not depend on them [default: as many as the machine has, at most 4]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -184,13 +184,13 @@ fn on_or_off(text: &str) -> Result<bool, String> {
 /// What a run is to do.
 fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     let mut settings = Settings::resolve(args.config.as_deref(), &args.set)?;
-    let capacity = super::profile(&args.profile)?;
-    settings.fit(&capacity);
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
     if threads == 0 || args.stride == 0 || args.frames == Some(0) {
         bail!("--threads, --stride and --frames begin at 1. Give a larger number");
     }
     let dataset = args.open(&settings)?;
+    let (profile, capacity) = args.bounds.resolve(dataset.size(), settings.voxel_size_m())?;
+    settings.fit(&capacity);
     let indices = run::frame_indices(dataset.len(), args.start, args.stride, args.frames)?;
     if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &indices) {
         settings.set_frame_interval_s(interval_s);
@@ -208,7 +208,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     Ok(Plan {
         indices,
         poses,
-        profile: args.profile.clone(),
+        profile,
         capacity,
         config: settings.config(dataset.rig()),
         config_toml: settings.to_toml(args.path.is_none())?,
@@ -360,7 +360,10 @@ fn conclude(run: &RunRecord, place: &Path) {
     line("map", format!("{} triangles, {} of {} blocks used at most", run.mesh.triangles, run.blocks_peak(), run.capacity.blocks));
     let refused = run.blocks_refused();
     if refused > 0 {
-        line("", format!("{refused} blocks found no room: the map has holes. Choose a larger --profile or a larger volume.voxel_size_m"));
+        line(
+            "",
+            format!("{refused} blocks found no room: the map has holes. Give more bytes with --memory, or a larger volume.voxel_size_m"),
+        );
     }
     if run.shelf.records > 0 {
         let (records, mib) = (run.shelf.records, run.shelf.bytes as f64 / MIB as f64);
@@ -384,6 +387,6 @@ fn lost_because(run: &RunRecord) -> String {
     match &run.shelf_failure {
         Some(failure) => format!("map.blocks took no more ({failure}). Free the disk, or raise --stream-mib"),
         None if run.streaming.is_some() => "map.blocks could not be read back whole. Look after the disk".to_owned(),
-        None => "the pool was full. Run without --no-stream, or choose a larger --profile".to_owned(),
+        None => "the pool was full. Run without --no-stream, or give more bytes with --memory".to_owned(),
     }
 }

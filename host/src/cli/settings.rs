@@ -100,6 +100,11 @@ impl Settings {
         }
     }
 
+    /// Side of a voxel of the static map, m.
+    pub fn voxel_size_m(&self) -> f32 {
+        self.volume.voxel_size_m
+    }
+
     /// Sets the time between two frames, which comes with the data set.
     pub fn set_frame_interval_s(&mut self, interval_s: f64) {
         self.instances.frame_interval_s = interval_s as f32;

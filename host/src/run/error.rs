@@ -52,7 +52,7 @@ pub enum RunError {
     },
     /// The pruning window is longer than the profile's history.
     #[error(
-        "volume.prune_lag is {prune_lag} frames; profile {profile} remembers {history_frames}. Choose a larger --profile, or \
+        "volume.prune_lag is {prune_lag} frames; profile {profile} remembers {history_frames}. Give more bytes with --memory or a larger --profile, or \
          --set volume.prune_lag={history_frames}"
     )]
     Window {
@@ -70,7 +70,7 @@ pub enum RunError {
         problems: String,
     },
     /// The machine has no room for the slab.
-    #[error("this machine has no {bytes} bytes for the slab of profile {profile}. Choose a smaller --profile; `dynvox budget` lists them")]
+    #[error("this machine has no {bytes} bytes for the slab of {profile}. Give fewer with --memory; `dynvox budget` shows what they hold")]
     NoMemory {
         /// Bytes of the slab.
         bytes: usize,
@@ -113,7 +113,7 @@ pub enum RunError {
     /// The process holds more memory than it may.
     #[error(
         "at frame {frame} the process holds {rss_bytes} bytes, more than the {limit_bytes} it may. Allow more with --rss-limit-mib, or choose a \
-         smaller --profile"
+         smaller --memory"
     )]
     Resident {
         /// Number of the frame.

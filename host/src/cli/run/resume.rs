@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments a run is begun with; with `--resume` they are those it was begun with. The others change nothing in the result.
-pub const BEGUN: [&str; 27] = [
+pub const BEGUN: [&str; 29] = [
     "path",
     "sequence",
     "dataset",
@@ -16,6 +16,8 @@ pub const BEGUN: [&str; 27] = [
     "stacked",
     "calibration",
     "profile",
+    "memory",
+    "capacity",
     "start",
     "frames",
     "stride",

@@ -1,0 +1,281 @@
+//! A capacity for a given number of bytes and a given image: what the profiles are for four cases, for all others.
+//!
+//! The rules, in order. What the image needs comes first and follows from its pixels alone (see [`Capacity::for_budget`]). Of the rest at
+//! most a fifth goes to volumes of objects, in steps; all that remains is blocks of the static map, since they decide how far a drive goes
+//! before blocks leave the pool. The result never exceeds the budget, and one block more would.
+
+use super::{MIN_HEIGHT, MIN_WIDTH};
+use crate::memory::Capacity;
+use crate::objects::MAX_OBJECTS;
+use crate::tracking::MAX_DETECTIONS;
+use core::fmt;
+
+/// Largest image side, px: positions of features are 16-bit.
+pub const MAX_SIDE: usize = 8_192;
+/// Largest side of an image that is rectified, px.
+const MAX_RAW_SIDE: usize = 4_096;
+/// Most pixels of an image.
+const MAX_PIXELS: usize = 1 << 24;
+/// Fewest blocks of a static map worth making: half of what one frame of 320 x 96 px sees.
+const MIN_BLOCKS: usize = 1_024;
+/// Colour is kept where at least so many blocks can have it, unless it is asked for or declined.
+const COLOUR_BLOCKS: usize = 20_000;
+/// Steps of objects reconstructed at once, and blocks of each; the first that fits its share is taken.
+const OBJECTS: [(usize, usize); 6] = [(16, 4_000), (8, 1_200), (4, 700), (2, 300), (2, 150), (0, 0)];
+/// Of what the image leaves, one part in so many may go to volumes of objects.
+const OBJECTS_SHARE: usize = 5;
+/// Where their number is asked for, one part in so many.
+const ASKED_OBJECTS_SHARE: usize = 2;
+/// Of what the image leaves, one part in so many may go to crops that wait.
+const CROPS_SHARE: usize = 16;
+/// Voxel size the numbers of visible blocks are for, m.
+const VOXEL_SIZE_M: f32 = 0.05;
+
+/// What a budget is asked for besides bytes and image size. The default leaves all to the rules.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BudgetOptions {
+    /// Whether voxels have colour; where it is not said, they have it where 20,000 blocks with colour fit.
+    pub colour: Option<bool>,
+    /// Objects reconstructed at once, at most [`MAX_OBJECTS`]; as many as a fifth of the budget allows where it is not said.
+    pub objects: Option<usize>,
+    /// Side of a voxel of the static map, m: larger voxels need fewer blocks at once. `None` is 0.05 m.
+    pub voxel_size_m: Option<f32>,
+    /// Largest unrectified image, width and height, px; 0 where images come rectified.
+    pub raw_image: [usize; 2],
+}
+
+/// Why there is no capacity for a budget.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum BudgetError {
+    /// The budget is too small for this image and these options.
+    TooSmall {
+        /// Bytes of the least capacity that works.
+        least: usize,
+    },
+    /// The image is too small or too large.
+    Image,
+    /// More objects are asked for than can be told apart.
+    Objects,
+    /// The voxel size is not a positive number.
+    VoxelSize,
+}
+
+impl fmt::Display for BudgetError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooSmall { least } => write!(f, "the budget is too small: the least that works for this image is {least} bytes"),
+            Self::Image => {
+                write!(
+                    f,
+                    "images must be from {MIN_WIDTH} x {MIN_HEIGHT} px to {MAX_SIDE} px a side ({MAX_RAW_SIDE} where they are rectified)"
+                )
+            }
+            Self::Objects => write!(f, "at most {MAX_OBJECTS} objects can be reconstructed at once"),
+            Self::VoxelSize => write!(f, "the voxel size must be a positive number of metres"),
+        }
+    }
+}
+
+impl core::error::Error for BudgetError {}
+
+/// A bound that cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CapacityProblem {
+    /// The bound: `visible_blocks`.
+    pub bound: &'static str,
+    /// What it must be: "must be above 0".
+    pub rule: &'static str,
+}
+
+impl fmt::Display for CapacityProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.bound, self.rule)
+    }
+}
+
+impl core::error::Error for CapacityProblem {}
+
+impl Capacity {
+    /// The largest capacity of at most `bytes` for images of `width` x `height` px: `capacity.bytes() <= bytes`, always.
+    ///
+    /// Of every 16 pixels one may be a feature and of every 40 one a match; masks may cover 8 images of pixels; 64 detections and tracks. The
+    /// pruning window is 200 frames where `bytes` is 96 MiB or more, else 64. Objects and blocks share the rest as the module says.
+    ///
+    /// ```
+    /// use dynvox_core::{BudgetOptions, Capacity};
+    ///
+    /// let capacity = Capacity::for_budget(48 << 20, 752, 480, &BudgetOptions::default())?;
+    /// assert!(capacity.bytes() <= 48 << 20 && capacity.blocks > 2_000);
+    /// # Ok::<(), dynvox_core::BudgetError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The budget is too small, which names the least that works, or the image or an option cannot be.
+    pub fn for_budget(bytes: usize, width: usize, height: usize, options: &BudgetOptions) -> Result<Self, BudgetError> {
+        let question = Question::new(bytes, width, height, options)?;
+        let least = question.least();
+        if least.bytes() > question.bytes {
+            return Err(BudgetError::TooSmall { least: least.bytes() });
+        }
+        let solved = match options.colour {
+            Some(colour) => question.solved(colour),
+            None => {
+                let coloured = question.solved(true);
+                if coloured.blocks >= COLOUR_BLOCKS { coloured } else { question.solved(false) }
+            }
+        };
+        // What the steps leave may be less than the least that works: then that is the answer, grown by what fits.
+        Ok(if solved.blocks >= MIN_BLOCKS { solved } else { question.filled(least) })
+    }
+
+    /// Whether every bound is one a mapper can work with.
+    ///
+    /// # Errors
+    /// The first bound that is not.
+    pub fn validate(&self) -> Result<(), CapacityProblem> {
+        let above_0 = "must be above 0";
+        let rules = [
+            (self.image_width >= MIN_WIDTH, "image_width", "must be at least 64 px"),
+            (self.image_height >= MIN_HEIGHT, "image_height", "must be at least 32 px"),
+            (self.image_width.max(self.image_height) <= MAX_SIDE, "image_width", "and image_height must be at most 8,192 px"),
+            (self.features > 0, "features", above_0),
+            (self.matches > 0, "matches", above_0),
+            (self.blocks > 0, "blocks", above_0),
+            (self.visible_blocks > 0, "visible_blocks", above_0),
+            (self.visible_blocks <= self.blocks, "visible_blocks", "must be at most `blocks`"),
+            (self.history_frames > 0, "history_frames", above_0),
+            (self.detections <= MAX_DETECTIONS, "detections", "must be at most 64"),
+            (self.objects <= MAX_OBJECTS, "objects", "must be at most 16"),
+            (self.objects == 0 || self.object_blocks > 0, "object_blocks", "must be above 0 where there are objects"),
+        ];
+        match rules.iter().find(|(holds, ..)| !holds) {
+            Some((_, bound, rule)) => Err(CapacityProblem { bound, rule }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// One question: bytes, image, options.
+struct Question<'o> {
+    bytes: usize,
+    width: usize,
+    height: usize,
+    options: &'o BudgetOptions,
+    /// Blocks visible in one frame at most, were there no bound on blocks.
+    visible: usize,
+}
+
+impl<'o> Question<'o> {
+    fn new(bytes: usize, width: usize, height: usize, options: &'o BudgetOptions) -> Result<Self, BudgetError> {
+        let fits = |width: usize, height: usize| width <= MAX_SIDE && height <= MAX_SIDE && width * height <= MAX_PIXELS;
+        let [raw_width, raw_height] = options.raw_image;
+        let raw_fits = raw_width <= MAX_RAW_SIDE && raw_height <= MAX_RAW_SIDE;
+        if width < MIN_WIDTH || height < MIN_HEIGHT || !fits(width, height) || !raw_fits {
+            return Err(BudgetError::Image);
+        }
+        if options.objects.is_some_and(|objects| objects > MAX_OBJECTS) {
+            return Err(BudgetError::Objects);
+        }
+        let voxel_size_m = options.voxel_size_m.unwrap_or(VOXEL_SIZE_M);
+        if !(voxel_size_m.is_finite() && voxel_size_m > 0.0) {
+            return Err(BudgetError::VoxelSize);
+        }
+        // Surfaces of the same extent take fewer blocks of larger voxels, by the square of their side.
+        let finer = f64::from(VOXEL_SIZE_M) / f64::from(voxel_size_m);
+        let pixels = width * height;
+        let at_default = if pixels / 20 > 12_000 { pixels / 20 } else { 12_000 };
+        let visible = (at_default as f64 * finer * finer) as usize;
+        let visible = if visible < MIN_BLOCKS { MIN_BLOCKS } else { visible };
+        // A slice cannot be longer than this.
+        let bytes = if bytes > isize::MAX as usize { isize::MAX as usize } else { bytes };
+        Ok(Self { bytes, width, height, options, visible })
+    }
+
+    /// What follows from the image alone: no block, no object.
+    fn image_only(&self, colour: bool) -> Capacity {
+        let pixels = self.width * self.height;
+        let [raw_width, raw_height] = self.options.raw_image;
+        Capacity {
+            image_width: self.width,
+            image_height: self.height,
+            raw_width,
+            raw_height,
+            features: (pixels / 16).max(2_000),
+            matches: (pixels / 40).max(1_000),
+            blocks: 0,
+            visible_blocks: 0,
+            history_frames: if self.bytes >= 96 << 20 { 200 } else { 64 },
+            detections: MAX_DETECTIONS,
+            mask_words: pixels / 8 + 1,
+            tracks: 64,
+            objects: 0,
+            object_blocks: 0,
+            crop_pixels: 0,
+            colour,
+        }
+    }
+
+    /// The least capacity that works with the options.
+    fn least(&self) -> Capacity {
+        let base = self.image_only(self.options.colour.unwrap_or(false));
+        let objects = self.options.objects.unwrap_or(0);
+        let (object_blocks, crop_pixels) = if objects > 0 { (150, self.width * self.height / 2) } else { (0, 0) };
+        self.with_blocks(&Capacity { objects, object_blocks, crop_pixels, ..base }, MIN_BLOCKS)
+    }
+
+    /// The image, objects in their share, and as many blocks as fit; no block where nothing is left for them.
+    fn solved(&self, colour: bool) -> Capacity {
+        let base = self.image_only(colour);
+        let rest = self.bytes.saturating_sub(base.bytes());
+        let with_objects = |(objects, object_blocks): (usize, usize), crop_pixels: usize| {
+            let crop_pixels = if objects > 0 { crop_pixels } else { 0 };
+            Capacity { objects, object_blocks, crop_pixels, ..base }
+        };
+        let cost = |capacity: &Capacity| capacity.bytes() - base.bytes();
+        let pixels = self.width * self.height;
+        let crops = Capacity { crop_pixels: pixels * 8 / 5, ..base };
+        let crop_pixels = if cost(&crops) <= rest / CROPS_SHARE { crops.crop_pixels } else { pixels / 2 };
+        let share = if self.options.objects.is_some() { rest / ASKED_OBJECTS_SHARE } else { rest / OBJECTS_SHARE };
+        let steps = OBJECTS.into_iter().map(|(objects, blocks)| match self.options.objects {
+            Some(0) => (0, 0),
+            Some(asked) => (asked, blocks.max(150)),
+            None => (objects, blocks),
+        });
+        let fits = |step: &(usize, usize)| cost(&with_objects(*step, crop_pixels)) <= share;
+        let step = steps.clone().find(fits).or_else(|| steps.clone().next_back()).unwrap_or_default();
+        self.filled(with_objects(step, crop_pixels))
+    }
+
+    /// With as many blocks as fit.
+    fn filled(&self, capacity: Capacity) -> Capacity {
+        let fits = |blocks: usize| self.with_blocks(&capacity, blocks).bytes() <= self.bytes;
+        // A block has at least 512 voxels of 3 bytes.
+        let block_bytes = 512 * if capacity.colour { 6 } else { 3 };
+        let (mut fitting, mut too_many) = (0, self.bytes.saturating_sub(capacity.bytes()) / block_bytes + 1);
+        while fitting + 1 < too_many {
+            let middle = fitting + (too_many - fitting) / 2;
+            if fits(middle) {
+                fitting = middle;
+            } else {
+                too_many = middle;
+            }
+        }
+        self.with_blocks(&capacity, fitting)
+    }
+
+    /// The same with so many blocks, of which at most four in five are visible at once.
+    fn with_blocks(&self, capacity: &Capacity, blocks: usize) -> Capacity {
+        let most = blocks - blocks / 5;
+        Capacity {
+            blocks,
+            visible_blocks: if most < self.visible { most } else { self.visible },
+            ..*capacity
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,108 @@
+use super::*;
+use crate::random::Random;
+
+const MIB: usize = 1 << 20;
+const IMAGES: [(usize, usize); 6] = [(320, 96), (640, 480), (752, 480), (1_280, 384), (1_280, 720), (1_920, 1_080)];
+
+fn solve(bytes: usize, (width, height): (usize, usize), options: &BudgetOptions) -> Result<Capacity, BudgetError> {
+    Capacity::for_budget(bytes, width, height, options)
+}
+
+/// One block more.
+fn grown(capacity: &Capacity) -> Capacity {
+    let blocks = capacity.blocks + 1;
+    Capacity {
+        blocks,
+        visible_blocks: capacity.visible_blocks.min(blocks - blocks / 5),
+        ..*capacity
+    }
+}
+
+#[test]
+fn budgets_are_filled_and_never_exceeded_or_the_least_is_named() {
+    let mut solved = 0;
+    for mib in [8, 16, 32, 48, 64, 100, 256, 1_024] {
+        for (image, voxel_size_m) in IMAGES.into_iter().flat_map(|image| [(image, 0.05), (image, 0.1)]) {
+            let options = BudgetOptions { voxel_size_m: Some(voxel_size_m), ..BudgetOptions::default() };
+            let bytes = mib * MIB;
+            match solve(bytes, image, &options) {
+                Ok(capacity) => {
+                    assert!(
+                        capacity.bytes() <= bytes && capacity.bytes() * 100 >= bytes * 97,
+                        "{mib} MiB, {image:?}: {}",
+                        capacity.bytes()
+                    );
+                    assert_eq!(capacity.validate(), Ok(()), "{mib} MiB, {image:?}");
+                    assert_eq!((capacity.image_width, capacity.image_height), image);
+                    solved += 1;
+                }
+                Err(BudgetError::TooSmall { least }) => {
+                    assert!(least > bytes && mib < 256, "{mib} MiB, {image:?}");
+                    assert!(solve(least, image, &options).is_ok() && solve(least - 1, image, &options).is_err());
+                }
+                Err(other) => panic!("{mib} MiB, {image:?}: {other}"),
+            }
+        }
+    }
+    assert!(solved >= 60, "{solved} of 96");
+}
+
+#[test]
+fn any_question_is_answered_within_its_budget_or_refused_with_a_least_that_works() {
+    let mut random = Random::new(5);
+    let mut answered = 0;
+    for at in 0..10_000 {
+        let exponent = 20 + random.below(11);
+        let bytes = (1usize << exponent) + random.below(1 << exponent) as usize;
+        let image = (64 + random.below(2_000) as usize, 32 + random.below(1_200) as usize);
+        let options = BudgetOptions {
+            colour: [None, Some(false), Some(true)].get(random.below(3) as usize).copied().flatten(),
+            objects: (random.below(2) == 0).then(|| random.below(17) as usize),
+            voxel_size_m: (random.below(2) == 0).then(|| 0.01 + random.below(50) as f32 / 100.0),
+            raw_image: if random.below(4) == 0 { [image.0 + 100, image.1 + 50] } else { [0, 0] },
+        };
+        match solve(bytes, image, &options) {
+            Ok(capacity) => {
+                assert!(capacity.bytes() <= bytes, "question {at}: {options:?}");
+                assert!(grown(&capacity).bytes() > bytes, "question {at}: one block more would fit");
+                assert_eq!(capacity.validate(), Ok(()), "question {at}: {options:?}");
+                assert!(capacity.blocks >= MIN_BLOCKS && options.colour.is_none_or(|colour| colour == capacity.colour));
+                assert!(options.objects.is_none_or(|objects| objects == capacity.objects), "question {at}: {options:?}");
+                answered += 1;
+            }
+            Err(BudgetError::TooSmall { least }) => {
+                assert!(least > bytes, "question {at}");
+                assert!(solve(least, image, &options).is_ok(), "question {at}: the least named works");
+                assert!(solve(least - 1, image, &options).is_err(), "question {at}: a byte less does not");
+            }
+            Err(other) => panic!("question {at}: {other}"),
+        }
+    }
+    assert!(answered > 3_000, "{answered}");
+}
+
+#[test]
+fn a_larger_budget_maps_at_least_as_far() {
+    let drive =
+        |mib: usize| solve(mib * MIB, (640, 480), &BudgetOptions { colour: Some(false), objects: Some(2), ..BudgetOptions::default() });
+    let blocks: std::vec::Vec<usize> = (50..300).step_by(10).map(|mib| drive(mib).unwrap().blocks).collect();
+    assert!(blocks.is_sorted(), "{blocks:?}");
+}
+
+#[test]
+fn the_profiles_are_valid_and_what_cannot_be_is_named() {
+    for (name, capacity) in Capacity::PROFILES {
+        assert_eq!(capacity.validate(), Ok(()), "{name}");
+    }
+    let problem = |capacity: Capacity| capacity.validate().unwrap_err().bound;
+    assert_eq!(problem(Capacity { blocks: 0, ..Capacity::TINY }), "blocks");
+    assert_eq!(problem(Capacity { visible_blocks: 9_999, ..Capacity::TINY }), "visible_blocks");
+    assert_eq!(problem(Capacity { objects: 17, ..Capacity::TINY }), "objects");
+    let plain = BudgetOptions::default();
+    assert_eq!(solve(MIB, (10, 10), &plain), Err(BudgetError::Image));
+    assert_eq!(solve(MIB, (640, usize::MAX), &plain), Err(BudgetError::Image));
+    assert_eq!(solve(MIB, (640, 480), &BudgetOptions { objects: Some(99), ..plain }), Err(BudgetError::Objects));
+    assert_eq!(solve(MIB, (640, 480), &BudgetOptions { voxel_size_m: Some(f32::NAN), ..plain }), Err(BudgetError::VoxelSize));
+    assert!(matches!(solve(0, (640, 480), &plain), Err(BudgetError::TooSmall { .. })));
+    assert!(solve(usize::MAX, (640, 480), &plain).is_ok_and(|capacity| capacity.bytes() <= isize::MAX as usize));
+}
