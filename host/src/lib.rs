@@ -1,4 +1,4 @@
-//! The host of dynvox: feeds the core, watches its ceilings, shows what it made.
+//! The host of dynvox: feeds the core, checks its limits, evaluates and shows its results.
 
 pub mod cli;
 pub mod evaluate;
@@ -8,5 +8,6 @@ pub mod input;
 pub mod observe;
 pub mod report;
 pub mod run;
+pub mod slab;
 pub mod sweep;
 pub mod synth;

@@ -40,7 +40,7 @@ fn one_bit_of_one_pixel_is_found_as_input_of_its_frame() {
     image.save(&path).unwrap();
     run(root.path(), "dirty", &[]);
     let (code, said) = diff(root.path(), &["clean", "dirty"]);
-    assert_eq!((code, said.as_str()), (1, "the runs part at frame 2, first in: input\n"));
+    assert_eq!((code, said.as_str()), (1, "first divergence: frame 2, input\n"));
 }
 
 /// What one bit of a voxel, a match, a pose or a track does to a stage's digest is in the core's tests; here, that the stage is named.
@@ -64,7 +64,7 @@ fn one_bit_of_a_stages_digest_names_the_stage() {
         fs::write(&csv, lines.concat()).unwrap();
         let (code, said) = diff(root.path(), &["clean", "dirty"]);
         let named = if stage == "objects" { "object 7" } else { stage };
-        assert_eq!((code, said), (1, format!("the runs part at frame 2, first in: {named}\n")));
+        assert_eq!((code, said), (1, format!("first divergence: frame 2, {named}\n")));
     }
 }
 
@@ -75,10 +75,10 @@ fn a_setting_is_named_beside_the_stage_it_reaches_first() {
     let (code, said) = diff(root.path(), &["clean", "coarse"]);
     assert_eq!(code, 1);
     assert!(said.contains("setting volume.voxel_size_m: 0.05 in clean, 0.1 in coarse"), "{said}");
-    assert!(said.ends_with("the runs part at frame 0, first in: background\n"), "{said}");
+    assert!(said.ends_with("first divergence: frame 0, background\n"), "{said}");
     run(root.path(), "sparse", &["--set", "scene_flow.bucket_matches=1"]);
     let (code, said) = diff(root.path(), &["clean", "sparse"]);
-    assert!(code == 1 && said.ends_with("the runs part at frame 1, first in: matches\n"), "{said}");
+    assert!(code == 1 && said.ends_with("first divergence: frame 1, matches\n"), "{said}");
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn a_shorter_run_is_the_beginning_of_a_longer_one() {
     let root = prepared();
     run(root.path(), "short", &["--frames", "3"]);
     let (code, said) = diff(root.path(), &["clean", "short"]);
-    assert_eq!((code, said.as_str()), (1, "short is the beginning of clean: equal in its 3 frames, 1 more follow\n"));
+    assert_eq!((code, said.as_str()), (1, "short is a prefix of clean: equal in all its 3 frames, 1 more follow\n"));
     assert_eq!(diff(root.path(), &["clean", "short", "--shared"]).0, 0);
     run(root.path(), "first", &["--frames", "1"]);
     run(root.path(), "rest", &["--start", "1"]);
@@ -101,14 +101,14 @@ fn what_is_no_run_folder_or_an_old_or_damaged_one_is_told_with_what_to_do() {
         let (code, said) = diff(root.path(), &["clean", name]);
         assert!(code == 2 && said.contains("error: ") && said.contains(sentence), "{said}");
     };
-    trouble("rig", "rig is no run folder: it has no frames.csv");
+    trouble("rig", "rig is not a run folder: its frames.csv cannot be read");
     trouble("rig", "Give a folder that `dynvox run` wrote");
-    trouble("nowhere", "nowhere is no run folder");
+    trouble("nowhere", "nowhere is not a run folder");
     run(root.path(), "old", &[]);
     let csv = root.path().join("old/frames.csv");
     let text = fs::read_to_string(&csv).unwrap();
     fs::write(&csv, text.replace("disparity_digest", "other")).unwrap();
-    trouble("old", "has no column disparity_digest: it is of an older dynvox");
+    trouble("old", "has no column disparity_digest: an older dynvox wrote it");
     fs::write(&csv, &text[..text.len() - 30]).unwrap();
     trouble("old", "line 5 cannot be read");
 }

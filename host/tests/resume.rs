@@ -141,7 +141,7 @@ fn stopped() -> TempDir {
     let run = dynvox(root.path(), &args);
     assert_eq!(run.status.code(), Some(1));
     assert!(
-        said(&run).contains("left/005.png is 50 x 50 px") && said(&run).contains("`dynvox run --resume out/it` lets the run go on"),
+        said(&run).contains("left/005.png is 50 x 50 px") && said(&run).contains("`dynvox run --resume out/it` resumes the run"),
         "{}",
         said(&run)
     );
@@ -155,12 +155,12 @@ fn stopped() -> TempDir {
 fn a_run_that_failed_goes_on_when_the_cause_is_mended() {
     let root = stopped();
     let again = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "out/it"]);
-    assert!(said(&again).contains("a run was stopped on its way to out/it"), "{}", said(&again));
+    assert!(said(&again).contains("an interrupted run to out/it has a snapshot"), "{}", said(&again));
     let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
     assert!(resumed.status.success(), "{}", said(&resumed));
     assert_same(root.path(), "whole", "out/it");
     let twice = dynvox(root.path(), &["run", "--resume", "out/it"]);
-    assert!(said(&twice).contains("the one there is finished"), "{}", said(&twice));
+    assert!(said(&twice).contains("it is complete"), "{}", said(&twice));
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
         bytes
     };
     with(&snapshot, b"P5 3 1 255", "is not a snapshot of a run");
-    with(&snapshot, &changed(8, 0), "is a snapshot of version 0; this dynvox takes version 1");
+    with(&snapshot, &changed(8, 0), "is a snapshot of version 0; this dynvox takes version 2");
     for at in [15, 20, 30, 5_000, whole.len() / 2, whole.len() - 1] {
         with(&snapshot, &changed(at, !whole[at]), "run.snapshot is damaged");
     }
@@ -203,7 +203,7 @@ fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
     let mut pixels = image::open(&image).unwrap().into_luma8();
     pixels.get_pixel_mut(80, 40).0[0] ^= 1;
     pixels.save(path("other.png")).unwrap();
-    with(&image, &fs::read(path("other.png")).unwrap(), "the data set's frame 3 is not what it was");
+    with(&image, &fs::read(path("other.png")).unwrap(), "frame 3 of the data set has changed");
     let [last, away] = ["rig/left/007.png", "away.png"].map(path);
     fs::rename(&last, &away).unwrap();
     fs::rename(path("rig/right/007.png"), path("away-right.png")).unwrap();
@@ -216,8 +216,8 @@ fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
     with(&blocks, b"dynvox", "map.blocks is not as the run left it");
     for (args, sentence) in [
         (vec!["run", "--resume", "out/it", "--profile", "small"], "cannot be used with"),
-        (vec!["run", "--resume", "nowhere"], "no run can go on to"),
-        (vec!["run", "--snapshot-every", "0", "--out", "x"], "--snapshot-every begins at 1"),
+        (vec!["run", "--resume", "nowhere"], "no run to nowhere can be resumed"),
+        (vec!["run", "--snapshot-every", "0", "--out", "x"], "--snapshot-every must be at least 1"),
         (vec!["run", "--snapshot-every", "9", "--evaluate", "exact"], "cannot be used with"),
     ] {
         let run = dynvox(root.path(), &args);

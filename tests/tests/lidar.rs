@@ -1,7 +1,9 @@
 //! A map made of exact depth and poses passes the evaluation; one that is off by a known disparity loses what it must.
 #![allow(missing_docs)]
 
-use dynvox::evaluate::lidar::{Aim, Awaited, EvaluatedFrame, Field, Layer, LidarFigures, Rule, aim, aim_at_exact};
+use dynvox::evaluate::reference::{
+    EvaluatedFrame, Field, PendingFrame, ProjectedScan, ReferenceFigures, Region, Rule, project_scan, sample_exact_depth,
+};
 use dynvox::formats::Image;
 use dynvox::input::LidarScan;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
@@ -62,37 +64,37 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
         mapper.step(&stereo, &Serial).unwrap();
         let bf = street.rig().focal_baseline_px_m();
         let exact = Image::new(640, 192, frame.depth_m.clone()).unwrap();
-        let mut aims = [aim(&scan(&street, index), &field(&config)), aim_at_exact(&exact, &street.rig(), &field(&config))];
+        let mut scans = [project_scan(&scan(&street, index), &field(&config)), sample_exact_depth(&exact, &street.rig(), &field(&config))];
         // The sensor stands above and behind the camera and sees past edges: what it sees there is hidden from the camera, and no map can show it.
-        let all = aims[0].targets.len();
+        let all = scans[0].points.len();
         let bare = |u: u16, v: u16| f32::from(exact_q8[usize::from(v) * 640 + usize::from(u)]) / f32::from(DISPARITY_ONE_PX);
-        aims[0].targets.retain(|target| !Rule::KITTI.is_error(bare(target.u, target.v), target.disparity_px));
-        assert!(aims[0].targets.len() as f64 > 0.97 * all as f64, "{} of {all}", aims[0].targets.len());
+        scans[0].points.retain(|point| !Rule::KITTI.is_error(bare(point.u, point.v), point.disparity_px));
+        assert!(scans[0].points.len() as f64 > 0.97 * all as f64, "{} of {all}", scans[0].points.len());
         let map = mapper.raycast(&frame.t_world_camera, &Serial).unwrap().depth_m().unwrap();
         let input = |u: usize, v: usize| f32::from(exact_q8[v * 640 + u]) / f32::from(DISPARITY_ONE_PX);
-        let judge = |aim: &Aim, map: &View<'_, f32>| -> EvaluatedFrame {
-            Awaited::settle(index as usize, frame.t_world_camera, aim, input, |_, _| Layer::Static).compare(map, bf, 1.0).0
+        let evaluate = |scanned: &ProjectedScan, map: &View<'_, f32>| -> EvaluatedFrame {
+            PendingFrame::new(index as usize, frame.t_world_camera, scanned, input, |_, _| Region::Static).compare(map, bf, 1.0).0
         };
-        by_scan.push(judge(&aims[0], &map));
-        by_pixel.push(judge(&aims[1], &map));
+        by_scan.push(evaluate(&scans[0], &map));
+        by_pixel.push(evaluate(&scans[1], &map));
         // A map whose every surface is 4 px off: wrong wherever 4 px are more than 5 %.
         let off: Vec<f32> =
             frame.depth_m.iter().map(|&depth_m| if depth_m > 0.0 { (bf / (bf / f64::from(depth_m) + 4.0)) as f32 } else { 0.0 }).collect();
-        let off = judge(&aims[1], &view_f32(&off));
-        let large = aims[1].targets.iter().filter(|target| 4.0 <= Rule::KITTI.share * target.disparity_px).count() as u32;
-        assert_eq!(off.layers[0].sources[1].errors[0], off.layers[0].total - large, "frame {index}");
-        (near, judged) = (near + large, judged + off.layers[0].total);
+        let off = evaluate(&scans[1], &view_f32(&off));
+        let large = scans[1].points.iter().filter(|point| 4.0 <= Rule::KITTI.share * point.disparity_px).count() as u32;
+        assert_eq!(off.regions[0].sources[1].errors[0], off.regions[0].total - large, "frame {index}");
+        (near, judged) = (near + large, judged + off.regions[0].total);
         shifted.push(off);
     }
     assert!(near > 0 && near < judged, "the scene must have both: {near} of {judged}");
     for (name, frames) in [("scan", &by_scan), ("pixels", &by_pixel)] {
-        let fused = LidarFigures::of("exact", 0, frames).unwrap().still.fused;
+        let fused = ReferenceFigures::of("exact", 0, frames, None).unwrap().still.fused;
         assert!(fused.points > 10_000);
         assert!(fused.accuracy.unwrap() > 0.99 && fused.completeness.unwrap() > 0.99, "{name}: {fused:?}");
     }
-    let fused = LidarFigures::of("exact", 0, &shifted).unwrap().still.fused;
+    let fused = ReferenceFigures::of("exact", 0, &shifted, None).unwrap().still.fused;
     assert_eq!(fused.completeness, Some(1.0));
-    let kept = shifted.iter().map(|frame| frame.layers[0].accuracy(1, 0).unwrap()).sum::<f64>() / f64::from(FRAMES);
+    let kept = shifted.iter().map(|frame| frame.regions[0].accuracy(1, 0).unwrap()).sum::<f64>() / f64::from(FRAMES);
     assert!((fused.accuracy.unwrap() - kept).abs() < 1e-12 && kept < 0.5, "{kept}");
 }
 

@@ -1,7 +1,7 @@
 //! `dynvox budget`.
 
 use super::capacity::{Bytes, ImageSize, to_json, to_toml};
-use crate::report::html::grouped;
+use crate::report::text::grouped;
 use dynvox_core::volume::{BLOCK_SIDE, VolumeConfig};
 use dynvox_core::{BudgetOptions, Capacity};
 use std::fmt::Write;

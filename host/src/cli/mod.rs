@@ -72,7 +72,7 @@ pub fn main() -> ExitCode {
     let filter = tracing_subscriber::EnvFilter::try_from_env("DYNVOX_LOG").unwrap_or_else(|_| "warn".into());
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
     let done = match Cli::parse().command {
-        None => run::run(&run::RunArgs::of_nothing()),
+        None => run::run(&run::RunArgs::without_arguments()),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
         Some(Command::Budget(args)) => budget::run(&args),

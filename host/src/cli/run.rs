@@ -5,14 +5,14 @@ mod resume;
 use super::capacity::CapacityArgs;
 use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
-use crate::evaluate::objects::Medians;
 use crate::formats;
 use crate::input::depth::{self, DepthChoice};
 use crate::input::masks::{self, MaskChoice};
 use crate::input::{self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking};
 use crate::observe::Reference;
+use crate::report::text::counted;
 use crate::report::{self, Summary};
-use crate::run::{self, FolderError, HOST_OVERHEAD_BYTES, Plan, RunError, RunFolder, RunRecord, Stopped, Streaming};
+use crate::run::{self, BLOCKS_FILE, Checkpoint, FolderError, HOST_OVERHEAD_BYTES, Plan, RunError, RunFolder, RunRecord, Streaming};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -59,22 +59,22 @@ pub struct RunArgs {
     /// Shrink the images, above 0 and up to 1
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     scale: f64,
-    /// Where depth comes from: elas (stereo matching here), files:DIR (PNG, PFM or OpenCV XML named as the images; depth where DIR's name
-    /// speaks of depth and not of disparity), disparity:DIR, depth:DIR, or exact (the synthetic street)
+    /// Source of depth: elas (stereo matching), files:DIR (PNG, PFM or OpenCV XML named as the images; depth where DIR's name says depth
+    /// and not disparity), disparity:DIR, depth:DIR, or exact (the synthetic street)
     #[arg(long, default_value = "elas", value_name = "SOURCE")]
     depth: DepthChoice,
-    /// Where masks of what could move come from: auto, none, files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or
+    /// Source of instance masks: auto, none, files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or
     /// noisy[:SEED] (the synthetic street)
     #[arg(long, default_value = "auto", value_name = "SOURCE")]
     instances: MaskChoice,
-    /// Whether what moves is kept out of the static map and reconstructed apart; off fuses everything into one map [default: on]
+    /// Whether objects are masked out of the static map and reconstructed separately; off fuses everything into one map [default: on]
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     dynamic: Option<bool>,
-    /// Where the camera's motion comes from: stereo (matches over two pairs), icp (depth against the map, the baseline of hand-held mappers:
-    /// expected to fail on a drive), or file:POSES (KITTI or TUM) [default: stereo]
+    /// Source of the camera's motion: stereo (matches over two pairs), icp (depth against the map, the baseline of hand-held mappers:
+    /// expected to fail at driving speed), or file:POSES (KITTI or TUM) [default: stereo]
     #[arg(long, value_name = "SOURCE")]
     egomotion: Option<EgomotionChoice>,
-    /// Fuse every K-th frame; the camera is followed in all [default: 1]
+    /// Fuse every K-th frame; the camera is tracked in all [default: 1]
     #[arg(long, value_name = "K")]
     fuse_every: Option<u32>,
     /// Settings from a file; config.toml of an earlier run is one
@@ -83,34 +83,34 @@ pub struct RunArgs {
     /// One setting, over those of the file; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Lose the blocks that leave the full pool; otherwise they go to map.blocks in the run folder, come back when seen again, and are in map.ply
+    /// Lose blocks evicted from the full pool; otherwise they are stored in map.blocks, loaded back when seen again, and included in map.ply
     #[arg(long)]
     no_stream: bool,
-    /// Let map.blocks grow to so many MiB at most; the disk is the limit otherwise
+    /// Limit map.blocks to so many MiB [default: the disk's space]
     #[arg(long, value_name = "MIB", conflicts_with = "no_stream")]
     stream_mib: Option<u64>,
-    /// Leave map.blocks in the run folder when the mesh is written
+    /// Keep map.blocks in the run folder after the mesh is written
     #[arg(long, conflicts_with = "no_stream")]
     keep_blocks: bool,
-    /// Hold input and map against LiDAR scans or the synthetic street's exact depth: accuracy and completeness, of the street and of cars
+    /// Evaluate input and map against LiDAR scans or the synthetic street's exact depth: accuracy and completeness, of the static map and of
+    /// objects
     #[arg(long, value_enum, value_name = "REFERENCE")]
     evaluate: Option<Reference>,
-    /// Hold the map against a frame so many frames later, when pruning has been there
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    /// Evaluate the map at a frame's pose N frames later, after pruning
+    #[arg(long, default_value_t = 0, value_name = "N", requires = "evaluate")]
     evaluation_delay: usize,
-    /// Fail at the first frame that harms the map: a guessed pose, a block lost or refused
+    /// Fail at the first frame that affects the map: an extrapolated pose, anything refused or lost
     #[arg(long)]
     strict: bool,
-    /// Fail when the process holds more than so many MiB [default: the slab and 256]
+    /// Fail when the process uses more than so many MiB [default: the slab and 256]
     #[arg(long, value_name = "MIB")]
     rss_limit_mib: Option<u64>,
-    /// Write a snapshot every N frames, so that a run that was stopped can go on: at most N frames are mapped again. --evaluate holds more than
-    /// a snapshot does, and cannot be had with it
+    /// Write a snapshot every N frames, from which an interrupted run can be resumed. Cannot be combined with --evaluate
     #[arg(long, value_name = "N", conflicts_with = "evaluate")]
     snapshot_every: Option<usize>,
-    /// Let a stopped run go on from its last snapshot, into RUN_FOLDER, where it was to end. Settings and data set are those it was begun with; only
-    /// --threads, --rss-limit-mib, --snapshot-every, --json and --quiet may be given anew
-    #[arg(long, value_name = "RUN_FOLDER", conflicts_with_all = resume::BEGUN)]
+    /// Resume the interrupted run to RUN_FOLDER from its last snapshot, with its settings and data set; only --threads, --rss-limit-mib,
+    /// --snapshot-every, --json and --quiet can be changed
+    #[arg(long, value_name = "RUN_FOLDER", conflicts_with_all = resume::FIXED_ARGUMENTS)]
     resume: Option<PathBuf>,
     /// Folder for the results [default: out/<data set>-NNN]
     #[arg(long, value_name = "DIR")]
@@ -126,22 +126,22 @@ pub struct RunArgs {
     quiet: bool,
 }
 
-/// The arguments of a run without the command's name.
+/// The arguments of a run as a command line of their own.
 #[derive(clap::Parser)]
-struct Alone {
+struct RunCommand {
     #[command(flatten)]
     args: RunArgs,
 }
 
 impl RunArgs {
-    /// What `dynvox` alone means.
-    pub fn of_nothing() -> Self {
-        <Alone as clap::Parser>::parse_from(["dynvox"]).args
+    /// The defaults: a run of `dynvox` without arguments.
+    pub fn without_arguments() -> Self {
+        <RunCommand as clap::Parser>::parse_from(["dynvox"]).args
     }
 
-    /// What a line of arguments means, the program's name first.
-    pub fn of(line: &[String]) -> Result<Self, clap::Error> {
-        Ok(<Alone as clap::Parser>::try_parse_from(line)?.args)
+    /// Parses a command line, the program's name first.
+    pub fn parse(line: &[String]) -> Result<Self, clap::Error> {
+        Ok(<RunCommand as clap::Parser>::try_parse_from(line)?.args)
     }
 
     fn silent(&self) -> bool {
@@ -177,16 +177,16 @@ fn on_or_off(text: &str) -> Result<bool, String> {
     match text {
         "on" => Ok(true),
         "off" => Ok(false),
-        _ => Err("say on or off".to_owned()),
+        _ => Err("must be on or off".to_owned()),
     }
 }
 
-/// What a run is to do.
+/// The plan of a run.
 fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     let mut settings = Settings::resolve(args.config.as_deref(), &args.set)?;
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
     if threads == 0 || args.stride == 0 || args.frames == Some(0) {
-        bail!("--threads, --stride and --frames begin at 1. Give a larger number");
+        bail!("--threads, --stride and --frames must be at least 1. Give a larger number");
     }
     let dataset = args.open(&settings)?;
     let (profile, capacity) = args.bounds.resolve(dataset.size(), settings.voxel_size_m())?;
@@ -213,7 +213,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         config: settings.config(dataset.rig()),
         config_toml: settings.to_toml(args.path.is_none())?,
         threads,
-        snapshots: None,
+        checkpoints: None,
         streaming: (!args.no_stream).then_some(Streaming {
             most_bytes: args.stream_mib.map(|mib| mib.saturating_mul(MIB)),
             keep_file: args.keep_blocks,
@@ -227,24 +227,21 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     })
 }
 
-/// Maps into a folder, and tells what does not fit with what would.
-fn map(plan: &Plan, folder: &RunFolder, stopped: Option<Stopped>) -> anyhow::Result<RunRecord> {
-    run::run(plan, folder, stopped).map_err(|error| match error {
+/// Maps into a folder. An error about sizes lists the profiles; one that leaves a snapshot says how to resume.
+fn map(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> anyhow::Result<RunRecord> {
+    run::run(plan, folder, checkpoint).map_err(|error| match error {
         RunError::ImageSize { .. } | RunError::Window { .. } => anyhow::anyhow!("{error}\n\n{}", super::budget::table(&plan.config.volume)),
         error @ (RunError::Resume(_) | RunError::Reopen(_)) => error.into(),
         error if folder.snapshot().is_file() => {
-            anyhow::anyhow!(
-                "{error}.\nWhat was mapped before is kept: `dynvox run --resume {}` lets the run go on",
-                folder.target().display()
-            )
+            anyhow::anyhow!("{error}.\nThe last snapshot remains: `dynvox run --resume {}` resumes the run", folder.target().display())
         }
         error => error.into(),
     })
 }
 
-/// A run of which no folder stays.
-pub fn record(args: &RunArgs, workshop: &Path) -> anyhow::Result<RunRecord> {
-    map(&plan(args)?, &RunFolder::begin(workshop, true)?, None)
+/// A run without a folder: its files go to a scratch directory and are removed.
+pub fn record(args: &RunArgs, scratch_dir: &Path) -> anyhow::Result<RunRecord> {
+    map(&plan(args)?, &RunFolder::begin(scratch_dir, true)?, None)
 }
 
 pub fn run(args: &RunArgs) -> anyhow::Result<()> {
@@ -252,141 +249,56 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         return resume::run(args, target);
     }
     let mut plan = plan(args)?;
-    plan.snapshots = args.snapshot_every.map(|every| resume::snapshots(&plan, every)).transpose()?;
+    plan.checkpoints = args.snapshot_every.map(|every| resume::checkpoints(&plan, every)).transpose()?;
     let target = args.out.clone().unwrap_or_else(|| RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name()));
     let folder = RunFolder::begin(&target, args.overwrite)?;
     if !args.silent() {
-        introduce(&plan);
-        if plan.snapshots.is_some() {
-            eprintln!("note: should it be stopped, `dynvox run --resume {}` lets it go on", target.display());
+        print_header(&plan);
+        if plan.checkpoints.is_some() {
+            eprintln!("note: if the run is interrupted, `dynvox run --resume {}` resumes it", target.display());
         }
     }
     finish(args, &plan, folder, None)
 }
 
-/// Maps, writes what there is to say of it, and puts the folder in its place.
-fn finish(args: &RunArgs, plan: &Plan, folder: RunFolder, stopped: Option<Stopped>) -> anyhow::Result<()> {
-    let record = map(plan, &folder, stopped)?;
+/// Maps, writes the results, and renames the folder to its target.
+fn finish(args: &RunArgs, plan: &Plan, folder: RunFolder, checkpoint: Option<Checkpoint>) -> anyhow::Result<()> {
+    let record = map(plan, &folder, checkpoint)?;
     let summary = Summary::of(&record);
     write(&folder, &record, &summary)?;
-    let place = folder.commit(&record.served())?;
+    let temporary: &[&str] = if record.keeps_blocks() { &[] } else { &[BLOCKS_FILE] };
+    let target = folder.commit(temporary)?;
     if args.json {
         println!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {
-        conclude(&record, &place);
+        report::print_summary(&mut std::io::stdout().lock(), &record, &target)?;
     }
     Ok(())
 }
 
 fn write(folder: &RunFolder, run: &RunRecord, summary: &Summary) -> Result<(), FolderError> {
-    let poses = run.poses();
-    let times: Vec<f64> = run.rows.iter().map(|row| row.time_s).collect();
-    folder.write("config.toml", |out| std::io::Write::write_all(out, run.config_toml.as_bytes()))?;
-    folder.write("trajectory_kitti.txt", |out| formats::write_kitti(out, &poses))?;
-    folder.write("trajectory_tum.txt", |out| formats::write_tum(out, &times, &poses))?;
-    folder.write("frames.csv", |out| report::write_frames(out, &run.rows))?;
-    folder.write("tracks.csv", |out| report::write_tracks(out, &run.rows))?;
-    if !run.objects.judged.is_empty() {
-        folder.write("tracks_truth.csv", |out| report::write_tracks_truth(out, &run.rows, &run.objects.judged))?;
+    let sections = &run.sections;
+    let (times_s, poses) = (&sections.trajectory.times_s, &sections.trajectory.poses);
+    folder.write("config.toml", |out| std::io::Write::write_all(out, run.header.config_toml.as_bytes()))?;
+    folder.write("trajectory_kitti.txt", |out| formats::write_kitti(out, poses))?;
+    folder.write("trajectory_tum.txt", |out| formats::write_tum(out, times_s, poses))?;
+    folder.write("frames.csv", |out| report::write_frames(out, &run.frames))?;
+    folder.write("tracks.csv", |out| report::write_tracks(out, &sections.tracks.frames))?;
+    if !sections.tracks.comparisons.is_empty() {
+        folder.write("tracks_truth.csv", |out| report::write_tracks_truth(out, &sections.tracks))?;
     }
-    if let Some(lidar) = &run.lidar {
-        folder.write("lidar.csv", |out| report::write_lidar(out, &lidar.frames))?;
+    if let Some(reference) = &sections.reference {
+        folder.write("lidar.csv", |out| report::write_reference(out, &reference.frames))?;
     }
     folder.write("report.html", |out| report::html::write(out, run))?;
     folder.write("summary.json", |out| Ok(serde_json::to_writer_pretty(out, summary)?))
 }
 
-fn introduce(plan: &Plan) {
+fn print_header(plan: &Plan) {
     let (width, height) = plan.dataset.size();
-    eprintln!(
-        "{}: {} frames of {width} x {height} px, profile {}, {} thread{}",
-        plan.dataset.name(),
-        plan.indices.len(),
-        plan.profile,
-        plan.threads,
-        if plan.threads == 1 { "" } else { "s" }
-    );
+    let (name, frames, threads) = (plan.dataset.name(), plan.indices.len(), counted(plan.threads, "thread"));
+    eprintln!("{name}: {frames} frames of {width} x {height} px, profile {}, {threads}", plan.profile);
     for note in plan.dataset.notes() {
         eprintln!("note: {note}");
-    }
-}
-
-fn conclude(run: &RunRecord, place: &Path) {
-    let line = |name: &str, value: String| println!("{name:<22}{value}");
-    line("frames", format!("{} at {:.1} fps", run.rows.len(), run.fps()));
-    if let Some(errors) = &run.errors {
-        if let (Some(percent), Some(deg_per_m)) = (errors.t_err_percent, errors.r_err_deg_per_m) {
-            line("trajectory error", format!("{percent:.3} %, {deg_per_m:.4} deg/m over pieces"));
-        }
-        line("", format!("{:.2} cm, {:.4} deg per frame; ATE {:.3} m", 100.0 * errors.rpe_t_m, errors.rpe_r_deg, errors.ate_m));
-    }
-    if let Some(exact) = &run.exact {
-        line(
-            "map against truth",
-            format!("median {:.1} cm, {:.1} % complete within 20 m", 100.0 * exact.median_error_m, 100.0 * exact.completeness),
-        );
-    }
-    if let Some(figures) = run.lidar.as_ref().and_then(|lidar| lidar.figures.as_ref()) {
-        let percent = |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
-        for (name, of) in [("street", &figures.still), ("cars", &figures.dynamic)] {
-            let (input, map) = (&of.input, &of.fused);
-            if of.frames > 0 {
-                let [right, there] = [&input.accuracy, &input.completeness].map(|share| percent(*share));
-                line(
-                    &format!("{} against {}", name, figures.source),
-                    format!("input {right} right, {there} complete; map {} and {}", percent(map.accuracy), percent(map.completeness)),
-                );
-            }
-        }
-    }
-    if let Some(figures) = &run.objects.figures {
-        let (near, far) = (&figures.late_near, &figures.late_far);
-        line(
-            "tracks against truth",
-            format!(
-                "{} of {} late within 20 m, {} of {} at 20 to 32 m; {} flips",
-                near.late, near.tracks, far.late, far.tracks, figures.flips
-            ),
-        );
-        let error = |of: &Medians| match (of.t_m, of.r_deg) {
-            (Some(t_m), Some(r_deg)) => format!("{:.1} cm, {r_deg:.2} deg", 100.0 * t_m),
-            _ => "-".to_owned(),
-        };
-        line(
-            "",
-            format!("motion of what drives: {} within 20 m, {} at 20 to 32 m", error(&figures.moving_near), error(&figures.moving_far)),
-        );
-    }
-    line("map", format!("{} triangles, {} of {} blocks used at most", run.mesh.triangles, run.blocks_peak(), run.capacity.blocks));
-    let refused = run.blocks_refused();
-    if refused > 0 {
-        line(
-            "",
-            format!("{refused} blocks found no room: the map has holes. Give more bytes with --memory, or a larger volume.voxel_size_m"),
-        );
-    }
-    if run.shelf.records > 0 {
-        let (records, mib) = (run.shelf.records, run.shelf.bytes as f64 / MIB as f64);
-        line("", format!("{records} blocks written to disk, {} brought back, {mib:.1} MiB", run.blocks_back()));
-    }
-    if run.blocks_lost() > 0 {
-        line("", format!("{} blocks are lost: {}", run.blocks_lost(), lost_because(run)));
-    }
-    if let Some((failures, first, cause)) = run.tracking_failures() {
-        line("tracking failure", format!("in {failures} of {} frames, first in frame {first}: {cause}", run.rows.len()));
-        line("", "the poses of these frames are guesses, and they are not in the map. --egomotion stereo follows a drive".to_owned());
-    } else if run.held_frames() > 0 {
-        line("held motion", format!("{} frames had too few matches", run.held_frames()));
-    }
-    line("digest", format!("{:016x}", run.digest()));
-    line("results", place.display().to_string());
-}
-
-/// Why blocks are lost, and what to do.
-fn lost_because(run: &RunRecord) -> String {
-    match &run.shelf_failure {
-        Some(failure) => format!("map.blocks took no more ({failure}). Free the disk, or raise --stream-mib"),
-        None if run.streaming.is_some() => "map.blocks could not be read back whole. Look after the disk".to_owned(),
-        None => "the pool was full. Run without --no-stream, or give more bytes with --memory".to_owned(),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::run::{self, RunArgs};
 use crate::input::{self, OpenOptions};
-use crate::sweep::{Data, Kind, Plan, RunResult, SweepFolder, Wanted, merge};
+use crate::sweep::{Data, Kind, Plan, RunResult, SweepFolder, SweepRequest, merge};
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
 
@@ -66,14 +66,14 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     if !args.merge.is_empty() {
         let (plan, folder, results) = merge(&args.merge, &args.out)?;
         let page = folder.draw(&plan, &results)?;
-        return conclude(&plan, results.len(), &page, args.quiet);
+        return print_result(&plan, results.len(), &page, args.quiet);
     }
     let data = if args.data.is_empty() { vec![Data { path: None, sequence: None }] } else { args.data.clone() };
     let labels: Vec<String> = data.iter().map(Data::label).collect();
     if let Some(twice) = labels.iter().enumerate().find_map(|(at, label)| labels[..at].contains(label).then_some(label)) {
         bail!("two data sets are called {twice}. Sweep them into two folders");
     }
-    let plan = Plan::new(&Wanted {
+    let plan = Plan::new(&SweepRequest {
         data: data.iter().map(|one| Ok((one.clone(), reference(one)?))).collect::<anyhow::Result<_>>()?,
         kinds: args.sweeps.clone(),
         weights: args.weights.clone(),
@@ -96,14 +96,14 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         if !args.quiet {
             eprintln!("run {} of {}: {} {}", at + 1, share.len(), one.label(), arguments.join(" "));
         }
-        let result = make(args, one, arguments, &folder.workshop(key)).with_context(|| format!("run {key} ended"))?;
+        let result = make(args, one, arguments, &folder.scratch_dir(key)).with_context(|| format!("run {key} ended"))?;
         result.write(&folder.result(key))?;
         // The page grows with every run: an interrupted sweep has one, too.
         folder.draw(&plan, &folder.results(&plan)?)?;
     }
     let results = folder.results(&plan)?;
     let page = folder.draw(&plan, &results)?;
-    conclude(&plan, results.len(), &page, args.quiet)
+    print_result(&plan, results.len(), &page, args.quiet)
 }
 
 impl SweepArgs {
@@ -132,17 +132,17 @@ fn data_of(plan: &Plan, key: &str, labels: &[String]) -> Option<usize> {
 }
 
 /// Makes one run. Nothing of it stays but what is returned.
-fn make(args: &SweepArgs, data: &Data, arguments: &[String], workshop: &Path) -> anyhow::Result<RunResult> {
+fn make(args: &SweepArgs, data: &Data, arguments: &[String], scratch_dir: &Path) -> anyhow::Result<RunResult> {
     let mut line = vec!["dynvox".to_owned(), "--quiet".to_owned()];
     line.extend(data.path.iter().map(|path| path.display().to_string()));
     line.extend(data.sequence.iter().flat_map(|sequence| ["--sequence".to_owned(), sequence.clone()]));
     line.extend(args.threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]));
     line.extend_from_slice(arguments);
-    let record = run::record(&RunArgs::of(&line)?, workshop)?;
+    let record = run::record(&RunArgs::parse(&line)?, scratch_dir)?;
     Ok(RunResult::of(arguments, &record)?)
 }
 
-fn conclude(plan: &Plan, made: usize, page: &Path, quiet: bool) -> anyhow::Result<()> {
+fn print_result(plan: &Plan, made: usize, page: &Path, quiet: bool) -> anyhow::Result<()> {
     if !quiet {
         println!("{made} of {} runs made", plan.runs.len());
         println!("{}", page.display());

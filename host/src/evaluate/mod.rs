@@ -1,8 +1,8 @@
 //! How good a run was, where the truth is known.
 
-pub mod exact;
-pub mod lidar;
 pub mod objects;
+pub mod quantile;
+pub mod reference;
 pub mod stereo;
 pub mod surfaces;
 pub mod swept;

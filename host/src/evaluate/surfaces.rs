@@ -1,9 +1,9 @@
 //! Objects' meshes against the surfaces the renderer drew: how far the mesh lies from what is really there, and how much it has of what was
 //! seen.
 //!
-//! Every pixel of exact depth that lies on a thing while its object is fused is a point of its true surface, in the thing's own frame; those
+//! Every pixel of exact depth that lies on a true object while its object is fused is a point of its true surface, in the true object's own frame; those
 //! of one cell of `CELL_M` are one sample, their mean. So the seen side is known, whatever hides the rest. The mesh is carried into the
-//! thing's frame by where the object was in the frame in which the thing was nearest, and most of it is made: drift of the object's pose
+//! true object's frame by where the object was in the frame in which the true object was nearest, and most of it is made: drift of the object's pose
 //! shows as distance.
 
 use crate::input::TrueObject;
@@ -16,9 +16,9 @@ use std::collections::HashMap;
 
 /// Side of the cells samples are made of, m.
 const CELL_M: f64 = 0.03;
-/// How far beside a thing's box its surface may lie, m.
+/// How far outside the true object's box its surface may lie, m.
 const MARGIN_M: f64 = 0.03;
-/// How far above its foot a thing begins, m: what is lower is road.
+/// How far above its foot a true object begins, m: what is lower is road.
 const FOOT_M: f64 = 0.05;
 /// Distance looked at, voxels: a sample this near to the mesh counts as there, a distance beyond it is not measured.
 pub const REACH_VOXELS: f64 = 2.0;
@@ -36,12 +36,12 @@ pub struct TrueView<'a> {
     pub far_m: f64,
 }
 
-/// What was seen of a thing while it was fused.
+/// What was seen of a true object while it was fused.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct SeenSide {
     /// Sum of the points in a cell, and their number.
     cells: HashMap<[i32; 3], [f64; 4]>,
-    /// Distance when nearest, m, and the object's frame to the thing's then.
+    /// Distance when nearest, m, and the object's frame to the true object's then.
     nearest: Option<(f64, Transform)>,
     frames: u32,
 }
@@ -58,21 +58,21 @@ pub struct SurfaceFigures {
     pub completeness: f64,
     /// Samples of the true surface.
     pub samples: usize,
-    /// Frames in which the thing was seen and fused.
+    /// Frames in which the true object was seen and fused.
     pub frames: u32,
     /// Distance when nearest, m.
     pub nearest_m: f64,
 }
 
 impl SeenSide {
-    /// Adds what a frame shows of a thing. `t_thing_object` carries the object's own frame into the thing's.
-    pub fn add(&mut self, view: &TrueView<'_>, thing: &TrueObject, t_thing_object: &Transform) {
-        let t_thing_camera = thing.t_world_object.inverse() * view.t_world_camera;
-        let [width, height, length] = thing.dimensions_m;
+    /// Adds what a frame shows of a true object. `t_truth_object` carries the object's own frame into the true object's.
+    pub fn add(&mut self, view: &TrueView<'_>, truth: &TrueObject, t_truth_object: &Transform) {
+        let t_truth_camera = truth.t_world_object.inverse() * view.t_world_camera;
+        let [width, height, length] = truth.dimensions_m;
         let inside = |p: &Point3<f64>| {
             p.x.abs() <= 0.5 * width + MARGIN_M && p.z.abs() <= 0.5 * length + MARGIN_M && p.y >= -height - MARGIN_M && p.y <= -FOOT_M
         };
-        let pixels = thing.pixels;
+        let pixels = truth.pixels;
         let mut seen = false;
         for v in pixels.top.max(0)..pixels.top + pixels.height {
             for u in pixels.left.max(0)..pixels.left + pixels.width {
@@ -83,7 +83,7 @@ impl SeenSide {
                 let per_px = depth_m / view.rig.focal_px;
                 let camera =
                     Point3::new((f64::from(u) - view.rig.center_u_px) * per_px, (f64::from(v) - view.rig.center_v_px) * per_px, depth_m);
-                let point = t_thing_camera.transform_point(camera);
+                let point = t_truth_camera.transform_point(camera);
                 if inside(&point) {
                     let cell = self.cells.entry(cell(&point, CELL_M)).or_default();
                     [point.x, point.y, point.z, 1.0].iter().zip(cell).for_each(|(value, sum)| *sum += value);
@@ -93,22 +93,22 @@ impl SeenSide {
         }
         if seen {
             self.frames += 1;
-            let distance_m = t_thing_camera.distance_m();
+            let distance_m = t_truth_camera.distance_m();
             if self.nearest.is_none_or(|(nearest_m, _)| distance_m < nearest_m) {
-                self.nearest = Some((distance_m, *t_thing_object));
+                self.nearest = Some((distance_m, *t_truth_object));
             }
         }
     }
 
     /// Compares a mesh, in the object's own frame, with it; `None` where nothing was seen or there is no mesh.
     pub fn compare(&self, triangles: &[Triangle], voxel_size_m: f64) -> Option<SurfaceFigures> {
-        let (nearest_m, t_thing_object) = self.nearest?;
+        let (nearest_m, t_truth_object) = self.nearest?;
         let reach_m = REACH_VOXELS * voxel_size_m;
         let mut samples: Vec<([i32; 3], Point3<f64>)> =
             self.cells.iter().map(|(cell, [x, y, z, count])| (*cell, Point3::new(x / count, y / count, z / count))).collect();
         samples.sort_by_key(|(cell, _)| *cell);
         let samples: Vec<Point3<f64>> = samples.into_iter().map(|(_, point)| point).collect();
-        let of = |position_m: [f32; 3]| t_thing_object.transform_point(Point3::from(position_m.map(f64::from)));
+        let of = |position_m: [f32; 3]| t_truth_object.transform_point(Point3::from(position_m.map(f64::from)));
         let middles: Vec<Point3<f64>> = triangles
             .iter()
             .map(|triangle| {
@@ -119,10 +119,10 @@ impl SeenSide {
         if middles.is_empty() || samples.is_empty() {
             return None;
         }
-        let truth = Near::of(&samples, reach_m);
+        let truth = PointGrid::of(&samples, reach_m);
         let mut distances: Vec<f64> = middles.iter().map(|middle| truth.distance_m(middle)).collect();
         distances.sort_by(f64::total_cmp);
-        let mesh = Near::of(&middles, reach_m);
+        let mesh = PointGrid::of(&middles, reach_m);
         let there = samples.iter().filter(|sample| mesh.distance_m(sample).is_finite()).count();
         Some(SurfaceFigures {
             median_m: distances.get(distances.len() / 2).copied().filter(|distance| distance.is_finite()),
@@ -140,12 +140,12 @@ fn cell(point: &Point3<f64>, side_m: f64) -> [i32; 3] {
 }
 
 /// Points by cells of the reach's side.
-struct Near<'p> {
+struct PointGrid<'p> {
     cells: HashMap<[i32; 3], Vec<&'p Point3<f64>>>,
     reach_m: f64,
 }
 
-impl<'p> Near<'p> {
+impl<'p> PointGrid<'p> {
     fn of(points: &'p [Point3<f64>], reach_m: f64) -> Self {
         let mut cells: HashMap<[i32; 3], Vec<&Point3<f64>>> = HashMap::new();
         points.iter().for_each(|point| cells.entry(cell(point, reach_m)).or_default().push(point));
@@ -172,7 +172,7 @@ mod tests {
 
     /// A wall of a box 2 m wide, 1.5 m high and 4 m long whose back is 8 m away: what a camera 1 m above the road sees of it.
     fn side() -> SeenSide {
-        let thing = TrueObject {
+        let truth = TrueObject {
             id: 1,
             pixels: PixelBox { left: 0, top: 0, width: 100, height: 80 },
             t_world_object: Transform::from_translation([0.0, 1.0, 10.0]),
@@ -189,7 +189,7 @@ mod tests {
         };
         let mut side = SeenSide::default();
         // The object's frame is the camera's.
-        side.add(&view, &thing, &thing.t_world_object.inverse());
+        side.add(&view, &truth, &truth.t_world_object.inverse());
         side
     }
 

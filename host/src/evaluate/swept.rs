@@ -1,6 +1,6 @@
-//! The static map against what drove through it: triangles of `map.ply` inside the boxes moving things filled while they were seen.
+//! The static map against moving objects: triangles of `map.ply` inside the boxes moving objects filled while they were seen.
 //!
-//! A box is taken smaller than the thing: the ground below it and what it touches belong to the map.
+//! A box is taken smaller than the true object: the ground below it and what it touches belong to the map.
 
 use crate::input::TrueObject;
 use dynvox_core::geometry::Transform;
@@ -33,7 +33,7 @@ impl SweptBox {
     }
 }
 
-/// The volume moving things swept.
+/// The volume moving objects swept.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Swept {
     boxes: Vec<SweptBox>,
@@ -47,7 +47,7 @@ fn square(x_m: f64, z_m: f64) -> [i64; 2] {
 }
 
 impl Swept {
-    /// Adds a thing if it moves in this frame; `t_map_world` carries the truth's world into the map's.
+    /// Adds a true object if it moves in this frame; `t_map_world` carries the truth's world into the map's.
     pub fn add(&mut self, object: &TrueObject, t_map_world: &Transform) {
         if object.moving {
             let t_map_object = t_map_world * object.t_world_object;

@@ -1,17 +1,259 @@
-//! What is watched while a run goes on: the reference depth, tracks, objects, pictures.
+//! What is measured while a run goes on. Each observer sees every frame after its step, keeps plain data that goes into checkpoints, and returns
+//! a section of the run's record in the end.
 
+mod blocks;
+mod frame;
+mod health;
+mod keyframes;
 mod objects;
-pub(crate) mod pictures;
+pub mod pictures;
 mod reference;
-mod retired;
 mod thumbnail;
 mod tracks;
+mod trajectory;
 mod volume_copy;
 
-pub(crate) use objects::ObjectsAtWork;
-pub use objects::ObjectsRecord;
-pub(crate) use reference::LidarAtWork;
-pub use reference::{ErrorPictures, LidarRecord, Reference, evaluable};
-pub use retired::KeptObject;
-pub use thumbnail::portrait;
-pub use tracks::{TrackRecord, TrackRow, state_name};
+pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
+pub use frame::{FrameRow, STAGES, StageTime};
+pub use health::{HealthObserver, HealthSection};
+pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
+pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
+pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, ReferenceSection};
+pub use tracks::{FrameTracks, TrackRecord, TrackRow, TracksObserver, TracksSection, state_name};
+pub use trajectory::{TrackingFailures, TrajectoryObserver, TrajectorySection, from_first};
+pub use volume_copy::VolumeCopy;
+
+use crate::formats::Mesh;
+use crate::input::{FrameSource, InputError, StereoImages};
+use dynvox_core::geometry::Transform;
+use dynvox_core::memory::Region;
+use dynvox_core::objects::ObjectSummary;
+use dynvox_core::view::Raycaster;
+use dynvox_core::volume::PruneReport;
+use dynvox_core::{Capacity, Config, Mapper};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Why an observer cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum ObserveError {
+    /// A file of the run folder.
+    #[error("{path} cannot be written: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the machine says.
+        source: std::io::Error,
+    },
+    /// A file that an earlier part of the run wrote.
+    #[error("{path} is not as the run left it: {reason}")]
+    Changed {
+        /// The file.
+        path: PathBuf,
+        /// What differs.
+        reason: String,
+    },
+    /// The data set.
+    #[error(transparent)]
+    Dataset(#[from] InputError),
+}
+
+/// What does not change during a run.
+pub struct Setup<'p> {
+    /// The frames.
+    pub dataset: &'p dyn FrameSource,
+    /// Numbers of the frames that the run takes.
+    pub indices: &'p [usize],
+    /// The bounds.
+    pub capacity: &'p Capacity,
+    /// The settings.
+    pub config: &'p Config,
+    /// The run folder under construction.
+    pub folder: PathBuf,
+    /// Where the camera's motion comes from: `stereo`, `icp` or `file`.
+    pub motion_source: &'static str,
+    /// What the map is evaluated against, and when.
+    pub reference: Option<ReferencePlan>,
+}
+
+/// The map as an observer may look at it.
+pub trait MapView<'s> {
+    /// The mapper after the step.
+    fn mapper(&self) -> &Mapper<'s>;
+
+    /// The static map from a pose; `None` where the core refuses the pose.
+    fn raycast(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>>;
+
+    /// The same with every object in its place.
+    fn raycast_with_objects(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>>;
+}
+
+/// An object that left the mapper.
+pub struct RetiredVolume {
+    /// What the mapper says of it.
+    pub summary: ObjectSummary,
+    /// Its blocks.
+    pub volume: VolumeCopy,
+}
+
+/// A frame after its step.
+pub struct FrameContext<'a, 's> {
+    /// Its position in the run.
+    pub at: usize,
+    /// What is recorded of it.
+    pub row: &'a FrameRow,
+    /// The images, and what the data set knows of them.
+    pub images: &'a StereoImages,
+    /// Objects that left the mapper in this step.
+    pub retired: &'a [RetiredVolume],
+    /// The map.
+    pub view: &'a mut dyn MapView<'s>,
+}
+
+/// The end of a run: every frame is mapped, and the map is still in memory.
+pub struct EndContext<'a, 's> {
+    /// All frames.
+    pub rows: &'a [FrameRow],
+    /// Objects that left the mapper at the end.
+    pub retired: &'a [RetiredVolume],
+    /// The map.
+    pub view: &'a mut dyn MapView<'s>,
+}
+
+/// A finished run: the map is on disk.
+pub struct Finished<'a> {
+    /// All frames.
+    pub rows: &'a [FrameRow],
+    /// The slab, region by region.
+    pub regions: Vec<Region>,
+    /// Blocks of the map in memory at the end.
+    pub blocks: usize,
+    /// What was pruned after the last frame.
+    pub pruned: PruneReport,
+    /// The mesh written.
+    pub mesh: Mesh,
+    /// The mesh file.
+    pub mesh_path: PathBuf,
+    /// The block store.
+    pub store: StoreStats,
+}
+
+/// Sees every frame and sums up in the end. Its fields are what a checkpoint holds of it.
+pub trait Observer {
+    /// What it contributes to the record of the run.
+    type Section;
+
+    /// The run is resumed from a checkpoint: checks files written before it, and removes those written after it.
+    ///
+    /// # Errors
+    /// A file is missing or differs, or cannot be removed.
+    fn resume(&mut self, _setup: &Setup<'_>) -> Result<(), ObserveError> {
+        Ok(())
+    }
+
+    /// Takes in a frame.
+    ///
+    /// # Errors
+    /// The data set or the disk refuses.
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError>;
+
+    /// Takes in the end.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    fn end(&mut self, _setup: &Setup<'_>, _end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+        Ok(())
+    }
+
+    /// Sums up.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    fn finish(self, setup: &Setup<'_>, finished: &Finished<'_>) -> Result<Self::Section, ObserveError>;
+}
+
+/// All observers, in the order in which they see a frame.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct Observers {
+    trajectory: TrajectoryObserver,
+    keyframes: KeyframesObserver,
+    reference: ReferenceObserver,
+    tracks: TracksObserver,
+    objects: ObjectsObserver,
+    blocks: BlocksObserver,
+    health: HealthObserver,
+}
+
+/// What the observers found.
+#[derive(Clone, Debug)]
+pub struct Sections {
+    /// Poses, and their errors against ground truth.
+    pub trajectory: TrajectorySection,
+    /// Pictures.
+    pub keyframes: KeyframesSection,
+    /// Input and map against a reference depth; `None` where the run has none.
+    pub reference: Option<ReferenceSection>,
+    /// Tracks, and their errors against ground truth.
+    pub tracks: TracksSection,
+    /// Reconstructed objects.
+    pub objects: ObjectsSection,
+    /// Blocks of the map: made, pruned, evicted, stored.
+    pub blocks: BlocksSection,
+    /// What was refused.
+    pub health: HealthSection,
+}
+
+impl Observer for Observers {
+    type Section = Sections;
+
+    fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
+        self.objects.resume(setup)
+    }
+
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        self.trajectory.frame(setup, frame)?;
+        self.keyframes.frame(setup, frame)?;
+        self.reference.frame(setup, frame)?;
+        self.tracks.frame(setup, frame)?;
+        self.objects.frame(setup, frame)?;
+        self.blocks.frame(setup, frame)?;
+        self.health.frame(setup, frame)
+    }
+
+    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+        self.keyframes.end(setup, end)?;
+        self.objects.end(setup, end)
+    }
+
+    fn finish(self, setup: &Setup<'_>, finished: &Finished<'_>) -> Result<Sections, ObserveError> {
+        Ok(Sections {
+            trajectory: self.trajectory.finish(setup, finished)?,
+            keyframes: self.keyframes.finish(setup, finished)?,
+            reference: self.reference.finish(setup, finished)?,
+            tracks: self.tracks.finish(setup, finished)?,
+            objects: self.objects.finish(setup, finished)?,
+            blocks: self.blocks.finish(setup, finished)?,
+            health: self.health.finish(setup, finished)?,
+        })
+    }
+}
+
+/// Chooses `count` of `frames` positions, evenly, the last among them.
+fn spread(frames: usize, count: usize) -> impl Fn(usize) -> bool {
+    let count = count.min(frames).max(1);
+    move |at| ((at + 1) * count) / frames > (at * count) / frames
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chosen_frames_are_spread_evenly_and_end_with_the_last() {
+        for (frames, count) in [(100, 5), (7, 5), (3, 5), (1, 24)] {
+            let chosen: Vec<usize> = (0..frames).filter(|&at| spread(frames, count)(at)).collect();
+            assert_eq!(chosen.len(), count.min(frames));
+            assert_eq!(chosen.last(), Some(&(frames - 1)));
+        }
+    }
+}

@@ -1,116 +1,200 @@
-//! What moves or could, over a run: objects as they leave the mapper, tracks, both against truth.
+//! Reconstructed objects: meshes of those that leave the mapper, and their poses. An object leaves within a step, which must not wait for
+//! its mesh: its blocks are copied there, and meshed here, after the step.
 
-use super::retired::{Kept, KeptObject};
-use super::tracks::{TrackRecord, TrackRow, track_records};
-use crate::evaluate::objects::{Judged, ObjectErrors, ObjectFigures};
-use crate::evaluate::surfaces::TrueView;
+use super::thumbnail::thumbnail;
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, RetiredVolume, Setup};
+use crate::evaluate::objects::true_object;
+use crate::evaluate::surfaces::{SeenSide, SurfaceFigures, TrueView};
 use crate::evaluate::swept::Swept;
-use crate::input::MaskRefusals;
-use crate::input::StereoImages;
-use crate::run::FolderError;
-use crate::run::FrameRow;
-use dynvox_core::masks::PixelBox;
-use dynvox_core::tracking::{DetectionCount, TrackReport};
-use dynvox_core::{Config, Mapper, Report};
+use crate::formats::{PlyWriter, write_numbered};
+use dynvox_core::geometry::Transform;
+use dynvox_core::objects::ObjectSummary;
+use dynvox_core::tracking::{Class, State, TrackReport};
+use dynvox_core::view::Triangle;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What moved or could, over the whole run.
-#[derive(Clone, Debug, Default)]
-pub struct ObjectsRecord {
-    /// All tracks, by number.
-    pub tracks: Vec<TrackRecord>,
-    /// All objects handed over, in that order.
-    pub kept: Vec<KeptObject>,
-    /// Tracks against truth.
-    pub figures: Option<ObjectFigures>,
-    /// Every track of every frame that was compared with a true thing.
-    pub judged: Vec<(u32, Judged)>,
-    /// Triangles of the static map where something drove; known where the truth is exact.
-    pub swept_triangles: Option<u64>,
-    /// What the source of masks said and could not be used.
-    pub refusals: MaskRefusals,
-    /// What became of the detections.
-    pub detections: DetectionCount,
+/// Name of the folder of objects in the run folder.
+const FOLDER: &str = "objects";
+/// Objects shown with a thumbnail, at most: those fused most often.
+const THUMBNAILS: usize = 24;
+
+/// An object handed over by the mapper.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ReconstructedObject {
+    /// Number of its track.
+    pub id: u32,
+    /// Number of the trajectory segment within the track.
+    pub segment: u32,
+    /// Name of its files: the track's number; `7-2` for the second object of track 7.
+    pub name: String,
+    /// Its class.
+    pub class: Class,
+    /// Its last motion state.
+    pub state: State,
+    /// Frames fused.
+    pub frames: u32,
+    /// Blocks of its volume.
+    pub blocks: usize,
+    /// Triangles of its mesh.
+    pub triangles: u64,
+    /// Its mesh against the true surface, where that is known.
+    pub surface: Option<SurfaceFigures>,
+    /// Its mesh from three sides, as a PNG file; empty for objects beyond the number shown.
+    pub thumbnail_png: Vec<u8>,
 }
 
-/// The objects of a run under way.
+/// Objects of a run.
+#[derive(Clone, Debug)]
+pub struct ObjectsSection {
+    /// All objects handed over, in that order.
+    pub objects: Vec<ReconstructedObject>,
+    /// Triangles of the static map in the volume that moving objects swept; known where the truth is exact.
+    pub swept_triangles: Option<u64>,
+}
+
+/// Collects objects.
 #[derive(Debug, Default, Serialize, Deserialize)]
-pub struct ObjectsAtWork {
-    /// What left the mapper.
-    pub(crate) kept: Kept,
-    errors: ObjectErrors,
+pub struct ObjectsObserver {
+    /// Poses of each object that is still in the mapper, in the frames it was fused in: by track and segment.
+    paths: BTreeMap<(u32, u32), Vec<(usize, Transform)>>,
+    /// The true surface seen of each, where that is known.
+    sides: BTreeMap<(u32, u32), SeenSide>,
+    retired: Vec<ReconstructedObject>,
     swept: Option<Swept>,
 }
 
-impl ObjectsAtWork {
-    /// Notes a frame; returns the tracks seen in it.
-    pub fn note(&mut self, config: &Config, frame: usize, mapper: &Mapper<'_>, images: &StereoImages, report: &Report) -> Vec<TrackRow> {
-        let tracks: Vec<TrackReport> = mapper.tracks().filter(|track| track.seen).collect();
-        for (summary, _) in mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame) {
-            self.kept.follow(frame, summary.id, summary.chain, summary.t_world_object);
+impl Observer for ObjectsObserver {
+    type Section = ObjectsSection;
+
+    /// Removes files of objects that left after the checkpoint: they will leave again.
+    fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
+        let folder = setup.folder.join(FOLDER);
+        let failed = |source| ObserveError::Write { path: folder.clone(), source };
+        if !folder.is_dir() {
+            return Ok(());
         }
-        if let Some(truth) = &images.objects {
-            let size = (images.left.width(), images.left.height());
-            let large_enough = |pixels: &PixelBox| config.instances.large_enough(pixels.area(), size.0);
-            self.errors.add(&tracks, &report.t_world_camera, truth, size, large_enough);
-            if let Some(exact) = &images.exact {
-                let t_map_world = report.t_world_camera * truth.t_world_camera.inverse();
-                let swept = self.swept.get_or_insert_default();
-                truth.objects.iter().for_each(|object| swept.add(object, &t_map_world));
-                let Some(depth_m) = exact.depth_m.view() else { return tracks.iter().map(TrackRow::from).collect() };
-                let view = TrueView {
-                    rig: &config.rig,
-                    depth_m,
-                    t_world_camera: truth.t_world_camera,
-                    far_m: f64::from(config.instances.volume.far_m),
-                };
-                for (summary, _) in mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame) {
-                    let thing = self.errors.truth_of(summary.id).and_then(|id| truth.objects.iter().find(|thing| thing.id == id));
-                    if let Some(thing) = thing {
-                        let t_thing_object = thing.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
-                        self.kept.side(summary.id, summary.chain).add(&view, thing, &t_thing_object);
-                    }
-                }
+        for entry in folder.read_dir().map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let known = |one: &ReconstructedObject| files(&one.name).iter().any(|file| entry.file_name() == file.as_str());
+            if !self.retired.iter().any(known) {
+                std::fs::remove_file(entry.path()).map_err(failed)?;
             }
         }
-        tracks.iter().map(TrackRow::from).collect()
+        // Where none is left there is no folder either.
+        if self.retired.is_empty() { std::fs::remove_dir(&folder).map_err(failed) } else { Ok(()) }
     }
 
-    /// Sums up. Call it when the mapper has handed over its last object.
-    pub fn finish(&mut self, rows: &[FrameRow]) -> ObjectsRecord {
-        let mut refusals = MaskRefusals::default();
-        rows.iter().for_each(|row| refusals.add(&row.refusals));
-        ObjectsRecord {
-            tracks: track_records(rows, &self.errors.tracks()),
-            kept: self.kept.finish(),
-            figures: self.errors.figures(),
-            judged: self.errors.rows(),
-            swept_triangles: None,
-            refusals,
-            detections: rows.iter().fold(DetectionCount::default(), |sum, row| summed(sum, &row.report.instances.detections)),
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        self.write_all(setup, frame.retired)?;
+        for object in fused(frame) {
+            self.paths.entry((object.id, object.chain)).or_default().push((frame.row.frame, object.t_world_object));
         }
+        self.note_truth(setup, frame);
+        Ok(())
     }
 
-    /// Triangles of the finished static map where something drove.
-    pub fn swept_triangles(&self, map: &Path) -> Result<Option<u64>, FolderError> {
-        let counted = self.swept.as_ref().map(|swept| swept.triangles(map)).transpose();
-        counted.map_err(|source| FolderError::Write { path: map.to_path_buf(), source })
+    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+        self.write_all(setup, end.retired)
+    }
+
+    fn finish(self, _: &Setup<'_>, finished: &Finished<'_>) -> Result<ObjectsSection, ObserveError> {
+        let swept = self.swept.as_ref().map(|swept| swept.triangles(&finished.mesh_path)).transpose();
+        let failed = |source| ObserveError::Write { path: finished.mesh_path.clone(), source };
+        Ok(ObjectsSection { objects: self.retired, swept_triangles: swept.map_err(failed)? })
     }
 }
 
-fn summed(a: DetectionCount, b: &DetectionCount) -> DetectionCount {
-    DetectionCount {
-        given: a.given + b.given,
-        taken: a.taken + b.taken,
-        bad_score: a.bad_score + b.bad_score,
-        bad_box: a.bad_box + b.bad_box,
-        bad_mask: a.bad_mask + b.bad_mask,
-        ignored: a.ignored + b.ignored,
-        too_small: a.too_small + b.too_small,
-        tracked_only: a.tracked_only + b.tracked_only,
-        beyond: a.beyond + b.beyond,
-        no_room: a.no_room + b.no_room,
-        covered: a.covered + b.covered,
+/// Objects fused in a frame.
+fn fused(frame: &FrameContext<'_, '_>) -> Vec<ObjectSummary> {
+    let all = frame.view.mapper().objects().map(|(summary, _)| *summary);
+    all.filter(|summary| summary.last_frame == frame.row.report.frame).collect()
+}
+
+impl ObjectsObserver {
+    /// Notes what is really there, where the truth is exact: the volume moving objects sweep, and the surfaces that are seen.
+    fn note_truth(&mut self, setup: &Setup<'_>, frame: &FrameContext<'_, '_>) {
+        let (Some(truth), Some(exact)) = (&frame.images.objects, &frame.images.exact) else { return };
+        let t_map_world = frame.row.report.t_world_camera * truth.t_world_camera.inverse();
+        let swept = self.swept.get_or_insert_default();
+        truth.objects.iter().for_each(|object| swept.add(object, &t_map_world));
+        let Some(depth_m) = exact.depth_m.view() else { return };
+        let view = TrueView {
+            rig: &setup.config.rig,
+            depth_m,
+            t_world_camera: truth.t_world_camera,
+            far_m: f64::from(setup.config.instances.volume.far_m),
+        };
+        let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.seen).collect();
+        for object in fused(frame) {
+            let track = tracks.iter().find(|track| track.id == object.id);
+            if let Some(truth) = track.and_then(|track| true_object(&track.pixels, truth)) {
+                let t_truth_object = truth.t_world_object.inverse() * t_map_world.inverse() * object.t_world_object;
+                self.sides.entry((object.id, object.chain)).or_default().add(&view, truth, &t_truth_object);
+            }
+        }
     }
+
+    fn write_all(&mut self, setup: &Setup<'_>, retired: &[RetiredVolume]) -> Result<(), ObserveError> {
+        retired.iter().try_for_each(|one| self.write(setup, one))
+    }
+
+    /// Writes an object's mesh and poses. One without triangles leaves no file.
+    fn write(&mut self, setup: &Setup<'_>, RetiredVolume { summary, volume }: &RetiredVolume) -> Result<(), ObserveError> {
+        let poses = self.paths.remove(&(summary.id, summary.chain)).unwrap_or_default();
+        let side = self.sides.remove(&(summary.id, summary.chain));
+        let folder = setup.folder.join(FOLDER);
+        let mut triangles: Vec<Triangle> = Vec::new();
+        let meshed = volume.triangles(&setup.config.mesh, &mut |triangle| triangles.push(triangle));
+        meshed.map_err(|source| ObserveError::Write { path: folder.clone(), source })?;
+        if triangles.is_empty() {
+            return Ok(());
+        }
+        let before = self.retired.iter().filter(|known| known.id == summary.id).count();
+        let name = if before == 0 { summary.id.to_string() } else { format!("{}-{}", summary.id, before + 1) };
+        write_files(&folder, &name, &triangles, &poses)?;
+        self.retired.push(ReconstructedObject {
+            id: summary.id,
+            segment: summary.chain,
+            name,
+            class: summary.class,
+            state: summary.state,
+            frames: summary.frames,
+            blocks: volume.blocks(),
+            triangles: triangles.len() as u64,
+            surface: side.and_then(|side| side.compare(&triangles, f64::from(volume.config().voxel_size_m))),
+            thumbnail_png: thumbnail(&triangles),
+        });
+        self.limit_thumbnails();
+        Ok(())
+    }
+
+    /// Drops the thumbnail of the object fused least often when there are too many.
+    fn limit_thumbnails(&mut self) {
+        let mut shown: Vec<_> = self.retired.iter_mut().filter(|one| !one.thumbnail_png.is_empty()).collect();
+        if shown.len() > THUMBNAILS
+            && let Some(least) = shown.iter_mut().min_by_key(|one| one.frames)
+        {
+            least.thumbnail_png = Vec::new();
+        }
+    }
+}
+
+/// The files of an object: its mesh, and its poses.
+fn files(name: &str) -> [String; 2] {
+    [format!("{name}.ply"), format!("{name}_kitti.txt")]
+}
+
+fn write_files(folder: &Path, name: &str, triangles: &[Triangle], poses: &[(usize, Transform)]) -> Result<(), ObserveError> {
+    let [mesh, poses_file] = files(name).map(|file| folder.join(file));
+    let written = std::fs::create_dir_all(folder).and_then(|()| {
+        let mut ply = PlyWriter::begin_in(&mesh, "the object's own frame: the camera's when it was first seen")?;
+        triangles.iter().for_each(|one| ply.triangle(one.vertices.map(|vertex| (vertex.position_m, vertex.colour))));
+        ply.finish()
+    });
+    written.map_err(|source| ObserveError::Write { path: mesh, source })?;
+    let mut text = Vec::new();
+    let written = write_numbered(&mut text, poses).and_then(|()| std::fs::write(&poses_file, text));
+    written.map_err(|source| ObserveError::Write { path: poses_file, source })
 }

@@ -1,8 +1,7 @@
-//! Pictures for the report: input, disparity in colours, the map from the camera's place.
+//! Pictures for the report: input, disparity in colours, the map from the camera's pose, errors against a reference.
 
-use crate::evaluate::lidar::{Layer, Rule, Sample};
-use crate::run::Threads;
-use dynvox_core::Mapper;
+use super::MapView;
+use crate::evaluate::reference::{Region, Rule, Sample};
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::tracking::State;
@@ -15,10 +14,10 @@ pub const SMALL_PX: usize = 640;
 pub const LARGE_PX: usize = 1_920;
 /// Pixels without a surface or a disparity.
 const EMPTY: [u8; 3] = [24, 26, 30];
-/// Tint of objects that move.
+/// Tint of dynamic objects.
 const MOVING: [u8; 3] = [255, 120, 20];
-/// Tint of objects that stand.
-const STANDING: [u8; 3] = [40, 130, 255];
+/// Tint of static objects.
+const STATIC: [u8; 3] = [40, 130, 255];
 /// Share of a tint in what is tinted.
 const TINT: f32 = 0.45;
 /// Where light comes from, in camera axes (x right, y down, z forward), length 1: behind the camera's left shoulder.
@@ -35,7 +34,7 @@ fn picture(widest_px: usize, width: usize, height: usize, pixel: impl Fn(usize, 
 fn encoded(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
     let mut png = Vec::new();
     let made = PngEncoder::new(&mut png).write_image(rgb, width as u32, height as u32, ExtendedColorType::Rgb8);
-    // A picture that cannot be encoded is left out of the report, no more.
+    // A picture that cannot be encoded is left out of the report.
     if made.is_err() {
         png.clear();
     }
@@ -48,11 +47,11 @@ pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample
     // A few steps of grey, so that the file stays small.
     let mut pixels: Vec<[u8; 3]> = grey.rows().flatten().map(|&grey| [grey / 32 * 11; 3]).collect();
     for (sample, seen_px) in samples {
-        let colour = match sample.layer {
-            Layer::Ignored => IGNORED,
-            Layer::Static | Layer::Dynamic => error_colour(seen_px, sample.target.disparity_px),
+        let colour = match sample.region {
+            Region::Ignored => IGNORED,
+            Region::Static | Region::Dynamic => error_colour(seen_px, sample.point.disparity_px),
         };
-        let (u, v) = (usize::from(sample.target.u), usize::from(sample.target.v));
+        let (u, v) = (usize::from(sample.point.u), usize::from(sample.point.v));
         // Two by two: scans are dense along rows and sparse across them.
         for (u, v) in [(u, v), (u + 1, v), (u, v + 1), (u + 1, v + 1)] {
             if let Some(pixel) = pixels.get_mut(v * width + u).filter(|_| u < width) {
@@ -65,7 +64,7 @@ pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample
 
 /// Points that are in no figure.
 pub const IGNORED: [u8; 3] = [110, 110, 110];
-/// Points nothing is shown at.
+/// Points without an estimate.
 pub const MISSING: [u8; 3] = [190, 60, 230];
 /// Points with an error of so many times what is allowed, and up to where each colour holds: blue is right, yellow to red wrong.
 pub const ERRORS: [(f32, [u8; 3]); 6] = [
@@ -102,8 +101,8 @@ pub fn disparity(disparity_q8: &View<'_, u16>, near_px: f32) -> Vec<u8> {
     })
 }
 
-/// The map: its colours, or clay grey where it has none, lit from behind the camera; what `tint` names a colour for is tinted. Empty where
-/// nothing was looked at.
+/// The map: its colours, or clay grey where it has none, lit from behind the camera, tinted by layer with the colours of `tint`. Empty
+/// before the first raycast.
 pub fn map(widest_px: usize, seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Vec<u8> {
     let (Some(depth_m), Some(normal), Some(colour), Some(layer)) = (seen.depth_m(), seen.normal(), seen.colour(), seen.layer()) else {
         return Vec::new();
@@ -111,17 +110,17 @@ pub fn map(widest_px: usize, seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[
     Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }.png(widest_px)
 }
 
-/// The street with its objects where they are: what moves tinted orange, what stands blue. Empty where there are no objects.
-pub fn composed(widest_px: usize, mapper: &mut Mapper<'_>, threads: &Threads, t_world_camera: &Transform) -> Vec<u8> {
-    let states: Vec<State> = mapper.placed_objects().map(|placed| placed.summary.state).collect();
+/// The static map with every object in its place: dynamic ones tinted orange, static ones blue. Empty without objects.
+pub fn composed(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &Transform) -> Vec<u8> {
+    let states: Vec<State> = view.mapper().placed_objects().map(|placed| placed.summary.state).collect();
     if states.is_empty() {
         return Vec::new();
     }
     let tint = |layer: u8| match states.get(usize::from(layer).checked_sub(1)?)? {
         State::Dynamic => Some(MOVING),
-        _ => Some(STANDING),
+        _ => Some(STATIC),
     };
-    threads.run(|| mapper.raycast_composed(t_world_camera, threads)).map(|seen| map(widest_px, seen, tint)).unwrap_or_default()
+    view.raycast_with_objects(t_world_camera).map(|seen| map(widest_px, seen, tint)).unwrap_or_default()
 }
 
 /// What a raycast shows, and how it is painted.
@@ -151,7 +150,7 @@ impl<T: Fn(usize, usize) -> Option<[u8; 3]>> Painting<'_, T> {
         let (base, ambient) = if colour == [0; 3] { ([205, 205, 200], 0.35) } else { (colour, 0.9) };
         let shaded = base.map(|channel| 1.05 * f32::from(channel) * (ambient + (1.0 - ambient) * lit));
         Some(match (self.tint)(u, v) {
-            // What is tinted keeps its shading: half its brightness, half the tint's colour.
+            // A tinted surface keeps its shading: half its brightness, half the tint's colour.
             Some(tint) => [0, 1, 2].map(|c| (0.5 * shaded[c] + TINT * f32::from(tint[c])) as u8),
             None => shaded.map(|channel| channel as u8),
         })

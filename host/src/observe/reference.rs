@@ -1,22 +1,27 @@
-//! The evaluation against LiDAR beside a run: points are settled while their frame is there, the map is looked at when the frame is due.
+//! Input and map against a reference depth, LiDAR or exact: regions are fixed while a frame is there, the map is viewed when the frame is due.
 
-use super::pictures;
-use crate::evaluate::lidar::{Aim, Awaited, Delay, EvaluatedFrame, Field, Layer, LidarFigures, aim, aim_at_exact};
+use super::{Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
+use crate::evaluate::reference::{
+    DepthErrors, EvaluatedFrame, Field, PendingFrame, PendingFrames, ProjectedScan, ReferenceFigures, Region, project_scan,
+    sample_exact_depth,
+};
 use crate::input::InstanceMask;
-use crate::input::{FrameSource, InputError, StereoImages};
-use dynvox_core::geometry::{StereoRig, Transform};
+use crate::input::{FrameSource, StereoImages};
+use dynvox_core::Mapper;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::masks::PixelBox;
-use dynvox_core::tracking::{InstancesConfig, State, ThingAt, Treatment};
-use dynvox_core::{Config, Mapper};
+use dynvox_core::tracking::{State, ThingAt, Treatment};
+use serde::{Deserialize, Serialize};
 
 /// Frames whose errors are drawn at most.
 const PICTURES: usize = 4;
+/// Frames evaluated against exact depth, where it is there and no evaluation was asked for.
+const SAMPLED_FRAMES: usize = 24;
 
-/// What the map is held against.
+/// What the map is evaluated against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Reference {
-    /// LiDAR scans, of the frames that have one: `velodyne/` beside the images, or the synthetic street's.
+    /// LiDAR scans, of the frames that have one: `velodyne/` next to the images, or the synthetic street's.
     Lidar,
     /// The synthetic street's exact depth.
     Exact,
@@ -30,10 +35,52 @@ impl Reference {
             Self::Exact => "exact",
         }
     }
+
+    /// Whether a frame has it.
+    fn is_there(self, dataset: &dyn FrameSource, index: usize) -> bool {
+        match self {
+            Self::Lidar => dataset.has_lidar(index),
+            Self::Exact => dataset.has_exact_depth(),
+        }
+    }
+}
+
+/// What the map is evaluated against, and in which frames.
+#[derive(Clone, Debug)]
+pub struct ReferencePlan {
+    reference: Reference,
+    /// Frames after which the map is evaluated.
+    delay: usize,
+    /// Positions of the frames evaluated, ascending.
+    positions: Vec<usize>,
+    /// Those of them whose errors are drawn.
+    drawn: Vec<usize>,
+}
+
+impl ReferencePlan {
+    /// All frames that have the reference, each evaluated `delay` frames later; `None` when no frame has it in time.
+    pub fn all(dataset: &dyn FrameSource, indices: &[usize], reference: Reference, delay: usize) -> Option<Self> {
+        let in_time = indices.iter().enumerate().take(indices.len().saturating_sub(delay));
+        let positions = in_time.filter(|&(_, &index)| reference.is_there(dataset, index)).map(|(at, _)| at).collect();
+        Self::of(reference, delay, positions)
+    }
+
+    /// Some frames against exact depth, at once; `None` where there is no exact depth.
+    pub fn sampled(dataset: &dyn FrameSource, indices: &[usize]) -> Option<Self> {
+        let chosen = spread(indices.len(), SAMPLED_FRAMES);
+        let positions = if dataset.has_exact_depth() { (0..indices.len()).filter(|&at| chosen(at)).collect() } else { Vec::new() };
+        Self::of(Reference::Exact, 0, positions)
+    }
+
+    fn of(reference: Reference, delay: usize, positions: Vec<usize>) -> Option<Self> {
+        let count = PICTURES.min(positions.len());
+        let drawn = (1..=count).filter_map(|at| positions.get(at * positions.len() / count - 1).copied()).collect();
+        (!positions.is_empty()).then_some(Self { reference, delay, positions, drawn })
+    }
 }
 
 /// Pictures of one frame's errors, as PNG files.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ErrorPictures {
     /// Number of the frame in the data set.
     pub frame: usize,
@@ -45,9 +92,9 @@ pub struct ErrorPictures {
 
 /// A finished evaluation.
 #[derive(Clone, Debug)]
-pub struct LidarRecord {
-    /// Figures over all; `None` when no frame came to be evaluated.
-    pub figures: Option<LidarFigures>,
+pub struct ReferenceSection {
+    /// Figures over all; `None` when the run ended before a frame was due.
+    pub figures: Option<ReferenceFigures>,
     /// Frame by frame.
     pub frames: Vec<EvaluatedFrame>,
     /// Pictures of some.
@@ -55,139 +102,108 @@ pub struct LidarRecord {
 }
 
 /// An evaluation under way.
-#[derive(Debug)]
-pub struct LidarAtWork {
-    reference: Reference,
-    delay_frames: usize,
-    field: Field,
-    rig: StereoRig,
-    /// Px of the images as they are stored in one px of those mapped.
-    enlarged: f32,
-    /// Whether what moves is kept apart; where it is not, masks are taken as they are given.
-    instances: InstancesConfig,
-    delay: Delay,
-    /// Positions of the frames to be drawn, ascending.
-    drawn: Vec<usize>,
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct ReferenceObserver {
     frames: Vec<EvaluatedFrame>,
+    depth_errors: DepthErrors,
     pictures: Vec<ErrorPictures>,
+    /// Empty after every frame unless there is a delay, and a run with a delay has no checkpoints.
+    #[serde(skip)]
+    pending: PendingFrames,
 }
 
-/// Positions among `indices` whose frames can be evaluated within the run.
-pub fn evaluable(dataset: &dyn FrameSource, indices: &[usize], reference: Reference, delay: usize) -> Vec<usize> {
-    let in_time = indices.len().saturating_sub(delay);
-    let has = |&at: &usize| match reference {
-        Reference::Lidar => indices.get(at).is_some_and(|&index| dataset.has_lidar(index)),
-        Reference::Exact => dataset.has_exact_depth(),
-    };
-    (0..in_time).filter(has).collect()
-}
+impl Observer for ReferenceObserver {
+    type Section = Option<ReferenceSection>;
 
-impl LidarAtWork {
-    /// Begins; `evaluable` are the positions of the frames that have a reference.
-    pub fn new(
-        reference: Reference,
-        delay_frames: usize,
-        config: &Config,
-        (size, enlarged): ((usize, usize), f32),
-        evaluable: &[usize],
-    ) -> Self {
-        let count = PICTURES.min(evaluable.len());
-        let field = Field {
-            width: size.0,
-            height: size.1,
-            near_m: config.volume.near_m.into(),
-            far_m: config.volume.far_m.into(),
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        let Some(plan) = &setup.reference else { return Ok(()) };
+        let pending = if plan.positions.binary_search(&frame.at).is_ok() { pending(setup, plan, frame)? } else { None };
+        let Some(due) = self.pending.step(plan.delay, pending) else { return Ok(()) };
+        // Object poses of past frames are not kept: later the background is viewed alone.
+        let seen = match plan.delay {
+            0 => frame.view.raycast_with_objects(&due.t_world_camera),
+            _ => frame.view.raycast(&due.t_world_camera),
         };
-        Self {
-            reference,
-            delay_frames,
-            field,
-            rig: config.rig,
-            enlarged,
-            instances: config.instances,
-            delay: Delay::new(delay_frames),
-            drawn: (1..=count).filter_map(|at| evaluable.get(at * evaluable.len() / count - 1).copied()).collect(),
-            frames: Vec::new(),
-            pictures: Vec::new(),
+        if let Some(depth_m) = seen.and_then(|seen| seen.depth_m()) {
+            self.compare(setup, &due, &depth_m);
         }
+        Ok(())
     }
 
-    /// Takes in the frame at position `at` after its step, and gives back the one that is due.
-    pub fn due(
-        &mut self,
-        at: usize,
-        index: usize,
-        images: &StereoImages,
-        mapper: &Mapper<'_>,
-        (dataset, t_world_camera): (&dyn FrameSource, &Transform),
-    ) -> Result<Option<Awaited>, InputError> {
-        let aim = match self.reference {
-            Reference::Lidar => dataset.lidar(index)?.map(|scan| aim(&scan, &self.field)),
-            Reference::Exact => images.exact.as_ref().map(|exact| aim_at_exact(&exact.depth_m, &self.rig, &self.field)),
-        };
-        let awaited = aim.map(|aim| self.settle(index, images, mapper, t_world_camera, &aim)).map(|mut awaited| {
-            awaited.picture = self.drawn.contains(&at).then(|| images.left.clone());
-            awaited
-        });
-        Ok(self.delay.step(awaited))
+    fn finish(self, setup: &Setup<'_>, _: &Finished<'_>) -> Result<Self::Section, ObserveError> {
+        Ok(setup.reference.as_ref().map(|plan| ReferenceSection {
+            figures: ReferenceFigures::of(plan.reference.name(), plan.delay, &self.frames, self.depth_errors.figures()),
+            frames: self.frames,
+            pictures: self.pictures,
+        }))
     }
+}
 
-    fn settle(&self, index: usize, images: &StereoImages, mapper: &Mapper<'_>, t_world_camera: &Transform, aim: &Aim) -> Awaited {
-        let disparity = mapper.disparity_q8();
-        let input_px = |u: usize, v: usize| {
-            let px = f32::from(disparity.get(u, v).unwrap_or_default()) / f32::from(DISPARITY_ONE_PX);
-            let depth_m = self.rig.focal_baseline_px_m() / f64::from(px);
-            // Only what is fused is the map's input. Infinite where there is no disparity.
-            if depth_m >= self.field.near_m && depth_m <= self.field.far_m { px } else { 0.0 }
-        };
-        let layer = |u: i32, v: i32| {
-            let thing = if self.instances.dynamic { mapper.thing_at(u, v) } else { self.masked(&images.masks.instances, u, v) };
-            Layer::of(thing.as_ref())
-        };
-        Awaited::settle(index, *t_world_camera, aim, input_px, layer)
-    }
-
-    /// What a pixel shows where nothing is tracked: what could move is then of unknown motion, so that maps with and without it are held against
-    /// the same points of the street.
-    fn masked(&self, sightings: &[InstanceMask], u: i32, v: i32) -> Option<ThingAt> {
-        let image = PixelBox {
-            left: 0,
-            top: 0,
-            width: self.field.width as i32,
-            height: self.field.height as i32,
-        };
-        let taken = |one: &&InstanceMask| {
-            one.contains(u, v)
-                && one.class.treatment() != Treatment::Ignore
-                && one.score >= self.instances.score_min
-                && self.instances.large_enough(one.pixels.intersection(&image).area(), self.field.width)
-        };
-        sightings.iter().find(taken).map(|one| ThingAt { class: one.class, track: None, state: State::Uncertain })
-    }
-
+impl ReferenceObserver {
     /// Compares a frame that is due with a view of the map from its pose.
-    pub fn compare(&mut self, awaited: &Awaited, map_depth_m: &View<'_, f32>) {
-        let (evaluated, shown_px) = awaited.compare(map_depth_m, self.rig.focal_baseline_px_m(), self.enlarged);
+    fn compare(&mut self, setup: &Setup<'_>, due: &PendingFrame, map_depth_m: &View<'_, f32>) {
+        let focal_baseline_px_m = setup.config.rig.focal_baseline_px_m();
+        let (size, full_size) = (setup.dataset.size(), setup.dataset.full_size());
+        let enlarged = (full_size.0 as f64 / size.0 as f64) as f32;
+        let (evaluated, shown_px) = due.compare(map_depth_m, focal_baseline_px_m, enlarged);
         self.frames.push(evaluated);
-        if let Some(picture) = awaited.picture.as_ref().and_then(|picture| picture.view()) {
-            let errors = |seen_px: &dyn Fn(usize) -> f32| {
-                let samples = awaited.samples.iter().enumerate();
-                pictures::errors(&picture, samples.map(|(at, sample)| (sample, seen_px(at))))
-            };
+        let depth_m = |px: f32| focal_baseline_px_m / f64::from(px);
+        for (sample, &shown_px) in due.samples.iter().zip(&shown_px).filter(|(sample, _)| sample.region == Region::Static) {
+            if shown_px > 0.0 {
+                self.depth_errors.add(depth_m(shown_px), depth_m(sample.point.disparity_px));
+            }
+        }
+        if let Some(picture) = due.picture.as_ref().and_then(|picture| picture.view()) {
+            let samples = || due.samples.iter();
             self.pictures.push(ErrorPictures {
-                frame: awaited.frame,
-                input_png: errors(&|at| awaited.samples.get(at).map_or(0.0, |sample| sample.input_px)),
-                map_png: errors(&|at| shown_px.get(at).copied().unwrap_or_default()),
+                frame: due.frame,
+                input_png: pictures::errors(&picture, samples().map(|sample| (sample, sample.input_px))),
+                map_png: pictures::errors(&picture, samples().zip(shown_px.iter().copied())),
             });
         }
     }
+}
 
-    /// Ends it.
-    pub fn finish(self) -> LidarRecord {
-        LidarRecord {
-            figures: LidarFigures::of(self.reference.name(), self.delay_frames, &self.frames),
-            frames: self.frames,
-            pictures: self.pictures,
-        }
+/// The points of a frame, with their regions and what the input measured there; `None` without a reference.
+fn pending(setup: &Setup<'_>, plan: &ReferencePlan, frame: &FrameContext<'_, '_>) -> Result<Option<PendingFrame>, ObserveError> {
+    let (rig, images, mapper) = (&setup.config.rig, frame.images, frame.view.mapper());
+    let (width, height) = setup.dataset.size();
+    let (near_m, far_m) = (setup.config.volume.near_m.into(), setup.config.volume.far_m.into());
+    let field = Field { width, height, near_m, far_m };
+    let scan: Option<ProjectedScan> = match plan.reference {
+        Reference::Lidar => setup.dataset.lidar(frame.row.frame)?.map(|scan| project_scan(&scan, &field)),
+        Reference::Exact => images.exact.as_ref().map(|exact| sample_exact_depth(&exact.depth_m, rig, &field)),
+    };
+    let disparity = mapper.disparity_q8();
+    let input_px = |u: usize, v: usize| {
+        let px = f32::from(disparity.get(u, v).unwrap_or_default()) / f32::from(DISPARITY_ONE_PX);
+        let depth_m = rig.focal_baseline_px_m() / f64::from(px);
+        // Only what is fused is the map's input. Infinite where there is no disparity.
+        if depth_m >= near_m && depth_m <= far_m { px } else { 0.0 }
+    };
+    let region = |u: i32, v: i32| region(setup, mapper, images, u, v);
+    Ok(scan.map(|scan| {
+        let mut pending = PendingFrame::new(frame.row.frame, frame.row.report.t_world_camera, &scan, input_px, region);
+        pending.picture = plan.drawn.contains(&frame.at).then(|| images.left.clone());
+        pending
+    }))
+}
+
+/// The region of a pixel. Without object tracking every masked object counts as one of unknown motion, so that maps with and without it
+/// are evaluated at the same points of the background.
+fn region(setup: &Setup<'_>, mapper: &Mapper<'_>, images: &StereoImages, u: i32, v: i32) -> Region {
+    let instances = &setup.config.instances;
+    if instances.dynamic {
+        return Region::of(mapper.thing_at(u, v).as_ref());
     }
+    let (width, height) = setup.dataset.size();
+    let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
+    let taken = |one: &&InstanceMask| {
+        one.contains(u, v)
+            && one.class.treatment() != Treatment::Ignore
+            && one.score >= instances.score_min
+            && instances.large_enough(one.pixels.intersection(&image).area(), width)
+    };
+    let object = images.masks.instances.iter().find(taken);
+    Region::of(object.map(|one| ThingAt { class: one.class, track: None, state: State::Uncertain }).as_ref())
 }

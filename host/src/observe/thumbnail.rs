@@ -6,12 +6,12 @@ use nalgebra::Vector3;
 
 /// Size of one view, px.
 const VIEW_PX: (usize, usize) = (380, 240);
-/// Share of the vertices on either end of an axis that may lie beside the picture: stray pieces should not shrink the thing.
+/// Share of the vertices on either end of an axis that may lie outside the picture: stray triangles should not shrink the object.
 const STRAY: f64 = 0.005;
 const EMPTY: [u8; 3] = [24, 26, 30];
 
 /// The pictures side by side as a PNG file; empty when there is nothing to show.
-pub fn portrait(triangles: &[Triangle]) -> Vec<u8> {
+pub fn thumbnail(triangles: &[Triangle]) -> Vec<u8> {
     if triangles.is_empty() {
         return Vec::new();
     }
@@ -22,7 +22,7 @@ pub fn portrait(triangles: &[Triangle]) -> Vec<u8> {
     let pixels: Vec<u8> = rows.flatten().copied().collect();
     let mut png = Vec::new();
     let size = (3 * VIEW_PX.0 as u32, VIEW_PX.1 as u32);
-    // A picture that cannot be encoded is left out, no more.
+    // A picture that cannot be encoded is left out.
     if PngEncoder::new(&mut png).write_image(&pixels, size.0, size.1, ExtendedColorType::Rgb8).is_err() {
         png.clear();
     }

@@ -1,13 +1,14 @@
-//! Tracks frame by frame, and each over the whole run.
+//! Tracks frame by frame and over the whole run, and their errors against ground truth.
 
-use crate::evaluate::objects::{TrackErrors, median};
-use crate::run::FrameRow;
+use super::{Finished, FrameContext, ObserveError, Observer, Setup};
+use crate::evaluate::objects::{ObjectErrors, ObjectFigures, TrackComparison, TrackErrors};
+use crate::evaluate::quantile::median;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::{Class, State, TrackReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Name of a state in tables and files.
+/// Name of a motion state in tables and files.
 pub const fn state_name(state: State) -> &'static str {
     match state {
         State::Uncertain => "uncertain",
@@ -16,26 +17,26 @@ pub const fn state_name(state: State) -> &'static str {
     }
 }
 
-/// A track seen in a frame: what a run remembers of its report. 64 bytes, so that a long drive may have many.
+/// A track seen in a frame. 64 bytes, so that a long run may have many.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrackRow {
     /// Its number.
     pub id: u32,
-    /// What it is.
+    /// Its class.
     pub class: Class,
-    /// Whether it moves.
+    /// Its motion state.
     pub state: State,
     /// Whether its motion was measured in this frame.
     pub measured: bool,
     /// Score of its detection.
     pub score: f32,
-    /// Where it was seen.
+    /// Its box in the left image.
     pub pixels: PixelBox,
     /// Speed over ground and its error, one sigma, m/s.
     pub speed_m_s: Option<[f32; 2]>,
     /// Matches on it.
     pub matches: u32,
-    /// Of these, explained by its motion.
+    /// Of these, inliers of its motion.
     pub inliers: u32,
     /// Blocks of its volume.
     pub blocks: u32,
@@ -60,36 +61,89 @@ impl From<&TrackReport> for TrackRow {
     }
 }
 
+/// The tracks seen in a frame.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FrameTracks {
+    /// Number of the frame in the data set.
+    pub frame: usize,
+    /// Its tracks, by age.
+    pub tracks: Vec<TrackRow>,
+}
+
 /// A track over the whole run.
 #[derive(Clone, Debug)]
 pub struct TrackRecord {
     /// Its number.
     pub id: u32,
-    /// What it is.
+    /// Its class.
     pub class: Class,
-    /// First and last frame it was seen in, as the data set counts.
+    /// First frame it was seen in, as the data set counts.
     pub first_frame: usize,
-    /// See `first_frame`.
+    /// Last frame it was seen in.
     pub last_frame: usize,
     /// Frames it was seen in.
     pub frames: usize,
     /// Of these, frames in each state: uncertain, static, dynamic.
     pub states: [usize; 3],
-    /// The state it was in most, of static and dynamic; uncertain if it was neither.
+    /// The more frequent of static and dynamic; uncertain if it was neither.
     pub state: State,
     /// Median speed over the frames in that state, m/s.
     pub speed_m_s: Option<f64>,
     /// Most blocks of its volume.
     pub blocks: u32,
-    /// Against the truth, where it is known.
+    /// Against ground truth, where it is known.
     pub errors: Option<TrackErrors>,
 }
 
+/// Tracks of a run.
+#[derive(Clone, Debug)]
+pub struct TracksSection {
+    /// Frame by frame.
+    pub frames: Vec<FrameTracks>,
+    /// Each over the whole run, by number.
+    pub tracks: Vec<TrackRecord>,
+    /// All against ground truth, where it is known.
+    pub figures: Option<ObjectFigures>,
+    /// Every comparison with a true object, by frame and then by track.
+    pub comparisons: Vec<(u32, TrackComparison)>,
+}
+
+/// Collects tracks.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct TracksObserver {
+    frames: Vec<FrameTracks>,
+    errors: ObjectErrors,
+}
+
+impl Observer for TracksObserver {
+    type Section = TracksSection;
+
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.seen).collect();
+        if let Some(truth) = &frame.images.objects {
+            let size = (frame.images.left.width(), frame.images.left.height());
+            let large_enough = |pixels: &PixelBox| setup.config.instances.large_enough(pixels.area(), size.0);
+            self.errors.add(&tracks, &frame.row.report.t_world_camera, truth, size, large_enough);
+        }
+        self.frames.push(FrameTracks { frame: frame.row.frame, tracks: tracks.iter().map(TrackRow::from).collect() });
+        Ok(())
+    }
+
+    fn finish(self, _: &Setup<'_>, _: &Finished<'_>) -> Result<TracksSection, ObserveError> {
+        Ok(TracksSection {
+            tracks: track_records(&self.frames, &self.errors.tracks()),
+            figures: self.errors.figures(),
+            comparisons: self.errors.comparisons(),
+            frames: self.frames,
+        })
+    }
+}
+
 /// Every track over all frames.
-pub(super) fn track_records(rows: &[FrameRow], errors: &BTreeMap<u32, TrackErrors>) -> Vec<TrackRecord> {
+fn track_records(frames: &[FrameTracks], errors: &BTreeMap<u32, TrackErrors>) -> Vec<TrackRecord> {
     let mut seen = BTreeMap::<u32, Vec<(usize, &TrackRow)>>::new();
-    for (row, track) in rows.iter().flat_map(|row| row.tracks.iter().map(move |track| (row, track))) {
-        seen.entry(track.id).or_default().push((row.frame, track));
+    for (frame, track) in frames.iter().flat_map(|frame| frame.tracks.iter().map(|track| (frame.frame, track))) {
+        seen.entry(track.id).or_default().push((frame, track));
     }
     let record = |(id, seen): (u32, Vec<(usize, &TrackRow)>)| {
         let of = |state: State| seen.iter().filter(move |(_, track)| track.state == state);

@@ -1,6 +1,6 @@
-//! What a volume holds, copied: whoever wants to look at it at leisure need not keep the mapper waiting.
+//! A copy of a volume's blocks, meshed after the step so that the mapper need not wait.
 
-use crate::run::HostSlab;
+use crate::slab::HostSlab;
 use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
 use dynvox_core::view::{MeshConfig, Triangle};

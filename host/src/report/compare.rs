@@ -1,5 +1,7 @@
-//! Two runs held against each other: where they part first, frame by frame and stage by stage.
+//! Two runs compared: the first frame and stage in which they diverge.
 
+use super::csv::{FrameDigests, read_frame_digests};
+use crate::run::settings::{Setting, differing, settings};
 use dynvox_core::StageDigests;
 use dynvox_core::{Digested, ObjectDigest, ObjectDigests};
 use std::collections::BTreeMap;
@@ -8,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// A run folder that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
-    /// It is none.
-    #[error("{path} is no run folder: it has no {file} that can be read ({source}). Give a folder that `dynvox run` wrote")]
+    /// It is not a run folder.
+    #[error("{path} is not a run folder: its {file} cannot be read ({source}). Give a folder that `dynvox run` wrote")]
     NoRun {
         /// Path as given.
         path: PathBuf,
@@ -19,7 +21,7 @@ pub enum CompareError {
         source: std::io::Error,
     },
     /// A column is missing: an older build wrote it.
-    #[error("{path} has no column {column}: it is of an older dynvox. Make the run again")]
+    #[error("{path} has no column {column}: an older dynvox wrote it. Run again")]
     Column {
         /// The table.
         path: PathBuf,
@@ -27,7 +29,7 @@ pub enum CompareError {
         column: String,
     },
     /// A file is damaged.
-    #[error("{path}: {reason}. Make the run again")]
+    #[error("{path}: {reason}. Run again")]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -35,7 +37,7 @@ pub enum CompareError {
         reason: String,
     },
     /// The runs have no frame in common.
-    #[error("the runs share no frame: one has {a}, the other {b}. Compare runs with the same --start and --stride")]
+    #[error("the runs share no frame: one has frames {a}, the other {b}. Compare runs with the same --start and --stride")]
     NothingShared {
         /// Frames of the first.
         a: String,
@@ -44,7 +46,7 @@ pub enum CompareError {
     },
 }
 
-/// What a run left of a frame.
+/// The digests of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
     /// Of all stages.
@@ -55,38 +57,29 @@ pub struct Row {
 
 /// A run, as far as it can be compared.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Run {
+pub struct RunDigests {
     /// The frames, by number.
     pub rows: BTreeMap<usize, Row>,
     /// The settings by dotted key, and what the summary says of the run: data set, profile.
     pub settings: BTreeMap<String, String>,
 }
 
-/// A setting that differs.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Setting {
-    /// Its dotted key.
-    pub key: String,
-    /// Its value in either run, where it has one.
-    pub values: [Option<String>; 2],
-}
-
-/// Where two runs part.
+/// The first difference of two runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Parting {
+pub struct Divergence {
     /// The first frame that differs.
     pub frame: usize,
     /// The first stage that differs in it; `None` where only the digest of all does.
     pub stage: Option<Digested>,
 }
 
-/// What two runs are to each other.
+/// Two runs compared.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Comparison {
     /// Settings that differ.
     pub settings: Vec<Setting>,
-    /// Where they part; `None` where they agree in every frame they share.
-    pub parting: Option<Parting>,
+    /// Where they diverge; `None` where they agree in every frame they share.
+    pub divergence: Option<Divergence>,
     /// Frames they share.
     pub shared: usize,
     /// First and last frame, and how many there are, of either.
@@ -96,25 +89,25 @@ pub struct Comparison {
 impl Comparison {
     /// Whether the same frames gave the same bits.
     pub fn equal(&self) -> bool {
-        self.parting.is_none() && self.frames.iter().all(|&[_, _, count]| count == self.shared)
+        self.divergence.is_none() && self.frames.iter().all(|&[_, _, count]| count == self.shared)
     }
 
-    /// Which run, 0 or 1, is the beginning of the other, if one is.
+    /// Which run, 0 or 1, is a prefix of the other, if one is.
     pub fn prefix(&self) -> Option<usize> {
         let [a, b] = self.frames;
         let begins = |short: [usize; 3], long: [usize; 3]| {
             short[2] == self.shared && long[2] > self.shared && short[0] == long[0] && short[1] < long[1]
         };
         let which = if begins(a, b) { Some(0) } else { begins(b, a).then_some(1) };
-        which.filter(|_| self.parting.is_none())
+        which.filter(|_| self.divergence.is_none())
     }
 }
 
-impl Run {
+impl RunDigests {
     /// Reads a run folder.
     ///
     /// # Errors
-    /// It is none, is damaged, or of an older build.
+    /// It is not a run folder, is damaged, or an older build wrote it.
     pub fn read(folder: &Path) -> Result<Self, CompareError> {
         let text = |file: &'static str| {
             std::fs::read_to_string(folder.join(file)).map_err(|source| CompareError::NoRun { path: folder.to_path_buf(), file, source })
@@ -137,109 +130,85 @@ impl Run {
     }
 }
 
-/// Holds two runs against each other, in the frames they share.
+/// Compares two runs in the frames they share.
 ///
 /// # Errors
 /// They share none.
-pub fn compare(a: &Run, b: &Run) -> Result<Comparison, CompareError> {
+pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareError> {
     let shared = || a.rows.iter().filter_map(|(frame, row)| Some((*frame, row, b.rows.get(frame)?)));
-    let parting = shared().find(|(_, one, other)| one != other);
+    let divergence = shared().find(|(_, one, other)| one != other);
     let comparison = Comparison {
         settings: differing(&a.settings, &b.settings),
-        parting: parting.map(|(frame, one, other)| Parting { frame, stage: one.stages.first_difference(&other.stages) }),
+        divergence: divergence.map(|(frame, one, other)| Divergence { frame, stage: one.stages.first_difference(&other.stages) }),
         shared: shared().count(),
         frames: [a.frames(), b.frames()],
     };
     if comparison.shared == 0 {
-        let said = |[first, last, count]: [usize; 3]| if count == 0 { "none".to_owned() } else { format!("{first} to {last}") };
-        return Err(CompareError::NothingShared { a: said(a.frames()), b: said(b.frames()) });
+        let range = |[first, last, count]: [usize; 3]| if count == 0 { "none".to_owned() } else { format!("{first} to {last}") };
+        return Err(CompareError::NothingShared { a: range(a.frames()), b: range(b.frames()) });
     }
     Ok(comparison)
 }
 
-/// The settings of two runs that differ, by key.
-pub(crate) fn differing(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Setting> {
-    let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
-    let pairs = keys.into_iter().map(|key| Setting { key: key.clone(), values: [a.get(key).cloned(), b.get(key).cloned()] });
-    pairs.filter(|setting| setting.values[0] != setting.values[1]).collect()
-}
-
-/// The settings in a `config.toml`, by dotted key.
-pub(crate) fn settings(config_toml: &str) -> Result<BTreeMap<String, String>, toml::de::Error> {
-    let mut settings = BTreeMap::new();
-    flatten("", &toml::from_str(config_toml)?, &mut settings);
-    Ok(settings)
-}
-
-fn flatten(prefix: &str, table: &toml::Table, settings: &mut BTreeMap<String, String>) {
-    for (key, value) in table {
-        let key = format!("{prefix}{key}");
-        match value {
-            toml::Value::Table(inner) => flatten(&format!("{key}."), inner, settings),
-            value => drop(settings.insert(key, value.to_string())),
-        }
-    }
-}
-
-/// Reads `frames.csv`; columns are found by name.
+/// The rows of `frames.csv`, by frame.
 fn read_rows(text: &str, path: &Path) -> Result<BTreeMap<usize, Row>, CompareError> {
-    let mut lines = text.lines();
-    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let place = |column: String| {
-        let at = names.iter().position(|name| *name == column);
-        at.ok_or_else(|| CompareError::Column { path: path.to_path_buf(), column })
+    let damaged = |reason: String| CompareError::Damaged { path: path.to_path_buf(), reason };
+    let rows = read_frame_digests(text).map_err(|error| match missing_column(&error) {
+        Some(column) => CompareError::Column { path: path.to_path_buf(), column },
+        None => damaged(match error.position() {
+            Some(position) => format!("line {} cannot be read", position.line()),
+            None => error.to_string(),
+        }),
+    })?;
+    let row = |(at, row): (usize, &FrameDigests)| {
+        let digests = row_of(row).ok_or_else(|| damaged(format!("line {} cannot be read", at + 2)))?;
+        Ok((row.frame, digests))
     };
-    let (frame_at, digest_at) = (place("frame".to_owned())?, place("digest".to_owned())?);
-    let stages_at = Digested::COLUMNS.iter().map(|column| place(format!("{column}_digest"))).collect::<Result<Vec<_>, _>>()?;
-    let row = |line: &str| {
-        let cells: Vec<&str> = line.split(',').collect();
-        let stages: Vec<&str> = stages_at.iter().map(|&at| cells.get(at).copied()).collect::<Option<_>>()?;
-        let digest = u64::from_str_radix(cells.get(digest_at)?, 16).ok()?;
-        Some((cells.get(frame_at)?.parse().ok()?, Row { digest, stages: stages_of(&stages)? }))
-    };
-    lines
-        .enumerate()
-        .map(|(at, line)| {
-            row(line).ok_or_else(|| CompareError::Damaged { path: path.to_path_buf(), reason: format!("line {} cannot be read", at + 2) })
-        })
-        .collect()
+    rows.iter().enumerate().map(row).collect()
 }
 
-/// The digests of the stages from their text, in the order of [`Digested::COLUMNS`].
-fn stages_of(cells: &[&str]) -> Option<StageDigests> {
-    let &[input, disparity, matches, egomotion, tracks, background, objects] = cells else { return None };
+/// The column that an error says is missing.
+fn missing_column(error: &csv::Error) -> Option<String> {
+    let csv::ErrorKind::Deserialize { err, .. } = error.kind() else { return None };
+    let csv::DeserializeErrorKind::Message(message) = err.kind() else { return None };
+    Some(message.strip_prefix("missing field `")?.trim_end_matches('`').to_owned())
+}
+
+/// The digests of a row from their text.
+fn row_of(row: &FrameDigests) -> Option<Row> {
     let hex = |text: &str| u64::from_str_radix(text, 16).ok();
     let object = |text: &str| {
         let (id, digest) = text.split_once(':')?;
         Some(ObjectDigest { id: id.parse().ok()?, digest: hex(digest)? })
     };
-    let objects: Vec<ObjectDigest> = match objects {
+    let objects: Vec<ObjectDigest> = match row.objects_digest.as_str() {
         "-" => Vec::new(),
         objects => objects.split(';').map(object).collect::<Option<_>>()?,
     };
-    Some(StageDigests {
-        input: hex(input)?,
-        disparity: hex(disparity)?,
-        matches: hex(matches)?,
-        egomotion: hex(egomotion)?,
-        tracks: hex(tracks)?,
-        background: hex(background)?,
+    let stages = StageDigests {
+        input: hex(&row.input_digest)?,
+        disparity: hex(&row.disparity_digest)?,
+        matches: hex(&row.matches_digest)?,
+        egomotion: hex(&row.egomotion_digest)?,
+        tracks: hex(&row.tracks_digest)?,
+        background: hex(&row.background_digest)?,
         objects: ObjectDigests::of(objects.into_iter()),
-    })
+    };
+    Some(Row { digest: hex(&row.digest)?, stages })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn run(frames: std::ops::Range<usize>, change: impl Fn(usize, &mut StageDigests)) -> Run {
+    fn run(frames: std::ops::Range<usize>, change: impl Fn(usize, &mut StageDigests)) -> RunDigests {
         let rows = frames.map(|frame| {
             let objects = ObjectDigests::of([ObjectDigest { id: 3, digest: 7 }, ObjectDigest { id: 9, digest: 8 }].into_iter());
             let mut stages = StageDigests { input: frame as u64, tracks: 5, objects, ..StageDigests::default() };
             change(frame, &mut stages);
             (frame, Row { digest: stages.whole(frame as u32), stages })
         });
-        Run {
+        RunDigests {
             rows: rows.collect(),
             settings: BTreeMap::from([("volume.far_m".to_owned(), "20".to_owned())]),
         }
@@ -248,26 +217,26 @@ mod tests {
     #[test]
     fn names_the_first_frame_and_the_first_stage_in_it() {
         let clean = run(0..5, |_, _| {});
-        let parting = |change: &dyn Fn(usize, &mut StageDigests)| compare(&clean, &run(0..5, change)).unwrap().parting;
-        assert_eq!(parting(&|_, _| {}), None);
+        let divergence = |change: &dyn Fn(usize, &mut StageDigests)| compare(&clean, &run(0..5, change)).unwrap().divergence;
+        assert_eq!(divergence(&|_, _| {}), None);
         let late = |frame: usize, stages: &mut StageDigests| {
             if frame >= 3 {
                 (stages.background, stages.matches) = (1, 1);
             }
         };
-        assert_eq!(parting(&late), Some(Parting { frame: 3, stage: Some(Digested::Matches) }));
+        assert_eq!(divergence(&late), Some(Divergence { frame: 3, stage: Some(Digested::Matches) }));
         let object = |frame: usize, stages: &mut StageDigests| {
             if frame == 4 {
                 stages.objects = ObjectDigests::of([ObjectDigest { id: 3, digest: 7 }].into_iter());
             }
         };
-        assert_eq!(parting(&object), Some(Parting { frame: 4, stage: Some(Digested::Object(9)) }));
+        assert_eq!(divergence(&object), Some(Divergence { frame: 4, stage: Some(Digested::Object(9)) }));
     }
 
     #[test]
     fn tells_a_beginning_from_an_end_and_both_from_the_same() {
         let (whole, start, end) = (run(0..5, |_, _| {}), run(0..3, |_, _| {}), run(2..5, |_, _| {}));
-        let of = |a: &Run, b: &Run| {
+        let of = |a: &RunDigests, b: &RunDigests| {
             let found = compare(a, b).unwrap();
             (found.equal(), found.prefix(), found.shared)
         };

@@ -1,10 +1,13 @@
-//! What a run leaves behind: tables, the summary and the page; and two runs compared by what they left.
+//! What a run leaves behind: tables, the summary, the page and the last lines on the console; and two runs compared by their tables.
 
 pub mod chart;
 pub mod compare;
+mod console;
 mod csv;
 pub mod html;
 mod summary;
+pub mod text;
 
-pub use csv::{write_frames, write_lidar, write_tracks, write_tracks_truth};
+pub use console::print_summary;
+pub use csv::{write_frames, write_reference, write_tracks, write_tracks_truth};
 pub use summary::Summary;

@@ -1,12 +1,10 @@
-//! `summary.json`: the figures of a run under fixed keys. A key is present as soon as the run knows its value.
+//! `summary.json`: the figures of a run under fixed keys. A key is absent where its value is unknown.
 
-use crate::evaluate::exact::ExactFigures;
-use crate::evaluate::lidar::LidarFigures;
 use crate::evaluate::objects::{ObjectFigures, TrackErrors};
+use crate::evaluate::reference::ReferenceFigures;
 use crate::evaluate::surfaces::SurfaceFigures;
-use crate::observe::{KeptObject, TrackRecord, state_name};
-use crate::run::RunRecord;
-use dynvox_core::Report;
+use crate::observe::{BlockTotals, BlocksSection, ReconstructedObject, TrackRecord, TrajectorySection, state_name};
+use crate::run::{RunRecord, StageStatistics};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -26,12 +24,10 @@ pub struct Summary {
     stages: BTreeMap<&'static str, StageSummary>,
     egomotion: EgomotionSummary,
     #[serde(skip_serializing_if = "Option::is_none")]
-    exact: Option<ExactSummary>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    lidar: Option<LidarFigures>,
+    lidar: Option<ReferenceFigures>,
     /// Every track, by number.
     objects: Vec<ObjectSummary>,
-    /// Tracks against truth, over all.
+    /// Tracks against ground truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     objects_truth: Option<ObjectFigures>,
     map: MapSummary,
@@ -62,17 +58,11 @@ struct EgomotionSummary {
     held_frames: usize,
     /// `stereo`, `icp` or `file`.
     source: &'static str,
-    /// `ok`, or `tracking failure` where the depth tracker was lost in a frame.
+    /// `ok`, or `tracking failure` where the depth tracker lost a frame.
     status: &'static str,
     tracking_failures: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     first_failure: Option<usize>,
-}
-
-#[derive(Debug, Serialize)]
-struct ExactSummary {
-    #[serde(rename = "static")]
-    still: ExactFigures,
 }
 
 #[derive(Debug, Serialize)]
@@ -82,7 +72,7 @@ struct ObjectSummary {
     first_frame: usize,
     last_frame: usize,
     frames: usize,
-    /// The one it was in most, of static and dynamic.
+    /// The more frequent of static and dynamic.
     state: &'static str,
     /// Frames it was seen in, by state: uncertain, static, dynamic.
     frames_in_state: [usize; 3],
@@ -101,7 +91,7 @@ struct ObjectSummary {
 }
 
 impl ObjectSummary {
-    fn of(track: &TrackRecord, kept: &[KeptObject]) -> Self {
+    fn of(track: &TrackRecord, objects: &[ReconstructedObject]) -> Self {
         let errors = track.errors.as_ref();
         Self {
             id: track.id,
@@ -116,7 +106,7 @@ impl ObjectSummary {
             me_t_m: errors.and_then(|errors| errors.me_t_m),
             me_r_deg: errors.and_then(|errors| errors.me_r_deg),
             truth: errors.cloned(),
-            surface: kept
+            surface: objects
                 .iter()
                 .filter(|object| object.id == track.id)
                 .max_by_key(|object| object.frames)
@@ -131,7 +121,7 @@ struct MapSummary {
     blocks_peak: u32,
     bytes: u64,
     triangles: u64,
-    /// Of these, where something drove while it was seen.
+    /// Of these, in the volume that moving objects swept.
     #[serde(skip_serializing_if = "Option::is_none")]
     swept_triangles: Option<u64>,
 }
@@ -149,9 +139,9 @@ struct PruneSummary {
 struct EvictSummary {
     out: u64,
     back: u64,
-    /// Left with nothing in them worth keeping.
+    /// Evicted with nothing in them.
     empty: u64,
-    /// Left at the end of the run, onto the disk as well.
+    /// Stored at the end of the run.
     end: u64,
     disk_records: u64,
     disk_bytes: u64,
@@ -177,76 +167,96 @@ struct HealthSummary {
 impl Summary {
     /// Collects the figures of a run.
     pub fn of(run: &RunRecord) -> Self {
-        let sum = |of: fn(&Report) -> u32| run.rows.iter().map(|row| u64::from(of(&row.report))).sum::<u64>();
-        let errors = run.errors.as_ref();
-        let stages = run.stage_statistics();
-        let failures = run.tracking_failures();
+        let sections = &run.sections;
+        let stage = |of: StageStatistics| StageSummary { median_ms: of.median_ms, p99_ms: of.p99_ms, cpu_median_ms: of.cpu_median_ms };
         Self {
-            dataset: run.name.clone(),
-            profile: run.profile.clone(),
-            threads: run.threads,
-            frames: run.rows.len(),
+            dataset: run.header.name.clone(),
+            profile: run.header.profile.clone(),
+            threads: run.header.threads,
+            frames: run.frames.len(),
             seconds: run.seconds,
             fps: run.fps(),
             digest: format!("{:016x}", run.digest()),
-            slab_bytes: run.slab_bytes,
+            slab_bytes: run.header.slab_bytes,
             rss_peak_bytes: run.rss_peak_bytes,
-            stages: stages
-                .iter()
-                .map(|(name, of)| (*name, StageSummary { median_ms: of.median_ms, p99_ms: of.p99_ms, cpu_median_ms: of.cpu_median_ms }))
-                .collect(),
-            egomotion: EgomotionSummary {
-                t_err_percent: errors.and_then(|errors| errors.t_err_percent),
-                r_err_deg_per_m: errors.and_then(|errors| errors.r_err_deg_per_m),
-                rpe_t_m: errors.map(|errors| errors.rpe_t_m),
-                rpe_r_deg: errors.map(|errors| errors.rpe_r_deg),
-                ate_m: errors.map(|errors| errors.ate_m),
-                held_frames: run.held_frames(),
-                source: run.motion_source,
-                status: if failures.is_some() { "tracking failure" } else { "ok" },
-                tracking_failures: failures.map_or(0, |(count, ..)| count),
-                first_failure: failures.map(|(_, first, _)| first),
-            },
-            exact: run.exact.map(|still| ExactSummary { still }),
-            lidar: run.lidar.as_ref().and_then(|lidar| lidar.figures.clone()),
-            objects: run.objects.tracks.iter().map(|track| ObjectSummary::of(track, &run.objects.kept)).collect(),
-            objects_truth: run.objects.figures.clone(),
+            stages: run.stage_statistics().into_iter().map(|(name, of)| (name, stage(of))).collect(),
+            egomotion: EgomotionSummary::of(&sections.trajectory),
+            lidar: sections.reference.as_ref().and_then(|reference| reference.figures.clone()),
+            objects: sections.tracks.tracks.iter().map(|track| ObjectSummary::of(track, &sections.objects.objects)).collect(),
+            objects_truth: sections.tracks.figures.clone(),
             map: MapSummary {
-                blocks: run.blocks,
-                blocks_peak: run.blocks_peak(),
-                bytes: run.map_bytes(),
-                triangles: run.mesh.triangles,
-                swept_triangles: run.objects.swept_triangles,
+                blocks: sections.blocks.blocks,
+                blocks_peak: sections.blocks.totals.peak,
+                bytes: sections.blocks.map_bytes(),
+                triangles: sections.blocks.mesh.triangles,
+                swept_triangles: sections.objects.swept_triangles,
             },
-            prune: PruneSummary {
-                visited: sum(|report| report.prune.visited) + u64::from(run.finish.visited),
-                voxels_reset: sum(|report| report.prune.voxels_reset) + u64::from(run.finish.voxels_reset),
-                blocks_freed: sum(|report| report.prune.blocks_freed) + u64::from(run.finish.blocks_freed),
-                carried_over_most: run.rows.iter().map(|row| row.report.prune.carried_over).max().unwrap_or_default(),
-                early: sum(|report| report.prune.early),
-            },
-            evict: EvictSummary {
-                out: sum(|report| report.allocation.eviction.kept + report.allocation.eviction.lost),
-                back: run.blocks_back(),
-                empty: sum(|report| report.allocation.eviction.empty),
-                end: u64::from(run.shelf.end.kept),
-                disk_records: run.shelf.records,
-                disk_bytes: run.shelf.bytes,
-            },
-            health: HealthSummary {
-                blocks_refused: run.blocks_refused(),
-                blocks_lost: run.blocks_lost(),
-                blocks_unreadable: run.shelf.unreadable,
-                probes_most: run.rows.iter().map(|row| row.report.allocation.probes_most).max().unwrap_or_default(),
-                history_frames_most: run.rows.iter().map(|row| row.history_frames).max().unwrap_or_default(),
-                rss_limit_bytes: run.rss_limit_bytes,
-                disk_failure: run.shelf_failure.clone(),
-                depth_values_refused: run.rows.iter().map(|row| u64::from(row.depth_refused)).sum(),
-                detections_refused: sum(|report| report.instances.detections.refused()),
-                tracks_refused: sum(|report| report.instances.tracks.refused + report.instances.objects.refused),
-                matches_dropped: sum(Report::dropped_features),
-                worst_severity: run.worst().name(),
-            },
+            prune: PruneSummary::of(&sections.blocks.totals),
+            evict: EvictSummary::of(&sections.blocks),
+            health: HealthSummary::of(run),
+        }
+    }
+}
+
+impl EgomotionSummary {
+    fn of(trajectory: &TrajectorySection) -> Self {
+        let (errors, failures) = (trajectory.errors.as_ref(), trajectory.failures);
+        Self {
+            t_err_percent: errors.and_then(|errors| errors.t_err_percent),
+            r_err_deg_per_m: errors.and_then(|errors| errors.r_err_deg_per_m),
+            rpe_t_m: errors.map(|errors| errors.rpe_t_m),
+            rpe_r_deg: errors.map(|errors| errors.rpe_r_deg),
+            ate_m: errors.map(|errors| errors.ate_m),
+            held_frames: trajectory.held_frames,
+            source: trajectory.source,
+            status: if failures.is_some() { "tracking failure" } else { "ok" },
+            tracking_failures: failures.map_or(0, |failures| failures.frames),
+            first_failure: failures.map(|failures| failures.first),
+        }
+    }
+}
+
+impl PruneSummary {
+    fn of(totals: &BlockTotals) -> Self {
+        Self {
+            visited: totals.prune_visited,
+            voxels_reset: totals.voxels_reset,
+            blocks_freed: totals.blocks_freed,
+            carried_over_most: totals.carried_over_most,
+            early: totals.early,
+        }
+    }
+}
+
+impl EvictSummary {
+    fn of(blocks: &BlocksSection) -> Self {
+        Self {
+            out: blocks.totals.stored + blocks.totals.lost,
+            back: blocks.totals.loaded,
+            empty: blocks.totals.empty,
+            end: u64::from(blocks.store.end.kept),
+            disk_records: blocks.store.records,
+            disk_bytes: blocks.store.bytes,
+        }
+    }
+}
+
+impl HealthSummary {
+    fn of(run: &RunRecord) -> Self {
+        let (blocks, health) = (&run.sections.blocks, &run.sections.health);
+        Self {
+            blocks_refused: blocks.totals.refused,
+            blocks_lost: blocks.lost(),
+            blocks_unreadable: blocks.store.unreadable,
+            matches_dropped: health.matches_dropped,
+            probes_most: blocks.totals.probes_most,
+            history_frames_most: blocks.totals.history_frames_most,
+            rss_limit_bytes: run.header.rss_limit_bytes,
+            disk_failure: blocks.store.failure.clone(),
+            depth_values_refused: health.depth_values_refused,
+            detections_refused: u64::from(health.detections.refused()),
+            tracks_refused: health.tracks_refused,
+            worst_severity: health.worst.name(),
         }
     }
 }

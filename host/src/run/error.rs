@@ -2,7 +2,7 @@
 
 use super::{FolderError, ResumeError};
 use crate::input::InputError;
-use crate::observe::Reference;
+use crate::observe::{ObserveError, Reference};
 use crate::run::store::StoreError;
 use dynvox_core::memory::SlabError;
 use dynvox_core::{NewError, StepError};
@@ -24,14 +24,14 @@ pub enum RunError {
         /// Frames there are.
         len: usize,
     },
-    /// Nothing to hold the map against.
+    /// No reference for the evaluation.
     #[error("--evaluate {} finds nothing in the {frames} frames: {}", .reference.name(), missing(*.reference, *.frames, *.delay))]
     NoReference {
         /// What was asked for.
         reference: Reference,
         /// Frames of the run.
         frames: usize,
-        /// Frames an evaluation waits.
+        /// Frames after which the map is evaluated.
         delay: usize,
     },
     /// The images are larger than the profile's.
@@ -52,7 +52,7 @@ pub enum RunError {
     },
     /// The pruning window is longer than the profile's history.
     #[error(
-        "volume.prune_lag is {prune_lag} frames; profile {profile} remembers {history_frames}. Give more bytes with --memory or a larger --profile, or \
+        "volume.prune_lag is {prune_lag} frames; profile {profile} has a history of {history_frames}. Give more bytes with --memory or a larger --profile, or \
          --set volume.prune_lag={history_frames}"
     )]
     Window {
@@ -69,8 +69,10 @@ pub enum RunError {
         /// All problems.
         problems: String,
     },
-    /// The machine has no room for the slab.
-    #[error("this machine has no {bytes} bytes for the slab of {profile}. Give fewer with --memory; `dynvox budget` shows what they hold")]
+    /// No memory for the slab.
+    #[error(
+        "the slab of {profile} needs {bytes} bytes, and this machine does not have them. Give fewer with --memory; `dynvox budget` shows what they hold"
+    )]
     NoMemory {
         /// Bytes of the slab.
         bytes: usize,
@@ -94,26 +96,26 @@ pub enum RunError {
         reason: String,
     },
     /// The block file.
-    #[error("blocks that leave the pool cannot be kept: {0}. Free the disk, or run with --no-stream")]
+    #[error("evicted blocks cannot be stored: {0}. Free disk space, or run with --no-stream")]
     Store(StoreError),
-    /// The block file of a run that goes on.
+    /// The block file of a resumed run.
     #[error(transparent)]
     Reopen(StoreError),
-    /// A stopped run that cannot go on.
+    /// An interrupted run that cannot be resumed.
     #[error(transparent)]
     Resume(#[from] ResumeError),
-    /// A strict run's map was harmed.
-    #[error("frame {frame} harms the map: {cause}. Without --strict the run goes on and counts it")]
+    /// A frame of a strict run affected the map.
+    #[error("frame {frame}: map affected: {cause}. Without --strict the run continues and counts it")]
     Strict {
         /// Number of the frame.
         frame: usize,
-        /// What happened.
+        /// The cause.
         cause: String,
     },
-    /// The process holds more memory than it may.
+    /// The process uses more memory than allowed.
     #[error(
-        "at frame {frame} the process holds {rss_bytes} bytes, more than the {limit_bytes} it may. Allow more with --rss-limit-mib, or choose a \
-         smaller --memory"
+        "at frame {frame} the process uses {rss_bytes} bytes, more than the {limit_bytes} allowed. Allow more with --rss-limit-mib, or \
+         choose a smaller --memory"
     )]
     Resident {
         /// Number of the frame.
@@ -123,6 +125,9 @@ pub enum RunError {
         /// The ceiling.
         limit_bytes: u64,
     },
+    /// An observer.
+    #[error(transparent)]
+    Observe(#[from] ObserveError),
     /// The threads cannot be started.
     #[error("{count} threads cannot be started: {source}. Give fewer --threads")]
     Threads {
@@ -133,20 +138,19 @@ pub enum RunError {
     },
 }
 
-/// What a reference lacks, and what to do.
+/// Why there is no reference, and what to do.
 fn missing(reference: Reference, frames: usize, delay: usize) -> String {
     match reference {
-        _ if delay >= frames => format!("--evaluation-delay {delay} is beyond the last of them. Give a smaller one, or more --frames"),
+        _ if delay >= frames => format!("--evaluation-delay {delay} reaches beyond the last of them. Give a smaller delay, or more --frames"),
         Reference::Lidar => {
-            "no scan beside the images. KITTI keeps them in velodyne/ (`dynvox inspect` tells where); fetch them, or take the frames \
-             that have one"
+            "there are no scans. KITTI keeps them in velodyne/ (`dynvox inspect` shows where); download them, or choose frames that have one"
                 .to_owned()
         }
         Reference::Exact => "only the synthetic street has exact depth. Give --evaluate lidar".to_owned(),
     }
 }
 
-/// What the core says of a slab, as an error.
+/// The core's refusal of a slab, as an error.
 pub(super) fn refused(profile: &str, error: NewError) -> RunError {
     let reason = match error {
         NewError::Slab(SlabError::TooSmall { missing }) => format!("it lacks {missing} bytes"),
@@ -156,7 +160,7 @@ pub(super) fn refused(profile: &str, error: NewError) -> RunError {
     RunError::Slab { profile: profile.to_owned(), reason }
 }
 
-/// What the core says of a frame, in words.
+/// The core's refusal of a frame, in words.
 pub(super) fn step_reason(error: StepError) -> String {
     match error {
         StepError::SizesDiffer => "its images differ in size".to_owned(),
@@ -164,8 +168,8 @@ pub(super) fn step_reason(error: StepError) -> String {
             format!("its images are not of {width} x {height} px, the size the calibration is for")
         }
         StepError::SizeChanged => "its images have another size than those before".to_owned(),
-        StepError::PoseNotFinite => "its pose holds numbers that are none".to_owned(),
         StepError::PoseNotRotation => "the quaternion of its pose does not have length 1".to_owned(),
+        StepError::PoseNotFinite => "its pose is not finite".to_owned(),
         StepError::TooLarge { width, height } => format!("its images are larger than {width} x {height} px"),
         StepError::TooSmall { width, height } => format!("its images are smaller than {width} x {height} px"),
         other => other.to_string(),

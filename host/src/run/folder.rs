@@ -1,5 +1,5 @@
-//! The run folder: written beside its place under another name, and put in place when it is whole. One that holds a snapshot stays there when
-//! its run ends early, so that the run can go on.
+//! The run folder: written under another name next to its target, and renamed when it is complete. One that holds a snapshot stays there
+//! when its run ends early, so that the run can be resumed.
 
 #[cfg(test)]
 mod tests;
@@ -21,22 +21,22 @@ pub enum FolderError {
         /// The folder asked for.
         path: PathBuf,
     },
-    /// A run was stopped there.
-    #[error("a run was stopped on its way to {path}. Let it go on with `dynvox run --resume {path}`, or begin anew with --overwrite")]
-    Stopped {
+    /// An interrupted run has a snapshot there.
+    #[error("an interrupted run to {path} has a snapshot. Resume it with `dynvox run --resume {path}`, or start again with --overwrite")]
+    Interrupted {
         /// The folder asked for.
         path: PathBuf,
     },
-    /// Nothing was stopped there.
-    #[error("no run can go on to {path}: {reason}")]
-    NothingStopped {
+    /// There is no run to resume.
+    #[error("no run to {path} can be resumed: {reason}")]
+    NothingToResume {
         /// The folder asked for.
         path: PathBuf,
         /// Why, and what to do.
         reason: &'static str,
     },
     /// The machine refuses.
-    #[error("{path} cannot be written: {source}. Check the disk and the rights, or give another --out")]
+    #[error("{path} cannot be written: {source}. Check the disk and the permissions, or give another --out")]
     Write {
         /// The file or folder.
         path: PathBuf,
@@ -57,12 +57,12 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// Begins a folder that will stand at `target`.
+    /// Begins a folder that will become `target`.
     pub fn begin(target: &Path, overwrite: bool) -> Result<Self, FolderError> {
-        room(target, overwrite)?;
+        check_target(target, overwrite)?;
         let partial = beside(target, "partial");
         if partial.join(SNAPSHOT).is_file() && !overwrite {
-            return Err(FolderError::Stopped { path: target.to_path_buf() });
+            return Err(FolderError::Interrupted { path: target.to_path_buf() });
         }
         let failed = |source| FolderError::Write { path: partial.clone(), source };
         if partial.exists() {
@@ -72,15 +72,15 @@ impl RunFolder {
         Ok(Self { target: target.to_path_buf(), partial, done: false })
     }
 
-    /// The folder of a run that was stopped on its way to `target` and left a snapshot. What the stop left half-written beside that is removed.
+    /// The folder of an interrupted run to `target` that left a snapshot. An incomplete snapshot next to it is removed.
     pub fn reopen(target: &Path) -> Result<Self, FolderError> {
         let partial = beside(target, "partial");
-        let nothing = |reason| FolderError::NothingStopped { path: target.to_path_buf(), reason };
+        let nothing = |reason| FolderError::NothingToResume { path: target.to_path_buf(), reason };
         if !partial.join(SNAPSHOT).is_file() {
             return Err(nothing(match (partial.is_dir(), target.join("summary.json").is_file()) {
-                (true, _) => "it was stopped before its first snapshot. Begin it again",
-                (false, true) => "the one there is finished",
-                (false, false) => "there is none. Give the folder the stopped run was to end in",
+                (true, _) => "it was interrupted before its first snapshot. Start it again",
+                (false, true) => "it is complete",
+                (false, false) => "there is no such run. Give the --out of the interrupted run",
             }));
         }
         let folder = Self { target: target.to_path_buf(), partial, done: false };
@@ -90,9 +90,12 @@ impl RunFolder {
         }
     }
 
-    /// Whether the folder may still be put in its place.
-    pub fn has_room(&self, overwrite: bool) -> Result<(), FolderError> {
-        room(&self.target, overwrite)
+    /// Refuses a target that is taken.
+    ///
+    /// # Errors
+    /// It exists and may not be replaced.
+    pub fn check_target(&self, overwrite: bool) -> Result<(), FolderError> {
+        check_target(&self.target, overwrite)
     }
 
     /// Where the snapshot is, or will be.
@@ -100,7 +103,7 @@ impl RunFolder {
         self.file(SNAPSHOT)
     }
 
-    /// What it will be called.
+    /// Where it will be.
     pub fn target(&self) -> &Path {
         &self.target
     }
@@ -109,6 +112,11 @@ impl RunFolder {
     pub fn next_name(parent: &Path, name: &str) -> PathBuf {
         let taken = |path: &PathBuf| path.exists() || beside(path, "partial").exists();
         (1u32..).map(|number| parent.join(format!("{name}-{number:03}"))).find(|path| !taken(path)).unwrap_or_else(|| parent.join(name))
+    }
+
+    /// Where it is while the run lasts.
+    pub fn path(&self) -> &Path {
+        &self.partial
     }
 
     /// Where to write a file of that name.
@@ -130,9 +138,9 @@ impl RunFolder {
         made.map_err(|source| FolderError::Write { path, source })
     }
 
-    /// Puts the folder in its place and returns where that is. The snapshot goes, and what else only served the making; not before, so that a run
-    /// killed in its last moment can still go on.
-    pub fn commit(mut self, served: &[&str]) -> Result<PathBuf, FolderError> {
+    /// Renames the folder to its target, which is returned. Snapshot and temporary files are removed only then, so that a run killed in its
+    /// last moment can still be resumed.
+    pub fn commit(mut self, temporary: &[&str]) -> Result<PathBuf, FolderError> {
         let failed = |source| FolderError::Write { path: self.target.clone(), source };
         let old = beside(&self.target, "replaced");
         let replaced = self.target.exists();
@@ -144,7 +152,7 @@ impl RunFolder {
         if replaced {
             std::fs::remove_dir_all(&old).map_err(failed)?;
         }
-        for name in served.iter().chain([&SNAPSHOT]) {
+        for name in temporary.iter().chain([&SNAPSHOT]) {
             let path = self.target.join(name);
             match std::fs::remove_file(&path) {
                 Err(source) if source.kind() != std::io::ErrorKind::NotFound => return Err(FolderError::Write { path, source }),
@@ -158,14 +166,14 @@ impl RunFolder {
 impl Drop for RunFolder {
     fn drop(&mut self) {
         if !self.done && !self.snapshot().is_file() {
-            // Nothing to be done about a failure here: the run has failed already.
+            // A failure here changes nothing: the run has failed already.
             let _ = std::fs::remove_dir_all(&self.partial);
         }
     }
 }
 
-/// Refuses a place that is taken.
-fn room(target: &Path, overwrite: bool) -> Result<(), FolderError> {
+/// Refuses a target that is taken.
+fn check_target(target: &Path, overwrite: bool) -> Result<(), FolderError> {
     let empty = !target.exists() || target.read_dir().is_ok_and(|mut entries| entries.next().is_none());
     match (overwrite || empty, empty || target.join("summary.json").is_file()) {
         (true, true) => Ok(()),
@@ -180,7 +188,7 @@ fn beside(target: &Path, suffix: &str) -> PathBuf {
     target.with_file_name(format!(".{name}.{suffix}"))
 }
 
-/// Writes a file as a whole: under another name first, then, when it is on the disk, in its place.
+/// Writes a file atomically: under another name first, renamed when it is synced to the disk.
 pub fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
@@ -192,7 +200,7 @@ pub fn write_whole(
         std::fs::rename(&draft, path)
     });
     written.map_err(|source| {
-        // The draft may not even be there.
+        // The draft may not exist.
         let _ = std::fs::remove_file(&draft);
         FolderError::Write { path: path.to_path_buf(), source }
     })

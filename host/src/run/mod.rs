@@ -1,4 +1,4 @@
-//! Runs the core on a data set: owns the slab, feeds the frames, takes the times, watches memory, collects what the report shows.
+//! Runs the core on a data set: owns the slab, feeds the frames, takes the times, checks limits, writes checkpoints.
 
 mod checkpoint;
 mod disk_store;
@@ -11,20 +11,20 @@ mod reader;
 mod record;
 mod resident;
 mod session;
-mod slab;
+pub mod settings;
 mod state;
 pub mod store;
 mod threads;
+mod view;
 
-pub use checkpoint::{Begun, ResumeError, Snapshots, Stopped};
-pub use disk_store::{MeshOutput, Shelf, ShelfUse, Streaming};
+pub use checkpoint::{Checkpoint, CheckpointPlan, ResumeError, RunManifest};
+pub use disk_store::{BLOCKS_FILE, DiskStore, MeshOutput, Streaming};
 pub use error::RunError;
 pub use execute::run;
 pub use folder::{FolderError, RunFolder, write_whole};
 pub use plan::{HOST_OVERHEAD_BYTES, Plan, frame_indices, frame_interval_s};
 pub use progress::Progress;
 pub use reader::{AHEAD, read_ahead};
-pub use record::{FrameRow, Keyframe, RunRecord, StageStatistics};
+pub use record::{RunHeader, RunRecord, StageStatistics};
 pub use resident::resident_bytes;
-pub use slab::HostSlab;
-pub use threads::{StageTime, Threads};
+pub use threads::Threads;

@@ -1,14 +1,16 @@
 //! What to run: the frames, the bounds, the settings.
 
 use super::disk_store::Streaming;
-use super::{RunError, Snapshots};
+use super::{CheckpointPlan, RunError, RunFolder};
+use crate::evaluate::quantile::median;
 use crate::input::FrameSource;
-use crate::observe::{Reference, evaluable};
+use crate::observe::{Reference, ReferencePlan, Setup};
+use dynvox_core::MotionSource;
 use dynvox_core::geometry::Transform;
 use dynvox_core::{Capacity, Config};
 
-/// Bytes the host may hold beside the slab unless a run says otherwise: decoded images, the synthetic street, a row per frame, pictures for
-/// the report, the block file's places.
+/// Bytes the host may use in addition to the slab, by default: decoded images, the synthetic street, a row per frame, pictures for the
+/// report, the index of the block file.
 pub const HOST_OVERHEAD_BYTES: u64 = 256 << 20;
 
 /// What to run.
@@ -29,28 +31,49 @@ pub struct Plan {
     pub config_toml: String,
     /// Threads at work.
     pub threads: usize,
-    /// How blocks that leave the pool are kept; they are lost when absent.
+    /// How evicted blocks are stored; they are lost when absent.
     pub streaming: Option<Streaming>,
-    /// Snapshots on the way, so that the run can be stopped and go on.
-    pub snapshots: Option<Snapshots>,
-    /// Whether the run fails at the first frame that harms the map.
+    /// When checkpoints are written.
+    pub checkpoints: Option<CheckpointPlan>,
+    /// Whether the run fails at the first frame that affects the map.
     pub strict: bool,
     /// Resident memory above which the run fails.
     pub rss_limit_bytes: u64,
-    /// What the map is held against, frame by frame.
+    /// What the map is evaluated against, frame by frame, where that is asked for.
     pub evaluate: Option<Reference>,
-    /// Frames after which the map is held against a frame's reference and exact depth, from where it was taken.
+    /// Frames after which the map is evaluated against a frame's reference, from the frame's pose.
     pub evaluation_delay: usize,
     /// Whether to show no progress.
     pub quiet: bool,
 }
 
 impl Plan {
-    /// Refuses what cannot run before any memory is taken.
+    /// What observers know of the run.
+    pub(super) fn setup(&self, folder: &RunFolder) -> Setup<'_> {
+        let dataset = self.dataset.as_ref();
+        Setup {
+            dataset,
+            indices: &self.indices,
+            capacity: &self.capacity,
+            config: &self.config,
+            folder: folder.path().to_path_buf(),
+            motion_source: match (&self.poses, self.config.mapper.egomotion) {
+                (Some(_), _) => "file",
+                (None, MotionSource::Stereo) => "stereo",
+                (None, MotionSource::Icp) => "icp",
+            },
+            reference: match self.evaluate {
+                Some(reference) => ReferencePlan::all(dataset, &self.indices, reference, self.evaluation_delay),
+                None => ReferencePlan::sampled(dataset, &self.indices),
+            },
+        }
+    }
+
+    /// Refuses what cannot run, before any memory is taken.
     pub(super) fn check(&self) -> Result<(), RunError> {
         let (width, height) = self.dataset.size();
         if let Some(reference) = self.evaluate
-            && evaluable(self.dataset.as_ref(), &self.indices, reference, self.evaluation_delay).is_empty()
+            && ReferencePlan::all(self.dataset.as_ref(), &self.indices, reference, self.evaluation_delay).is_none()
         {
             return Err(RunError::NoReference { reference, frames: self.indices.len(), delay: self.evaluation_delay });
         }
@@ -92,9 +115,7 @@ pub fn frame_indices(len: usize, start: usize, stride: usize, frames: Option<usi
 
 /// Median time between two of the frames, s; `None` where there is only one.
 pub fn frame_interval_s(dataset: &dyn FrameSource, indices: &[usize]) -> Option<f64> {
-    let mut steps: Vec<f64> = indices.windows(2).map(|pair| dataset.time_s(pair[1]) - dataset.time_s(pair[0])).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied()
+    median(indices.windows(2).map(|pair| dataset.time_s(pair[1]) - dataset.time_s(pair[0])))
 }
 
 #[cfg(test)]

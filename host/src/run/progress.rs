@@ -1,4 +1,4 @@
-//! Progress: a bar on a terminal, a line now and then elsewhere, nothing when asked.
+//! Progress: a bar on a terminal, some lines elsewhere, nothing when asked.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -37,17 +37,17 @@ impl Progress {
         Self::Bar(bar)
     }
 
-    /// A line that matters, whatever is shown of the progress.
-    pub fn say(&self, line: &str) {
+    /// Prints a warning, also where no progress is shown.
+    pub fn warn(&self, warning: &str) {
         match self {
-            Self::Bar(bar) => bar.suspend(|| eprintln!("{line}")),
-            Self::Quiet | Self::Lines { .. } => eprintln!("{line}"),
+            Self::Bar(bar) => bar.suspend(|| eprintln!("warning: {warning}")),
+            Self::Quiet | Self::Lines { .. } => eprintln!("warning: {warning}"),
         }
     }
 
     /// Frame `done` (from 1) is mapped; the block pool is `fill` full, in 0 to 1.
     pub fn frame(&self, done: usize, fps: f64, fill: f64, held: bool) {
-        let words = format!("{fps:5.1} fps  pool {:3.0} %{}", 100.0 * fill, if held { "  motion held" } else { "" });
+        let words = format!("{fps:5.1} fps  pool {:3.0} %{}", 100.0 * fill, if held { "  pose held" } else { "" });
         match self {
             Self::Quiet => {}
             Self::Bar(bar) => {
@@ -63,7 +63,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         if let Self::Bar(bar) = self {
             bar.finish_and_clear();

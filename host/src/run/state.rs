@@ -1,40 +1,36 @@
-//! What a run gathers beside its mapper, as plain data: all of it goes into a snapshot.
+//! What a run holds next to its mapper, as plain data: all of it goes into a checkpoint.
 
-use super::{FrameRow, Keyframe};
-use crate::evaluate::exact::ExactErrors;
-use crate::observe::ObjectsAtWork;
+use crate::observe::{FrameRow, Observers};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
-/// Rows, pictures, sums. What only says how they are made (settings, folders) is not here: that comes with the plan.
+/// Rows, observers, timers. What follows from the plan (settings, folders) is not here.
 #[derive(Debug, Default, Serialize, Deserialize)]
-pub struct Gathered {
-    pub(super) rows: Vec<FrameRow>,
-    pub(super) keyframes: Vec<Keyframe>,
-    pub(super) exact: ExactErrors,
-    pub(super) objects: ObjectsAtWork,
-    pub(super) spent: Spent,
+pub(super) struct RunState {
+    pub rows: Vec<FrameRow>,
+    pub observers: Observers,
+    pub timers: Timers,
 }
 
-/// Time a run took so far, that before a stop included.
+/// Time a run took so far, that before an interruption included.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Spent {
+pub(super) struct Timers {
     /// All of it.
-    pub whole: Duration,
-    /// Of it, what only the report and snapshots needed.
-    pub aside: Duration,
+    pub total: Duration,
+    /// Of it, the time that only the report and checkpoints needed.
+    pub overhead: Duration,
 }
 
-impl Spent {
-    /// Adds what passed since `since`, which is now.
-    pub fn until_now(&mut self, since: &mut Instant) {
+impl Timers {
+    /// Adds the time since `since`, which becomes now.
+    pub fn add_since(&mut self, since: &mut Instant) {
         let now = Instant::now();
-        self.whole += now - *since;
+        self.total += now - *since;
         *since = now;
     }
 
     /// Mapping and waiting for images.
     pub fn mapping(&self) -> Duration {
-        self.whole.saturating_sub(self.aside)
+        self.total.saturating_sub(self.overhead)
     }
 }

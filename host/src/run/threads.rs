@@ -4,23 +4,12 @@
 //! the stage it works for; whenever that changes (a stage begins or ends, a piece of work is taken over from another thread) the time since the
 //! last change is charged to the stage before. So pieces that run elsewhere are charged once, to the right stage.
 
+use crate::observe::{STAGES, StageTime};
 use cpu_time::ThreadTime;
 use dynvox_core::{Executor, Stage};
-use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-
-const STAGES: usize = Stage::ALL.len();
-
-/// What one stage took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct StageTime {
-    /// Wall time, ms.
-    pub wall_ms: f64,
-    /// CPU time of all threads together, ms.
-    pub cpu_ms: f64,
-}
 
 /// Runs the core's work on a number of threads and takes the time.
 pub struct Threads {

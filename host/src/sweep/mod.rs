@@ -1,10 +1,10 @@
-//! Many runs with one thing varied, and one page that shows them beside the original's numbers: the paper's tables and figures.
+//! Many runs with one setting varied, and one page that compares them with the original's numbers: the paper's tables and figures.
 //!
-//! A [`Plan`] lists the points of each sweep and the runs they need; points that mean the same run share it. Each finished run leaves one
-//! file, `runs/KEY.json`, written at once: a sweep that was interrupted goes on with the runs that have none. `plan.json` says what the folder is
-//! for; parts made on several machines are put together when their plans are the same, and told apart when their results are not.
+//! A [`Plan`] lists the points of each sweep and the runs they need; points with equal arguments share a run. Each finished run leaves one
+//! file, `runs/KEY.json`, written atomically: an interrupted sweep continues with the missing runs. `plan.json` is the folder's plan; parts
+//! made on several machines are merged when their plans are equal, and refused when their results differ.
 
-mod draw;
+mod figures;
 mod page;
 mod plan;
 mod published;
@@ -14,14 +14,14 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use plan::{Data, Kind, Plan, Point, Wanted};
+pub use plan::{Data, Kind, Plan, Point, SweepRequest};
 pub use result::{FrameSample, RunResult};
 pub use store::{Results, SweepFolder, merge};
 
 use crate::run::FolderError;
 use std::path::PathBuf;
 
-/// Why a sweep cannot go on.
+/// Why a sweep cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     /// A file cannot be read.
@@ -36,7 +36,7 @@ pub enum SweepError {
     #[error(transparent)]
     Write(#[from] FolderError),
     /// A file holds something else.
-    #[error("{path} is no file of a sweep: {reason}. Remove it, or give another --out")]
+    #[error("{path} is not a file of a sweep: {reason}. Remove it, or give another --out")]
     Foreign {
         /// The file.
         path: PathBuf,
@@ -44,14 +44,14 @@ pub enum SweepError {
         reason: String,
     },
     /// The folder belongs to another sweep.
-    #[error("{path} belongs to a sweep of other runs. Repeat that one's arguments to go on with it, or give another --out")]
+    #[error("{path} belongs to another sweep. Repeat its arguments to continue it, or give another --out")]
     Other {
         /// The folder's plan.
         path: PathBuf,
     },
     /// Two machines disagree.
     #[error(
-        "{path} has another result of run {run} than the folders before it: {ours} against {theirs}. The same run gives the same digest everywhere: compare versions, data and paths of --depth"
+        "{path}: run {run} has digest {theirs}, but {ours} in an earlier folder. Equal runs give equal digests: compare versions, data and paths of --depth"
     )]
     Differs {
         /// The folder.

@@ -80,7 +80,7 @@ impl Data {
 
 /// What to vary, over what.
 #[derive(Clone, Debug)]
-pub struct Wanted {
+pub struct SweepRequest {
     /// Data sets, and what each is evaluated against: `lidar`, `exact` or nothing.
     pub data: Vec<(Data, Option<&'static str>)>,
     /// Sweeps.
@@ -122,19 +122,19 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Spreads out what is wanted.
-    pub fn new(wanted: &Wanted) -> Self {
+    /// Spreads out what is request.
+    pub fn new(request: &SweepRequest) -> Self {
         let mut plan = Self { points: Vec::new(), runs: BTreeMap::new() };
-        for &kind in &wanted.kinds {
-            for (data, reference) in &wanted.data {
-                for (value, more, late) in values(kind, wanted, data) {
-                    let mut arguments = wanted.common.clone();
+        for &kind in &request.kinds {
+            for (data, reference) in &request.data {
+                for (value, more, late) in values(kind, request, data) {
+                    let mut arguments = request.common.clone();
                     arguments.extend(more);
                     if let Some(reference) = reference {
                         arguments.extend(["--evaluate", reference].map(str::to_owned));
                     }
                     if late {
-                        let [lag, delay] = wanted.lag_and_delay;
+                        let [lag, delay] = request.lag_and_delay;
                         arguments.extend(["--set".to_owned(), format!("volume.prune_lag={lag}")]);
                         arguments.extend(["--evaluation-delay".to_owned(), delay.to_string()]);
                     }
@@ -182,13 +182,13 @@ impl Plan {
 }
 
 /// Values of one sweep on one data set: as shown, as arguments, and whether the map is looked at late.
-fn values(kind: Kind, wanted: &Wanted, data: &Data) -> Vec<(String, Vec<String>, bool)> {
+fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Vec<String>, bool)> {
     let one = |value: &dyn std::fmt::Display, arguments: &[&str], late: bool| {
         (value.to_string(), arguments.iter().map(|argument| (*argument).to_owned()).collect::<Vec<_>>(), late)
     };
     // The defaults are left unsaid, so that sweeps share the runs they have in common.
     match kind {
-        Kind::PruneWeight => wanted
+        Kind::PruneWeight => request
             .weights
             .iter()
             .map(|weight| match weight {
@@ -196,7 +196,7 @@ fn values(kind: Kind, wanted: &Wanted, data: &Data) -> Vec<(String, Vec<String>,
                 _ => one(weight, &["--set", &format!("volume.prune_weight={weight}")], true),
             })
             .collect(),
-        Kind::FrameRate => wanted
+        Kind::FrameRate => request
             .rates
             .iter()
             .map(|rate| match rate {
@@ -204,7 +204,7 @@ fn values(kind: Kind, wanted: &Wanted, data: &Data) -> Vec<(String, Vec<String>,
                 _ => one(rate, &["--fuse-every", &rate.to_string()], true),
             })
             .collect(),
-        Kind::Scale => wanted
+        Kind::Scale => request
             .scales
             .iter()
             .map(|percent| match percent {
@@ -214,7 +214,7 @@ fn values(kind: Kind, wanted: &Wanted, data: &Data) -> Vec<(String, Vec<String>,
             .collect(),
         Kind::Depth => {
             let fits = |source: &&String| source.as_str() != "exact" || data.path.is_none();
-            wanted
+            request
                 .depths
                 .iter()
                 .filter(fits)

@@ -1,7 +1,7 @@
-//! What is kept of a run: its summary, and per frame what boxes and curves are drawn of. One file a run, written at once or not at all.
+//! The result of a run: its summary, and per frame the numbers that boxes and curves show. One file a run, written atomically.
 
 use super::SweepError;
-use crate::evaluate::lidar::{EvaluatedFrame, Layer};
+use crate::evaluate::reference::{EvaluatedFrame, Region};
 use crate::report::Summary;
 use crate::run::{RunRecord, write_whole};
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use std::path::Path;
 /// A finished run of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunResult {
-    /// What made it: arguments without path and threads.
+    /// Its arguments, without path and threads.
     pub arguments: Vec<String>,
     /// `summary.json` of the run.
     pub summary: Value,
@@ -22,7 +22,7 @@ pub struct RunResult {
     pub blocks: Vec<u32>,
 }
 
-/// Shares of one evaluated frame, static layer.
+/// Accuracy and completeness of one evaluated frame, static region.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameSample {
     /// Number of the frame.
@@ -35,17 +35,17 @@ pub struct FrameSample {
 
 impl FrameSample {
     fn of(frame: &EvaluatedFrame) -> Self {
-        let tally = &frame.layers[Layer::Static as usize];
+        let counts = &frame.regions[Region::Static as usize];
         Self {
             frame: frame.frame,
-            accuracy: [0, 1].map(|source| tally.accuracy(source, 0)),
-            completeness: [0, 1].map(|source| tally.completeness(source)),
+            accuracy: [0, 1].map(|source| counts.accuracy(source, 0)),
+            completeness: [0, 1].map(|source| counts.completeness(source)),
         }
     }
 }
 
 impl RunResult {
-    /// What is kept of a run.
+    /// Of a finished run.
     ///
     /// # Errors
     /// The summary cannot be turned into JSON.
@@ -53,8 +53,8 @@ impl RunResult {
         Ok(Self {
             arguments: arguments.to_vec(),
             summary: serde_json::to_value(Summary::of(run))?,
-            samples: run.lidar.iter().flat_map(|lidar| &lidar.frames).map(FrameSample::of).collect(),
-            blocks: run.rows.iter().map(|row| row.report.blocks.used).collect(),
+            samples: run.sections.reference.iter().flat_map(|reference| &reference.frames).map(FrameSample::of).collect(),
+            blocks: run.frames.iter().map(|row| row.report.blocks.used).collect(),
         })
     }
 
@@ -71,7 +71,7 @@ impl RunResult {
         serde_json::from_str(&text).map(Some).map_err(|error| SweepError::Foreign { path: path.to_path_buf(), reason: error.to_string() })
     }
 
-    /// Writes it beside its place, then puts it there.
+    /// Writes it atomically.
     ///
     /// # Errors
     /// The disk refuses.
@@ -81,18 +81,18 @@ impl RunResult {
         Ok(write_whole(path, |file| file.write_all(&text))?)
     }
 
-    /// A share by layer (`static`, `dynamic`), source (`input`, `fused`) and name.
-    pub fn share(&self, layer: &str, source: &str, name: &str) -> Option<f64> {
-        self.summary["lidar"][layer][source][name].as_f64()
+    /// A share by region (`static`, `dynamic`), source (`input`, `fused`) and name.
+    pub fn share(&self, region: &str, source: &str, name: &str) -> Option<f64> {
+        self.summary["lidar"][region][source][name].as_f64()
     }
 
-    /// Whether the depth tracker was lost.
-    pub fn lost(&self) -> Option<u64> {
+    /// Frames the depth tracker lost, if any.
+    pub fn tracking_failures(&self) -> Option<u64> {
         self.summary["egomotion"]["tracking_failures"].as_u64().filter(|failures| *failures > 0)
     }
 
-    /// Blocks of the map in the end.
-    pub fn blocks_in_the_end(&self) -> Option<f64> {
+    /// Blocks of the map at the end.
+    pub fn final_blocks(&self) -> Option<f64> {
         self.summary["map"]["blocks"].as_f64()
     }
 }

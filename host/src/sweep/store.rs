@@ -1,4 +1,4 @@
-//! A sweep's folder: the plan, a file for each finished run, tables and page drawn of what is there.
+//! A sweep's folder: the plan, a file for each finished run, tables and page of the results so far.
 
 use super::{Plan, RunResult, SweepError, page, table};
 use crate::run::{FolderError, write_whole};
@@ -16,7 +16,7 @@ pub struct SweepFolder {
 }
 
 impl SweepFolder {
-    /// Opens a folder for a plan, or makes it.
+    /// Opens the folder of a plan, or creates it.
     ///
     /// # Errors
     /// It belongs to another plan, or the disk refuses.
@@ -40,7 +40,7 @@ impl SweepFolder {
     /// The plan in the folder.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no plan.
     pub fn plan(&self) -> Result<Plan, SweepError> {
         let path = self.root.join("plan.json");
         let text = std::fs::read_to_string(&path).map_err(|source| SweepError::Read { path: path.clone(), source })?;
@@ -52,22 +52,22 @@ impl SweepFolder {
         self.root.join("runs").join(format!("{key}.json"))
     }
 
-    /// A place for a run under way.
-    pub fn workshop(&self, key: &str) -> PathBuf {
+    /// Scratch directory of a run.
+    pub fn scratch_dir(&self, key: &str) -> PathBuf {
         self.root.join("runs").join(key)
     }
 
-    /// All results there are.
+    /// All results so far.
     ///
     /// # Errors
-    /// A result cannot be read, or was made by other arguments.
+    /// A result cannot be read, or is of other arguments.
     pub fn results(&self, plan: &Plan) -> Result<Results, SweepError> {
         let mut results = Results::new();
         for (key, arguments) in &plan.runs {
             let path = self.result(key);
             if let Some(result) = RunResult::read(&path)? {
                 if result.arguments != *arguments {
-                    return Err(SweepError::Foreign { path, reason: "it was made by other arguments".to_owned() });
+                    return Err(SweepError::Foreign { path, reason: "it is of other arguments".to_owned() });
                 }
                 results.insert(key.clone(), result);
             }
@@ -81,17 +81,15 @@ impl SweepFolder {
     /// The disk refuses.
     pub fn draw(&self, plan: &Plan, results: &Results) -> Result<PathBuf, SweepError> {
         for kind in plan.kinds() {
-            write_whole(&self.root.join(format!("{}.csv", kind.name())), |file| {
-                file.write_all(table::csv(plan, kind, results).as_bytes())
-            })?;
+            write_whole(&self.root.join(format!("{}.csv", kind.name())), |file| file.write_all(&table::csv(plan, kind, results)?))?;
         }
         let page = self.root.join("report.html");
-        write_whole(&page, |file| file.write_all(page::html(plan, results).as_bytes()))?;
+        write_whole(&page, |file| file.write_all(page::html(plan, results).into_string().as_bytes()))?;
         Ok(page)
     }
 }
 
-/// Puts the parts made on several machines together in `target`.
+/// Merges parts made on several machines into `target`.
 ///
 /// # Errors
 /// The parts belong to different plans, or have different results of one run.

@@ -1,54 +1,88 @@
 //! A sweep as CSV.
 
-use super::{Kind, Plan, Results};
+use super::{Kind, Plan, Point, Results, RunResult};
+use serde::Serialize;
 use serde_json::Value;
-use std::fmt::Write;
+use std::io;
 
-/// One row a point; empty cells where a value is not known, all of them where the run is still to be made.
-pub fn csv(plan: &Plan, kind: Kind, results: &Results) -> String {
-    let mut out = "data,value,run,frames,reference,evaluated".to_owned();
-    for layer in ["static", "dynamic"] {
-        for source in ["input", "fused"] {
-            for name in ["accuracy", "completeness", "f1"] {
-                let _ = write!(out, ",{layer}_{source}_{name}");
-            }
-        }
-    }
-    out += ",map_blocks,map_bytes,triangles,swept_triangles,t_err_percent,ate_m,held_frames,tracking_failures,tracking,digest\n";
+/// One point. Cells are empty where a value is unknown, all of them where the run is missing.
+#[derive(Serialize)]
+struct PointColumns<'a> {
+    data: &'a str,
+    value: &'a str,
+    run: &'a str,
+    frames: Option<u64>,
+    reference: Option<&'a str>,
+    evaluated: Option<u64>,
+    static_input_accuracy: Option<f64>,
+    static_input_completeness: Option<f64>,
+    static_input_f1: Option<f64>,
+    static_fused_accuracy: Option<f64>,
+    static_fused_completeness: Option<f64>,
+    static_fused_f1: Option<f64>,
+    dynamic_input_accuracy: Option<f64>,
+    dynamic_input_completeness: Option<f64>,
+    dynamic_input_f1: Option<f64>,
+    dynamic_fused_accuracy: Option<f64>,
+    dynamic_fused_completeness: Option<f64>,
+    dynamic_fused_f1: Option<f64>,
+    map_blocks: Option<u64>,
+    map_bytes: Option<u64>,
+    triangles: Option<u64>,
+    swept_triangles: Option<u64>,
+    t_err_percent: Option<f64>,
+    ate_m: Option<f64>,
+    held_frames: Option<u64>,
+    tracking_failures: Option<u64>,
+    tracking: Option<&'a str>,
+    digest: Option<&'a str>,
+}
+
+/// The points of one sweep.
+///
+/// # Errors
+/// A row cannot be written.
+pub fn csv(plan: &Plan, kind: Kind, results: &Results) -> io::Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
     for point in plan.points.iter().filter(|point| point.kind == kind) {
-        let result = results.get(&point.run);
-        let at = |path: &[&str]| -> String {
-            let value = result.map(|result| path.iter().fold(&result.summary, |value, key| &value[*key]));
-            match value {
-                Some(Value::String(text)) => text.clone(),
-                Some(Value::Number(number)) => number.to_string(),
-                _ => String::new(),
-            }
-        };
-        // Values are words and numbers of our own, without commas but for those of a method's name.
-        let _ = write!(out, "{},{},{},{}", point.data, point.value.replace(',', ""), point.run, at(&["frames"]));
-        let _ = write!(out, ",{},{}", at(&["lidar", "source"]), at(&["lidar", "frames"]));
-        for layer in ["static", "dynamic"] {
-            for source in ["input", "fused"] {
-                for name in ["accuracy", "completeness", "f1"] {
-                    let _ = write!(out, ",{}", at(&["lidar", layer, source, name]));
-                }
-            }
-        }
-        for path in [
-            ["map", "blocks"],
-            ["map", "bytes"],
-            ["map", "triangles"],
-            ["map", "swept_triangles"],
-            ["egomotion", "t_err_percent"],
-            ["egomotion", "ate_m"],
-            ["egomotion", "held_frames"],
-            ["egomotion", "tracking_failures"],
-            ["egomotion", "status"],
-        ] {
-            let _ = write!(out, ",{}", at(&path));
-        }
-        let _ = writeln!(out, ",{}", at(&["digest"]));
+        writer.serialize(columns(point, results.get(&point.run))).map_err(io::Error::other)?;
     }
-    out
+    writer.into_inner().map_err(|error| io::Error::other(error.to_string()))
+}
+
+fn columns<'a>(point: &'a Point, result: Option<&'a RunResult>) -> PointColumns<'a> {
+    let value = |group: &str, name: &str| -> Option<&'a Value> { result?.summary.get(group)?.get(name) };
+    let number = |group: &str, name: &str| value(group, name).and_then(Value::as_f64);
+    let whole = |group: &str, name: &str| value(group, name).and_then(Value::as_u64);
+    let share = |region: &str, source: &str, name: &str| result?.share(region, source, name);
+    PointColumns {
+        data: &point.data,
+        value: &point.value,
+        run: &point.run,
+        frames: result.and_then(|result| result.summary.get("frames")?.as_u64()),
+        reference: value("lidar", "source").and_then(Value::as_str),
+        evaluated: whole("lidar", "frames"),
+        static_input_accuracy: share("static", "input", "accuracy"),
+        static_input_completeness: share("static", "input", "completeness"),
+        static_input_f1: share("static", "input", "f1"),
+        static_fused_accuracy: share("static", "fused", "accuracy"),
+        static_fused_completeness: share("static", "fused", "completeness"),
+        static_fused_f1: share("static", "fused", "f1"),
+        dynamic_input_accuracy: share("dynamic", "input", "accuracy"),
+        dynamic_input_completeness: share("dynamic", "input", "completeness"),
+        dynamic_input_f1: share("dynamic", "input", "f1"),
+        dynamic_fused_accuracy: share("dynamic", "fused", "accuracy"),
+        dynamic_fused_completeness: share("dynamic", "fused", "completeness"),
+        dynamic_fused_f1: share("dynamic", "fused", "f1"),
+        map_blocks: whole("map", "blocks"),
+        map_bytes: whole("map", "bytes"),
+        triangles: whole("map", "triangles"),
+        swept_triangles: whole("map", "swept_triangles"),
+        t_err_percent: number("egomotion", "t_err_percent"),
+        ate_m: number("egomotion", "ate_m"),
+        held_frames: whole("egomotion", "held_frames"),
+        tracking_failures: whole("egomotion", "tracking_failures"),
+        tracking: value("egomotion", "status").and_then(Value::as_str),
+        digest: result.and_then(|result| result.summary.get("digest")?.as_str()),
+    }
 }

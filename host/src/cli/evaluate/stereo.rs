@@ -1,9 +1,10 @@
 //! `dynvox evaluate stereo`.
 
 use crate::cli::settings::Settings;
-use crate::evaluate::stereo::{BAD_PX, StereoFigures, StereoPair, StereoTally, filled, find_stereo_set};
+use crate::evaluate::stereo::{BAD_PX, StereoCounts, StereoFigures, StereoPair, filled, find_stereo_set};
 use crate::formats::{Image, read_picture, read_png_deep, read_png_u16};
-use crate::run::{HostSlab, Threads};
+use crate::run::Threads;
+use crate::slab::HostSlab;
 use anyhow::bail;
 use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
@@ -50,15 +51,15 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
         bail!("--threads begins at 1. Give a larger number");
     }
     let threads = Threads::new(args.threads)?;
-    let mut tallies = [StereoTally::default(); REGIONS.len()];
+    let mut counts = [StereoCounts::default(); REGIONS.len()];
     for pair in &set.pairs {
         let given = match &args.disparity {
             Some(folder) => read_png_deep(&folder.join(format!("{}.png", pair.name)))?,
             None => threads.run(|| matched(pair, &config, &threads))?,
         };
-        judge(pair, &given, &mut tallies)?;
+        judge(pair, &given, &mut counts)?;
     }
-    let regions = REGIONS.into_iter().zip(tallies).filter_map(|(name, tally)| Some((name, tally.figures()?))).collect();
+    let regions = REGIONS.into_iter().zip(counts).filter_map(|(name, counts)| Some((name, counts.figures()?))).collect();
     let found = Found { benchmark: set.name, pairs: set.pairs.len(), regions };
     if args.json {
         println!("{}", serde_json::to_string_pretty(&found)?);
@@ -89,7 +90,7 @@ fn matched(pair: &StereoPair, config: &StereoConfig, threads: &Threads) -> anyho
 }
 
 /// Counts a pair in every region it has truth for.
-fn judge(pair: &StereoPair, given: &Image<u16>, tallies: &mut [StereoTally; REGIONS.len()]) -> anyhow::Result<()> {
+fn judge(pair: &StereoPair, given: &Image<u16>, counts: &mut [StereoCounts; REGIONS.len()]) -> anyhow::Result<()> {
     let same = |path: &Path, image: &Image<u16>| {
         if (image.width(), image.height()) == (given.width(), given.height()) {
             return Ok(());
@@ -102,8 +103,8 @@ fn judge(pair: &StereoPair, given: &Image<u16>, tallies: &mut [StereoTally; REGI
     if let (Some(path), Some(objects)) = (&pair.objects, &objects) {
         same(path, objects)?;
     }
-    for (path, tallies) in pair.truth.iter().zip(tallies.chunks_exact_mut(REGIONS.len() / 2)) {
-        let (Some(path), [all, background, foreground]) = (path, tallies) else { continue };
+    for (path, counts) in pair.truth.iter().zip(counts.chunks_exact_mut(REGIONS.len() / 2)) {
+        let (Some(path), [all, background, foreground]) = (path, counts) else { continue };
         let truth = read_png_deep(path)?;
         same(path, &truth)?;
         all.add(&truth, given, &whole, |_| true);

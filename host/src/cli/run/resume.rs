@@ -1,13 +1,12 @@
-//! `dynvox run --resume`: a run that was stopped goes on as it was begun.
+//! `dynvox run --resume`: an interrupted run continues from its last snapshot, as it was started.
 
-use super::{RunArgs, finish, introduce, plan};
-
-use crate::run::{Begun, Plan, RunFolder, Snapshots, Stopped};
+use super::{RunArgs, finish, plan, print_header};
+use crate::run::{Checkpoint, CheckpointPlan, Plan, RunFolder, RunManifest};
 use anyhow::{Context, bail};
 use std::path::Path;
 
-/// Arguments a run is begun with; with `--resume` they are those it was begun with. The others change nothing in the result.
-pub const BEGUN: [&str; 29] = [
+/// Arguments that are fixed when a run is resumed. The others do not change the result.
+pub const FIXED_ARGUMENTS: [&str; 29] = [
     "path",
     "sequence",
     "dataset",
@@ -39,40 +38,41 @@ pub const BEGUN: [&str; 29] = [
     "overwrite",
 ];
 
-/// Snapshots of the run this command line begins.
-pub fn snapshots(plan: &Plan, every: usize) -> anyhow::Result<Snapshots> {
+/// The checkpoints of the run that this command line starts.
+pub fn checkpoints(plan: &Plan, every: usize) -> anyhow::Result<CheckpointPlan> {
     if every == 0 {
-        bail!("--snapshot-every begins at 1. Give a larger number");
+        bail!("--snapshot-every must be at least 1. Give a larger number");
     }
-    // Behind the program's name and `run`.
-    let begun = Begun::of(plan, std::env::args_os().skip(2), &std::env::current_dir()?)?;
-    Ok(Snapshots { every, begun })
+    // After the program's name and `run`.
+    let manifest = RunManifest::of(plan, std::env::args_os().skip(2), &std::env::current_dir()?)?;
+    Ok(CheckpointPlan { every, manifest })
 }
 
-/// Lets the run go on that was to end in `target`.
+/// Resumes the interrupted run to `target`.
 pub fn run(args: &RunArgs, target: &Path) -> anyhow::Result<()> {
     let target = std::path::absolute(target)?;
     let folder = RunFolder::reopen(&target)?;
-    let stopped = Stopped::read(&folder)?;
-    let begun = stopped.begun().clone();
-    // Paths among the words begin where they were given.
-    let place = begun.place();
-    std::env::set_current_dir(&place).with_context(|| format!("the run was begun in {}, which cannot be entered", place.display()))?;
-    let line: Vec<String> = std::iter::once("dynvox".to_owned()).chain(begun.words().iter().cloned()).collect();
-    let mut as_begun = RunArgs::of(&line).context("the run was begun by another dynvox: this one does not take its command line")?;
-    as_begun.threads = args.threads.or(as_begun.threads);
-    as_begun.rss_limit_mib = args.rss_limit_mib.or(as_begun.rss_limit_mib);
-    as_begun.snapshot_every = args.snapshot_every.or(as_begun.snapshot_every);
-    (as_begun.json, as_begun.quiet) = (args.json, args.quiet);
-    let mut plan = plan(&as_begun)?;
-    begun.require(&plan)?;
-    folder.has_room(as_begun.overwrite)?;
-    plan.snapshots = as_begun.snapshot_every.map(|every| Snapshots { every, begun });
+    let checkpoint = Checkpoint::read(&folder)?;
+    let manifest = checkpoint.manifest().clone();
+    // Relative paths among the arguments start at the working directory of the run.
+    let working_dir = manifest.working_dir();
+    std::env::set_current_dir(&working_dir)
+        .with_context(|| format!("the run was started in {}, which cannot be entered", working_dir.display()))?;
+    let line: Vec<String> = std::iter::once("dynvox".to_owned()).chain(manifest.arguments().iter().cloned()).collect();
+    let mut original = RunArgs::parse(&line).context("another dynvox started the run: this one does not accept its command line")?;
+    original.threads = args.threads.or(original.threads);
+    original.rss_limit_mib = args.rss_limit_mib.or(original.rss_limit_mib);
+    original.snapshot_every = args.snapshot_every.or(original.snapshot_every);
+    (original.json, original.quiet) = (args.json, args.quiet);
+    let mut plan = plan(&original)?;
+    manifest.require(&plan)?;
+    folder.check_target(original.overwrite)?;
+    plan.checkpoints = original.snapshot_every.map(|every| CheckpointPlan { every, manifest });
     if !args.silent() {
-        introduce(&plan);
-        eprintln!("note: goes on behind frame {} of {}", stopped.frames(), plan.indices.len());
+        print_header(&plan);
+        eprintln!("note: resuming after frame {} of {}", checkpoint.frames(), plan.indices.len());
     }
-    finish(&as_begun, &plan, folder, Some(stopped))
+    finish(&original, &plan, folder, Some(checkpoint))
 }
 
 #[cfg(test)]
@@ -81,12 +81,12 @@ mod tests {
     use clap::CommandFactory;
 
     #[test]
-    fn every_argument_is_either_one_a_run_is_begun_with_or_one_that_may_be_given_anew() {
-        let anew = ["resume", "threads", "rss_limit_mib", "snapshot_every", "json", "quiet"];
-        let mut all: Vec<String> = super::super::Alone::command().get_arguments().map(|one| one.get_id().to_string()).collect();
+    fn every_argument_is_either_fixed_or_may_change_on_resume() {
+        let changeable = ["resume", "threads", "rss_limit_mib", "snapshot_every", "json", "quiet"];
+        let mut all: Vec<String> = super::super::RunCommand::command().get_arguments().map(|one| one.get_id().to_string()).collect();
         all.sort();
-        let mut said: Vec<&str> = BEGUN.into_iter().chain(anew).collect();
-        said.sort();
-        assert_eq!(all, said);
+        let mut listed: Vec<&str> = FIXED_ARGUMENTS.into_iter().chain(changeable).collect();
+        listed.sort();
+        assert_eq!(all, listed);
     }
 }

@@ -1,35 +1,36 @@
 //! Errors over all tracks.
 
 use super::association::AssociationFigures;
-use super::{FAR_M, Judged, Late, NEAR_M, TrackErrors, median};
+use super::{FAR_M, LateStates, NEAR_M, TrackComparison, TrackErrors};
+use crate::evaluate::quantile::median;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Errors over all tracks.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectFigures {
-    /// Tracks that belong to a true thing.
+    /// Tracks that belong to a true object.
     pub tracks: usize,
-    /// How well tracks stay with things.
+    /// Association of tracks with objects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub association: Option<AssociationFigures>,
     /// Frames by truth (static, dynamic) and state (uncertain, static, dynamic).
     pub confusion: [[u32; 3]; 2],
-    /// Tracks with a state not right in time, within [`FAR_M`].
+    /// Tracks with a late motion state, within [`FAR_M`].
     pub tracks_late: usize,
-    /// Tracks whose state was due within [`NEAR_M`].
-    pub late_near: Late,
-    /// Tracks whose state was due from [`NEAR_M`] to [`FAR_M`].
-    pub late_far: Late,
-    /// Changes between static and dynamic of things that did not change.
+    /// Late motion states within [`NEAR_M`].
+    pub late_near: LateStates,
+    /// Late motion states from [`NEAR_M`] to [`FAR_M`].
+    pub late_far: LateStates,
+    /// Changes between static and dynamic of objects whose true state did not change.
     pub flips: u32,
-    /// Moving things within [`NEAR_M`]: frames, median translation error (m) and rotation error (degrees).
+    /// Moving objects within [`NEAR_M`]: frames, median translation error (m) and rotation error (degrees).
     pub moving_near: Medians,
-    /// Moving things from [`NEAR_M`] to [`FAR_M`].
+    /// Moving objects from [`NEAR_M`] to [`FAR_M`].
     pub moving_far: Medians,
-    /// Standing things within [`NEAR_M`].
+    /// Static objects within [`NEAR_M`].
     pub standing_near: Medians,
-    /// Most frames for which a standing thing was called dynamic.
+    /// Most frames in which one static object was classified as dynamic.
     pub false_dynamic_frames: u32,
 }
 
@@ -48,10 +49,10 @@ pub struct Medians {
 
 impl ObjectFigures {
     /// Sums up; `None` when nothing was compared.
-    pub(super) fn of(judged: &BTreeMap<u32, Vec<Judged>>, association: Option<AssociationFigures>) -> Option<Self> {
-        let tracks: Vec<TrackErrors> = judged.values().map(|judged| TrackErrors::of(judged)).collect();
+    pub(super) fn of(comparisons: &BTreeMap<u32, Vec<TrackComparison>>, association: Option<AssociationFigures>) -> Option<Self> {
+        let tracks: Vec<TrackErrors> = comparisons.values().map(|comparisons| TrackErrors::of(comparisons)).collect();
         let medians = |moving: bool, from_m: f64, to_m: f64| {
-            let all = judged.values().flatten();
+            let all = comparisons.values().flatten();
             let within = all.filter(|one| one.moving == moving && (from_m..to_m).contains(&one.distance_m));
             let errors: Vec<[f64; 2]> = within.filter_map(|one| one.error).collect();
             let of = |at: usize| median(errors.iter().map(|error| error[at]));
@@ -61,8 +62,8 @@ impl ObjectFigures {
             tracks: tracks.len(),
             association,
             tracks_late: tracks.iter().filter(|track| track.late_frames > 0).count(),
-            late_near: Late::of(judged, 0.0..NEAR_M),
-            late_far: Late::of(judged, NEAR_M..FAR_M),
+            late_near: LateStates::of(comparisons, 0.0..NEAR_M),
+            late_far: LateStates::of(comparisons, NEAR_M..FAR_M),
             flips: tracks.iter().map(|track| track.flips).sum(),
             moving_near: medians(true, 0.0, NEAR_M),
             moving_far: medians(true, NEAR_M, FAR_M),

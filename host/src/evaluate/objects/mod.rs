@@ -1,11 +1,11 @@
-//! Tracks against truth: states, motions, speeds, and how well they stay with their things.
+//! Tracks against ground truth: motion states, motions, speeds, association.
 //!
-//! A track seen in a frame belongs to the true thing whose box its own overlaps most, at least by [`OVERLAP_MIN`]. Its motion since the last
-//! frame is compared in the thing's own frame, as DynoSAM's *motion error* (Morris, Wang, Kliniewski, Ila, *DynoSAM*, 2025; before it Zhang et al.,
+//! A track seen in a frame belongs to the true object whose box its own overlaps most, at least by [`OVERLAP_MIN`]. Its motion since the
+//! last frame is compared in the object's own frame, as DynoSAM's *motion error* (Morris, Wang, Kliniewski, Ila, *DynoSAM*, 2025; before it Zhang et al.,
 //! *VDO-SLAM*, 2020): `E = (true_before^-1 true_now)^-1 (true_before^-1 M true_before)`, with `M` the estimated motion over ground, carried into the
 //! truth's world by the camera's two poses, so that the camera's drift does not count. Both factors are motions of a rigid body: the difference
-//! of two places in the camera, which the original took, lacks what a turn does to a place. The error's translation is that of the middle of
-//! the thing's foot.
+//! of two positions in the camera, which the original took, ignores the effect of rotation. The error's translation is that of the middle of
+//! the object's foot.
 
 pub mod association;
 mod figures;
@@ -15,7 +15,7 @@ mod tests;
 mod track;
 
 pub use figures::{Medians, ObjectFigures};
-pub use late::Late;
+pub use late::LateStates;
 pub use track::TrackErrors;
 
 use crate::input::{ObjectsTruth, TrueObject};
@@ -26,30 +26,30 @@ use dynvox_core::tracking::{State, TrackReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Least overlap of a track's box with a thing's.
+/// Least overlap of a track's box with an object's.
 pub const OVERLAP_MIN: f32 = 0.4;
-/// Frames a state may take to become right.
+/// Frames a motion state may take to become right.
 pub const SETTLING_FRAMES: u32 = 5;
-/// Up to where a thing is near, and up to where it is far, m.
+/// Largest distance of a near object, m.
 pub const NEAR_M: f64 = 20.0;
-/// See [`NEAR_M`].
+/// Largest distance of a far object, m.
 pub const FAR_M: f64 = 32.0;
 
-/// Width or height below which little can be known of a thing, px.
+/// Width or height below which an object counts as small, px.
 pub const SMALL_PX: i32 = 30;
 
-/// How much of a thing a picture shows.
+/// How much of an object the image shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Showing {
-    /// All that nothing hides, and enough of it.
+pub enum Visibility {
+    /// It lies within the image and is not small.
     Whole,
-    /// Less than [`SMALL_PX`] of it across or down.
+    /// Less than [`SMALL_PX`] wide or high.
     Small,
-    /// It reaches the picture's border.
+    /// It touches the image border.
     Cut,
 }
 
-impl Showing {
+impl Visibility {
     /// Name in files.
     pub const fn name(self) -> &'static str {
         match self {
@@ -59,11 +59,11 @@ impl Showing {
         }
     }
 
-    fn of(thing: &PixelBox, size: (usize, usize)) -> Self {
-        let (right, bottom) = (thing.left + thing.width, thing.top + thing.height);
-        if thing.left <= 0 || thing.top <= 0 || right >= size.0 as i32 || bottom >= size.1 as i32 {
+    fn of(object: &PixelBox, size: (usize, usize)) -> Self {
+        let (right, bottom) = (object.left + object.width, object.top + object.height);
+        if object.left <= 0 || object.top <= 0 || right >= size.0 as i32 || bottom >= size.1 as i32 {
             Self::Cut
-        } else if thing.width < SMALL_PX || thing.height < SMALL_PX {
+        } else if object.width < SMALL_PX || object.height < SMALL_PX {
             Self::Small
         } else {
             Self::Whole
@@ -71,24 +71,24 @@ impl Showing {
     }
 }
 
-/// A track in a frame, against its truth.
+/// A track in a frame, compared with its true object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Judged {
+pub struct TrackComparison {
     /// The frame's position in the run.
     pub at: usize,
-    /// Number of the true thing.
+    /// Number of the true object.
     pub truth: u32,
     /// Whether it moves.
     pub moving: bool,
-    /// What the track's state is.
+    /// The track's motion state.
     pub state: State,
-    /// Frames since it was first seen and since the truth last changed.
+    /// Frames since the track began and since the true state last changed.
     pub settled: u32,
-    /// Distance of the true thing along the camera's axis, m.
+    /// Distance of the true object along the camera's axis, m.
     pub distance_m: f64,
-    /// How much of the true thing is in the picture.
-    pub view: Showing,
-    /// Error of the motion, m and degrees; `None` where none was estimated or the thing was not there before.
+    /// How much of the true object is in the image.
+    pub view: Visibility,
+    /// Error of the motion, m and degrees; `None` where none was estimated or the object was not there before.
     pub error: Option<[f64; 2]>,
     /// True speed, m/s.
     pub true_speed_m_s: f64,
@@ -96,13 +96,13 @@ pub struct Judged {
     pub speed_m_s: Option<f64>,
 }
 
-impl Judged {
-    /// Whether the state has had its time to settle.
+impl TrackComparison {
+    /// Whether the state should be right by now.
     fn is_due(&self) -> bool {
         self.settled >= SETTLING_FRAMES
     }
 
-    /// Whether the state is due and not the true one.
+    /// Whether the state should be right by now and is not.
     fn is_late(&self) -> bool {
         self.is_due() && self.state != if self.moving { State::Dynamic } else { State::Static }
     }
@@ -114,16 +114,16 @@ pub struct ObjectErrors {
     frame: u32,
     /// Poses of the frame before.
     before: BTreeMap<u32, Transform>,
-    /// For each true thing whether it moved when last seen, and since which frame.
+    /// For each true object whether it moved when last seen, and since which frame.
     truths: BTreeMap<u32, (bool, u32)>,
-    tracks: BTreeMap<u32, Vec<Judged>>,
+    tracks: BTreeMap<u32, Vec<TrackComparison>>,
     first_seen: BTreeMap<u32, u32>,
     association: Association,
 }
 
 impl ObjectErrors {
     /// Compares the tracks seen in a frame, whose images have `size`; call it for every frame. `large_enough` tells which boxes are large
-    /// enough for a detection: of others it is no fault to miss them.
+    /// enough for a detection: others do not count as missed.
     pub fn add(
         &mut self,
         tracks: &[TrackReport],
@@ -133,8 +133,8 @@ impl ObjectErrors {
         large_enough: impl Fn(&PixelBox) -> bool,
     ) {
         let boxes: Vec<(u32, PixelBox)> = tracks.iter().filter(|track| track.seen).map(|track| (track.id, track.pixels)).collect();
-        let things: Vec<_> = truth.objects.iter().map(|one| (one.id, one.pixels, large_enough(&one.pixels))).collect();
-        self.association.add(&boxes, &things, &truth.unlabelled);
+        let objects: Vec<_> = truth.objects.iter().map(|one| (one.id, one.pixels, large_enough(&one.pixels))).collect();
+        self.association.add(&boxes, &objects, &truth.unlabelled);
         let frame = self.frame;
         for object in &truth.objects {
             let known = self.truths.entry(object.id).or_insert((object.moving, frame));
@@ -144,9 +144,7 @@ impl ObjectErrors {
         }
         let t_true_estimated = truth.t_world_camera * t_world_camera.inverse();
         for track in tracks.iter().filter(|track| track.seen) {
-            let overlap = |object: &&TrueObject| object.pixels.overlap(&track.pixels);
-            let best = truth.objects.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b)));
-            let Some(object) = best.filter(|object| overlap(object) >= OVERLAP_MIN) else { continue };
+            let Some(object) = true_object(&track.pixels, truth) else { continue };
             let first = *self.first_seen.entry(track.id).or_insert(frame);
             let changed = self.truths.get(&object.id).map_or(frame, |known| known.1);
             let estimated = track.measured || track.state != State::Uncertain;
@@ -154,14 +152,14 @@ impl ObjectErrors {
                 let estimate = t_true_estimated * track.motion_world * t_true_estimated.inverse();
                 motion_error(before, &object.t_world_object, &estimate)
             });
-            self.tracks.entry(track.id).or_default().push(Judged {
+            self.tracks.entry(track.id).or_default().push(TrackComparison {
                 at: frame as usize,
                 truth: object.id,
                 moving: object.moving,
                 state: track.state,
                 settled: frame - first.max(changed),
                 distance_m: (truth.t_world_camera.inverse() * object.t_world_object).translation_m[2],
-                view: Showing::of(&object.pixels, size),
+                view: Visibility::of(&object.pixels, size),
                 error,
                 true_speed_m_s: object.speed_m_s,
                 speed_m_s: track.speed_m_s.map(|[speed, _]| f64::from(speed)),
@@ -171,19 +169,15 @@ impl ObjectErrors {
         self.frame += 1;
     }
 
-    /// The true thing a track belongs to in the frame added last.
-    pub fn truth_of(&self, track: u32) -> Option<u32> {
-        self.tracks.get(&track)?.last().filter(|judged| judged.at + 1 == self.frame as usize).map(|judged| judged.truth)
-    }
-
     /// Each track's errors, by its number.
     pub fn tracks(&self) -> BTreeMap<u32, TrackErrors> {
-        self.tracks.iter().map(|(&id, judged)| (id, TrackErrors::of(judged))).collect()
+        self.tracks.iter().map(|(&id, comparisons)| (id, TrackErrors::of(comparisons))).collect()
     }
 
     /// Every comparison, by frame and then by track.
-    pub fn rows(&self) -> Vec<(u32, Judged)> {
-        let mut rows: Vec<(u32, Judged)> = self.tracks.iter().flat_map(|(&id, judged)| judged.iter().map(move |one| (id, *one))).collect();
+    pub fn comparisons(&self) -> Vec<(u32, TrackComparison)> {
+        let mut rows: Vec<(u32, TrackComparison)> =
+            self.tracks.iter().flat_map(|(&id, comparisons)| comparisons.iter().map(move |one| (id, *one))).collect();
         rows.sort_by_key(|(id, one)| (one.at, *id));
         rows
     }
@@ -194,19 +188,18 @@ impl ObjectErrors {
     }
 }
 
-/// Error of a motion over ground in the thing's frame: translation in m, rotation in degrees.
+/// The true object that a box belongs to: the one it overlaps most, at least by [`OVERLAP_MIN`].
+pub fn true_object<'t>(pixels: &PixelBox, truth: &'t ObjectsTruth) -> Option<&'t TrueObject> {
+    let overlap = |object: &&TrueObject| object.pixels.overlap(pixels);
+    truth.objects.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))).filter(|object| overlap(object) >= OVERLAP_MIN)
+}
+
+/// Error of a motion over ground in the object's frame: translation in m, rotation in degrees.
 fn motion_error(before: &Transform, now: &Transform, motion_world: &Transform) -> [f64; 2] {
     let truth = before.inverse() * now;
     let estimate = before.inverse() * motion_world * before;
     let error = truth.inverse() * estimate;
     [error.distance_m(), error.angle_rad().to_degrees()]
-}
-
-/// Median of finite values, the higher of the two in the middle; `None` of none.
-pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// Root mean square of finite values; `None` of none.

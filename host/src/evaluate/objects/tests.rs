@@ -114,7 +114,7 @@ fn a_turning_car_is_judged_as_a_rigid_body() {
 #[test]
 fn every_comparison_is_a_row_in_the_order_of_frames() {
     let errors = drive(&[State::Uncertain, State::Dynamic, State::Dynamic], &[true; 3], &Transform::IDENTITY, &Transform::IDENTITY);
-    let rows = errors.rows();
+    let rows = errors.comparisons();
     assert_eq!(
         rows.iter().map(|(id, one)| (*id, one.at, one.error.is_some())).collect::<Vec<_>>(),
         [(1, 0, false), (1, 1, true), (1, 2, true)]
@@ -127,7 +127,7 @@ fn every_comparison_is_a_row_in_the_order_of_frames() {
 #[test]
 fn late_tracks_are_counted_by_distance_and_by_what_could_be_seen_of_them() {
     use State::{Static as S, Uncertain as U};
-    let one = |settled: u32, distance_m: f64, state: State, view: Showing| Judged {
+    let one = |settled: u32, distance_m: f64, state: State, view: Visibility| TrackComparison {
         at: settled as usize,
         truth: 7,
         moving: false,
@@ -141,24 +141,24 @@ fn late_tracks_are_counted_by_distance_and_by_what_could_be_seen_of_them() {
     };
     let tracks = [
         // Not due yet; then late far away, in time near by.
-        vec![one(4, 28.0, U, Showing::Whole), one(5, 27.0, U, Showing::Whole), one(6, 19.0, S, Showing::Whole)],
-        // Late only while it leaves the picture.
-        vec![one(5, 12.0, S, Showing::Whole), one(6, 11.0, U, Showing::Cut)],
-        // Late while there is little of it, cut once.
-        vec![one(5, 12.0, U, Showing::Small), one(6, 11.0, U, Showing::Cut)],
+        vec![one(4, 28.0, U, Visibility::Whole), one(5, 27.0, U, Visibility::Whole), one(6, 19.0, S, Visibility::Whole)],
+        // LateStates only while it leaves the picture.
+        vec![one(5, 12.0, S, Visibility::Whole), one(6, 11.0, U, Visibility::Cut)],
+        // LateStates while there is little of it, cut once.
+        vec![one(5, 12.0, U, Visibility::Small), one(6, 11.0, U, Visibility::Cut)],
         // Never due, and too far.
-        vec![one(3, 12.0, U, Showing::Whole)],
-        vec![one(9, 32.5, U, Showing::Whole)],
+        vec![one(3, 12.0, U, Visibility::Whole)],
+        vec![one(9, 32.5, U, Visibility::Whole)],
     ];
-    let judged = (1..).zip(tracks).collect();
-    assert_eq!(Late::of(&judged, 0.0..NEAR_M), Late { tracks: 3, late: 2, late_cut: 1, late_small: 1 });
-    assert_eq!(Late::of(&judged, NEAR_M..FAR_M), Late { tracks: 1, late: 1, late_cut: 0, late_small: 0 });
+    let comparisons = (1..).zip(tracks).collect();
+    assert_eq!(LateStates::of(&comparisons, 0.0..NEAR_M), LateStates { tracks: 3, late: 2, late_cut: 1, late_small: 1 });
+    assert_eq!(LateStates::of(&comparisons, NEAR_M..FAR_M), LateStates { tracks: 1, late: 1, late_cut: 0, late_small: 0 });
 }
 
 #[test]
 fn a_thing_at_the_border_is_cut_and_one_of_few_pixels_small() {
-    let of = |left, top, width, height| Showing::of(&PixelBox { left, top, width, height }, SIZE);
-    assert_eq!([of(1, 1, 30, 30), of(1, 1, 638, 190)], [Showing::Whole; 2]);
-    assert_eq!([of(1, 1, 29, 90), of(1, 1, 90, 29)], [Showing::Small; 2]);
-    assert_eq!([of(0, 1, 90, 90), of(1, 0, 9, 9), of(550, 1, 90, 90), of(1, 102, 90, 90)], [Showing::Cut; 4]);
+    let of = |left, top, width, height| Visibility::of(&PixelBox { left, top, width, height }, SIZE);
+    assert_eq!([of(1, 1, 30, 30), of(1, 1, 638, 190)], [Visibility::Whole; 2]);
+    assert_eq!([of(1, 1, 29, 90), of(1, 1, 90, 29)], [Visibility::Small; 2]);
+    assert_eq!([of(0, 1, 90, 90), of(1, 0, 9, 9), of(550, 1, 90, 90), of(1, 102, 90, 90)], [Visibility::Cut; 4]);
 }

@@ -1,6 +1,7 @@
 //! Errors of one track.
 
-use super::{FAR_M, Judged, median, rms};
+use super::{FAR_M, TrackComparison, rms};
+use crate::evaluate::quantile::median;
 use dynvox_core::tracking::State;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -8,15 +9,15 @@ use std::collections::BTreeMap;
 /// A track's errors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackErrors {
-    /// The true thing it belongs to in most frames.
+    /// The true object it belongs to in most frames.
     pub truth: u32,
     /// Frames compared.
     pub frames: usize,
     /// Frames by truth (static, dynamic) and state (uncertain, static, dynamic).
     pub confusion: [[u32; 3]; 2],
-    /// Frames in which the state was not the true one although it had time to settle, within [`FAR_M`].
+    /// Frames in which the motion state should have been right and was not, within [`FAR_M`].
     pub late_frames: u32,
-    /// Changes from static to dynamic or back while the truth stayed the same.
+    /// Changes from static to dynamic or back while the true state stayed the same.
     pub flips: u32,
     /// Motions compared.
     pub motions: usize,
@@ -34,23 +35,23 @@ pub struct TrackErrors {
     pub me_r_rms_deg: Option<f64>,
     /// Median true speed, m/s.
     pub true_speed_m_s: f64,
-    /// Median of the speed's error over the frames in which it is called dynamic, m/s.
+    /// Median of the speed's error over the frames in which it is classified as dynamic, m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_error_m_s: Option<f64>,
     /// Least distance, m.
     pub nearest_m: f64,
-    /// Frames compared, by position in the run, and whether the thing moved.
+    /// Frames compared, by position in the run, and whether the object moved.
     #[serde(skip)]
     pub moving: Vec<(usize, bool)>,
 }
 
 impl TrackErrors {
-    pub(super) fn of(judged: &[Judged]) -> Self {
+    pub(super) fn of(comparisons: &[TrackComparison]) -> Self {
         let mut confusion = [[0; 3]; 2];
         let mut votes = BTreeMap::<u32, usize>::new();
         let (mut late_frames, mut flips) = (0, 0);
-        let mut last: Option<&Judged> = None;
-        for one in judged {
+        let mut last: Option<&TrackComparison> = None;
+        for one in comparisons {
             let state = match one.state {
                 State::Uncertain => 0,
                 State::Static => 1,
@@ -60,16 +61,16 @@ impl TrackErrors {
             *votes.entry(one.truth).or_default() += 1;
             late_frames += u32::from(one.is_late() && one.distance_m < FAR_M);
             if one.state != State::Uncertain {
-                let same = |before: &&Judged| before.truth == one.truth && before.moving == one.moving && one.is_due();
+                let same = |before: &&TrackComparison| before.truth == one.truth && before.moving == one.moving && one.is_due();
                 flips += u32::from(last.filter(same).is_some_and(|before| before.state != one.state));
                 last = Some(one);
             }
         }
-        let dynamic = judged.iter().filter(|one| one.state == State::Dynamic);
-        let errors = |at: usize| judged.iter().filter_map(move |one| Some(one.error?[at]));
+        let dynamic = comparisons.iter().filter(|one| one.state == State::Dynamic);
+        let errors = |at: usize| comparisons.iter().filter_map(move |one| Some(one.error?[at]));
         Self {
             truth: votes.into_iter().max_by_key(|&(_, count)| count).map_or(0, |(truth, _)| truth),
-            frames: judged.len(),
+            frames: comparisons.len(),
             confusion,
             late_frames,
             flips,
@@ -78,10 +79,10 @@ impl TrackErrors {
             me_r_deg: median(errors(1)),
             me_t_rms_m: rms(errors(0)),
             me_r_rms_deg: rms(errors(1)),
-            true_speed_m_s: median(judged.iter().map(|one| one.true_speed_m_s)).unwrap_or_default(),
+            true_speed_m_s: median(comparisons.iter().map(|one| one.true_speed_m_s)).unwrap_or_default(),
             speed_error_m_s: median(dynamic.filter_map(|one| Some(one.speed_m_s? - one.true_speed_m_s))),
-            nearest_m: judged.iter().map(|one| one.distance_m).fold(f64::MAX, f64::min),
-            moving: judged.iter().map(|one| (one.at, one.moving)).collect(),
+            nearest_m: comparisons.iter().map(|one| one.distance_m).fold(f64::MAX, f64::min),
+            moving: comparisons.iter().map(|one| (one.at, one.moving)).collect(),
         }
     }
 }

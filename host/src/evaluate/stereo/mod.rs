@@ -13,7 +13,7 @@ mod tests;
 pub use fill::filled;
 pub use layout::{StereoPair, StereoSet, StereoSetError, find_stereo_set};
 
-use crate::evaluate::lidar::Rule;
+use crate::evaluate::reference::Rule;
 use crate::formats::Image;
 use serde::Serialize;
 
@@ -24,7 +24,7 @@ const ONE_PX: f32 = 256.0;
 
 /// Counts of one region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StereoTally {
+pub struct StereoCounts {
     /// Pixels with truth.
     pixels: u64,
     /// Of these, with an estimate of their own.
@@ -37,7 +37,7 @@ pub struct StereoTally {
     error_sums_px: [f64; 2],
 }
 
-impl StereoTally {
+impl StereoCounts {
     /// Takes in an image: truth and estimate in 1/256 px, 0 none; `counts` tells which pixels belong to the region.
     pub fn add(&mut self, truth: &Image<u16>, given: &Image<u16>, filled: &Image<u16>, counts: impl Fn(usize) -> bool) {
         let px = |q8: u16| f32::from(q8) / ONE_PX;

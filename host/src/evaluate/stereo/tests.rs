@@ -20,18 +20,18 @@ fn pixels_are_counted_given_and_filled_and_five_percent_is_forgiven_by_d1_alone(
     // Right; 3.5 px off at 90 px; 3.5 px off at 20 px; no estimate, filled by 16.5; no truth.
     let truth = image(&[&[px(10.0), px(90.0), px(20.0), px(18.0), 0]]);
     let given = image(&[&[px(10.0), px(93.5), px(16.5), 0, px(5.0)]]);
-    let mut tally = StereoTally::default();
-    tally.add(&truth, &given, &filled(&given), |_| true);
-    let found = tally.figures().unwrap();
+    let mut counts = StereoCounts::default();
+    counts.add(&truth, &given, &filled(&given), |_| true);
+    let found = counts.figures().unwrap();
     assert_eq!((found.pixels, found.coverage), (4, 0.75));
     // The hole takes the disparity of the pixel beside it without truth, the smaller one: off by 13 px.
     assert_eq!((found.d1, found.d1_filled), (1.0 / 3.0, 2.0 / 4.0));
     assert_eq!((found.bad, found.bad_filled), ([2.0 / 3.0, 2.0 / 3.0, 0.0, 0.0], [0.75, 0.75, 0.25, 0.25]));
     assert!((found.mean_error_px - 7.0 / 3.0).abs() < 1e-9 && found.mean_signed_error_px.abs() < 1e-9);
-    let mut foreground = StereoTally::default();
+    let mut foreground = StereoCounts::default();
     foreground.add(&truth, &given, &filled(&given), |at| at == 2);
     assert_eq!(foreground.figures().unwrap().d1, 1.0);
-    assert!(StereoTally::default().figures().is_none());
+    assert!(StereoCounts::default().figures().is_none());
 }
 
 #[test]

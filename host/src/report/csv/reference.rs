@@ -1,28 +1,62 @@
-//! `lidar.csv`: three rows for each evaluated frame, one by what the points belong to.
+//! `lidar.csv`: for each evaluated frame a row for each region and acceptance rule.
 
-use crate::evaluate::lidar::{EvaluatedFrame, Layer, RULES};
+use super::write_rows;
+use crate::evaluate::reference::{ACCEPTANCE_RULES, Counts, EvaluatedFrame, Region, Rule};
+use serde::Serialize;
 use std::io::{self, Write};
 
-/// Writes the table. `points = error + missing + correct` for input and map and every rule; columns `alone` count each by itself.
-pub fn write_lidar(out: &mut impl Write, frames: &[EvaluatedFrame]) -> io::Result<()> {
-    write!(out, "frame,layer,points,missing,input_missing_alone,map_missing_alone,scan_points,out_of_range,outside,epipolar")?;
-    for (at, rule) in RULES.iter().enumerate() {
-        let name = if at == 0 { "kitti".to_owned() } else { format!("{}px", rule.px) };
-        write!(out, ",input_error_{name},map_error_{name},input_error_alone_{name},map_error_alone_{name}")?;
+/// `points = error + missing + correct` for input and map and every rule; columns `alone` count each source by itself. `rule_px` is the
+/// largest error that counts as correct; with `rule_share` above 0 an error up to that share of the true disparity is correct as well.
+#[derive(Serialize)]
+struct ReferenceColumns {
+    frame: usize,
+    region: &'static str,
+    rule_px: f32,
+    rule_share: f32,
+    points: u32,
+    missing: u32,
+    input_missing_alone: u32,
+    map_missing_alone: u32,
+    input_error: u32,
+    map_error: u32,
+    input_error_alone: u32,
+    map_error_alone: u32,
+    scan_points: u32,
+    out_of_range: u32,
+    outside: u32,
+    epipolar: u32,
+}
+
+/// Writes the table.
+///
+/// # Errors
+/// The disk refuses.
+pub fn write_reference(out: &mut impl Write, frames: &[EvaluatedFrame]) -> io::Result<()> {
+    let rules = ACCEPTANCE_RULES.iter().enumerate();
+    let regions = |frame: &EvaluatedFrame| Region::ALL.into_iter().zip(frame.regions).collect::<Vec<_>>();
+    let counts = frames.iter().flat_map(|frame| regions(frame).into_iter().map(move |(region, counts)| (frame, region, counts)));
+    let row = |(frame, region, counts)| rules.clone().map(move |rule| columns(frame, region, &counts, rule));
+    write_rows(out, counts.flat_map(row))
+}
+
+fn columns(frame: &EvaluatedFrame, region: Region, counts: &Counts, (at, rule): (usize, &Rule)) -> ReferenceColumns {
+    let ([input, map], scan) = (&counts.sources, &frame.count);
+    ReferenceColumns {
+        frame: frame.frame,
+        region: region.name(),
+        rule_px: rule.px,
+        rule_share: rule.share,
+        points: counts.total,
+        missing: counts.missing,
+        input_missing_alone: input.missing_alone,
+        map_missing_alone: map.missing_alone,
+        input_error: input.errors[at],
+        map_error: map.errors[at],
+        input_error_alone: input.errors_alone[at],
+        map_error_alone: map.errors_alone[at],
+        scan_points: scan.points,
+        out_of_range: scan.out_of_range,
+        outside: scan.outside,
+        epipolar: scan.epipolar,
     }
-    writeln!(out)?;
-    for frame in frames {
-        for (layer, tally) in Layer::ALL.iter().zip(&frame.layers) {
-            let ([input, map], count) = (&tally.sources, &frame.count);
-            write!(out, "{},{},{},{}", frame.frame, layer.name(), tally.total, tally.missing)?;
-            write!(out, ",{},{}", input.missing_alone, map.missing_alone)?;
-            write!(out, ",{},{},{},{}", count.points, count.out_of_range, count.outside, count.epipolar)?;
-            for rule in 0..RULES.len() {
-                write!(out, ",{},{}", input.errors[rule], map.errors[rule])?;
-                write!(out, ",{},{}", input.errors_alone[rule], map.errors_alone[rule])?;
-            }
-            writeln!(out)?;
-        }
-    }
-    Ok(())
 }

@@ -1,38 +1,102 @@
-//! `tracks.csv`: one row for each track seen in a frame.
+//! `tracks.csv`: one row for each track seen in a frame; `tracks_truth.csv`: one for each that was compared with a true object.
 
-use crate::evaluate::objects::Judged;
-use crate::observe::state_name;
-use crate::run::FrameRow;
+use super::{rounded, write_rows};
+use crate::evaluate::objects::TrackComparison;
+use crate::observe::{FrameTracks, TrackRow, TracksSection, state_name};
+use serde::Serialize;
 use std::io::{self, Write};
 
-/// Writes the table. The box is in px, its last column and row not among it; speeds are empty until a motion was measured.
-pub fn write_tracks(out: &mut impl Write, rows: &[FrameRow]) -> io::Result<()> {
-    writeln!(out, "frame,id,class,state,speed_m_s,speed_sigma_m_s,x1,y1,x2,y2,score,matches,inliers,measured,blocks")?;
-    for row in rows {
-        for track in &row.tracks {
-            let (id, class, state, pixels) = (track.id, track.class.name(), state_name(track.state), &track.pixels);
-            let [speed, sigma] = track.speed_m_s.map_or([String::new(), String::new()], |speeds| speeds.map(|value| format!("{value:.3}")));
-            write!(out, "{},{id},{class},{state},{speed},{sigma}", row.frame)?;
-            write!(out, ",{},{},{},{}", pixels.left, pixels.top, pixels.left + pixels.width, pixels.top + pixels.height)?;
-            let measured = u8::from(track.measured);
-            writeln!(out, ",{:.3},{},{},{measured},{}", track.score, track.matches, track.inliers, track.blocks)?;
-        }
-    }
-    Ok(())
+/// The box is in px, `x2` and `y2` excluded; speeds are empty until a motion was measured.
+#[derive(Serialize)]
+struct TrackColumns {
+    frame: usize,
+    id: u32,
+    class: &'static str,
+    state: &'static str,
+    speed_m_s: Option<f64>,
+    speed_sigma_m_s: Option<f64>,
+    x1: i32,
+    y1: i32,
+    x2: i32,
+    y2: i32,
+    score: f64,
+    matches: u32,
+    inliers: u32,
+    measured: u8,
+    blocks: u32,
 }
 
-/// Writes `tracks_truth.csv`: one row for each track in a frame that was compared with a true thing. Errors are empty where no motion was
-/// estimated or the thing was not seen before. `settled` counts the frames since the track began and since the thing last started or stopped;
-/// `view` is whole, small or cut.
-pub fn write_tracks_truth(out: &mut impl Write, rows: &[FrameRow], judged: &[(u32, Judged)]) -> io::Result<()> {
-    writeln!(out, "frame,id,truth,moving,state,distance_m,me_t_m,me_r_deg,true_speed_m_s,speed_m_s,settled,view")?;
-    for (id, one) in judged {
-        let Some(row) = rows.get(one.at) else { continue };
-        let (moving, state) = (u8::from(one.moving), state_name(one.state));
-        write!(out, "{},{id},{},{moving},{state},{:.3}", row.frame, one.truth, one.distance_m)?;
-        let [t, r] = one.error.map_or([String::new(), String::new()], |error| error.map(|value| format!("{value:.5}")));
-        let speed = one.speed_m_s.map(|speed| format!("{speed:.3}")).unwrap_or_default();
-        writeln!(out, ",{t},{r},{:.3},{speed},{},{}", one.true_speed_m_s, one.settled, one.view.name())?;
+/// Errors are empty where no motion was estimated or the object was not seen before. `settled` counts the frames since the track began and
+/// since the true state last changed; `view` is whole, small or cut.
+#[derive(Serialize)]
+struct TruthColumns {
+    frame: usize,
+    id: u32,
+    truth: u32,
+    moving: u8,
+    state: &'static str,
+    distance_m: f64,
+    me_t_m: Option<f64>,
+    me_r_deg: Option<f64>,
+    true_speed_m_s: f64,
+    speed_m_s: Option<f64>,
+    settled: u32,
+    view: &'static str,
+}
+
+/// Writes `tracks.csv`.
+///
+/// # Errors
+/// The disk refuses.
+pub fn write_tracks(out: &mut impl Write, frames: &[FrameTracks]) -> io::Result<()> {
+    write_rows(out, frames.iter().flat_map(|frame| frame.tracks.iter().map(|track| track_columns(frame.frame, track))))
+}
+
+/// Writes `tracks_truth.csv`.
+///
+/// # Errors
+/// The disk refuses.
+pub fn write_tracks_truth(out: &mut impl Write, tracks: &TracksSection) -> io::Result<()> {
+    let columns = |(id, one): &(u32, TrackComparison)| Some(truth_columns(tracks.frames.get(one.at)?.frame, *id, one));
+    write_rows(out, tracks.comparisons.iter().filter_map(columns))
+}
+
+fn track_columns(frame: usize, track: &TrackRow) -> TrackColumns {
+    let pixels = &track.pixels;
+    let [speed, sigma] = [0, 1].map(|at| track.speed_m_s.map(|speeds| rounded(f64::from(speeds[at]), 3)));
+    TrackColumns {
+        frame,
+        id: track.id,
+        class: track.class.name(),
+        state: state_name(track.state),
+        speed_m_s: speed,
+        speed_sigma_m_s: sigma,
+        x1: pixels.left,
+        y1: pixels.top,
+        x2: pixels.left + pixels.width,
+        y2: pixels.top + pixels.height,
+        score: rounded(f64::from(track.score), 3),
+        matches: track.matches,
+        inliers: track.inliers,
+        measured: u8::from(track.measured),
+        blocks: track.blocks,
     }
-    Ok(())
+}
+
+fn truth_columns(frame: usize, id: u32, one: &TrackComparison) -> TruthColumns {
+    let [t, r] = [0, 1].map(|at| one.error.map(|error| rounded(error[at], 5)));
+    TruthColumns {
+        frame,
+        id,
+        truth: one.truth,
+        moving: u8::from(one.moving),
+        state: state_name(one.state),
+        distance_m: rounded(one.distance_m, 3),
+        me_t_m: t,
+        me_r_deg: r,
+        true_speed_m_s: rounded(one.true_speed_m_s, 3),
+        speed_m_s: one.speed_m_s.map(|speed| rounded(speed, 3)),
+        settled: one.settled,
+        view: one.view.name(),
+    }
 }

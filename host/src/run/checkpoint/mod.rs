@@ -1,4 +1,4 @@
-//! A run that can be stopped and goes on: every so many frames all it holds is written into its folder, in the place of what was written before.
+//! Checkpoints: every so many frames the state of a run is written into its folder, so that an interrupted run can be resumed.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -6,23 +6,23 @@
 //! | 4 | [`VERSION`], little-endian as all numbers here |
 //! | 8 | length of the host's part |
 //! | 4 | CRC-32 of the 20 bytes before and of the host's part |
-//! | | the host's part, CBOR: how the run was begun, how far the file of blocks had come, what was gathered |
+//! | | the host's part, CBOR: manifest, end of the file of blocks, state |
 //! | | the mapper's, to the end: [`dynvox_core::mapper::snapshot`] |
 //!
-//! The blocks that left the pool are not copied: their file only ever grows, so its length and a checksum say what it held.
+//! Evicted blocks are not copied: their file only ever grows, so its length and a checksum describe it.
 //!
 //! Memory: the host's part, some 4 KiB a frame, while it is written or read.
 
-mod begun;
 mod error;
+mod manifest;
 #[cfg(test)]
 mod tests;
 
-pub use begun::Begun;
 pub use error::ResumeError;
+pub use manifest::RunManifest;
 
 use super::Plan;
-use super::state::Gathered;
+use super::state::RunState;
 use super::{FolderError, RunFolder, write_whole};
 use crate::run::store::Position;
 use dynvox_core::Mapper;
@@ -33,39 +33,39 @@ use std::io::{self, BufReader, Read, Write};
 use std::path::PathBuf;
 
 const MAGIC: [u8; 8] = *b"DVXDRIVE";
-/// Version of the layout, and of what the host gathers. Another one is refused: there is no conversion.
-const VERSION: u32 = 1;
+/// Version of the layout and of the host's state. Another one is refused: there is no conversion.
+const VERSION: u32 = 2;
 /// Magic, version, length.
 const HEAD: usize = 20;
 
-/// When a run writes snapshots.
+/// When a run writes checkpoints.
 #[derive(Clone, Debug)]
-pub struct Snapshots {
+pub struct CheckpointPlan {
     /// Frames from one to the next.
     pub every: usize,
-    /// How the run was begun.
-    pub begun: Begun,
+    /// How the run was started.
+    pub manifest: RunManifest,
 }
 
 /// The host's part; borrowed to be written, owned when read.
 #[derive(Serialize, Deserialize)]
 struct Part<B, G> {
-    begun: B,
+    manifest: B,
     blocks: Option<Position>,
-    gathered: G,
+    state: G,
 }
 
-/// Writes the snapshot of a run into its folder.
+/// Writes the checkpoint of a run into its folder, in place of the one before.
 pub(super) fn write(
     folder: &RunFolder,
-    begun: &Begun,
+    manifest: &RunManifest,
     blocks: Option<Position>,
-    gathered: &Gathered,
+    state: &RunState,
     mapper: &mut Mapper<'_>,
 ) -> Result<(), FolderError> {
     write_whole(&folder.snapshot(), |file| {
         let mut part = Vec::new();
-        ciborium::into_writer(&Part { begun, blocks, gathered }, &mut part).map_err(io::Error::other)?;
+        ciborium::into_writer(&Part { manifest, blocks, state }, &mut part).map_err(io::Error::other)?;
         let head = head(part.len() as u64);
         file.write_all(&head)?;
         file.write_all(&checksum(&head, &part).to_le_bytes())?;
@@ -89,21 +89,21 @@ fn checksum(head: &[u8; HEAD], part: &[u8]) -> u32 {
     crc.finalize()
 }
 
-/// A run that was stopped, as its last snapshot tells it.
-pub struct Stopped {
+/// The last checkpoint of an interrupted run.
+pub struct Checkpoint {
     path: PathBuf,
-    begun: Begun,
+    manifest: RunManifest,
     pub(super) blocks: Option<Position>,
-    pub(super) gathered: Gathered,
-    /// What of the file is the mapper's.
+    pub(super) state: RunState,
+    /// The mapper's part of the file.
     rest: BufReader<File>,
 }
 
-impl Stopped {
-    /// Reads the snapshot in a run's folder, but for the mapper's part.
+impl Checkpoint {
+    /// Reads the checkpoint in a run's folder, but for the mapper's part.
     ///
     /// # Errors
-    /// It is none, of another version, or damaged.
+    /// There is none, or it is of another version or damaged.
     pub fn read(folder: &RunFolder) -> Result<Self, ResumeError> {
         let path = folder.snapshot();
         let failed = |source| ResumeError::Read { path: path.clone(), source };
@@ -132,23 +132,23 @@ impl Stopped {
         if checksum(&head, &part) != u32::from_le_bytes(sum) {
             return Err(damaged());
         }
-        let part: Part<Begun, Gathered> =
+        let part: Part<RunManifest, RunState> =
             ciborium::from_reader(&part[..]).map_err(|error| ResumeError::Otherwise { path: path.clone(), reason: error.to_string() })?;
-        let Part { begun, blocks, gathered } = part;
-        Ok(Self { path, begun, blocks, gathered, rest })
+        let Part { manifest, blocks, state } = part;
+        Ok(Self { path, manifest, blocks, state, rest })
     }
 
-    /// How the run was begun.
-    pub fn begun(&self) -> &Begun {
-        &self.begun
+    /// How the run was started.
+    pub fn manifest(&self) -> &RunManifest {
+        &self.manifest
     }
 
     /// Frames mapped.
     pub fn frames(&self) -> usize {
-        self.gathered.rows.len()
+        self.state.rows.len()
     }
 
-    /// Brings a mapper in `slab` to where it was.
+    /// Restores the mapper in `slab`.
     pub(super) fn mapper<'s>(&mut self, plan: &Plan, slab: &'s mut [u8]) -> Result<Mapper<'s>, ResumeError> {
         let (path, rest) = (&self.path, &mut self.rest);
         let restored = Mapper::restore(&plan.capacity, &plan.config, slab, &mut |bytes: &mut [u8]| rest.read_exact(bytes));
@@ -157,9 +157,9 @@ impl Stopped {
             RestoreError::Foreign | RestoreError::Damaged => ResumeError::Damaged { path: path.clone() },
             RestoreError::Source(source) if source.kind() == io::ErrorKind::UnexpectedEof => ResumeError::Damaged { path: path.clone() },
             RestoreError::Source(source) => ResumeError::Read { path: path.clone(), source },
-            RestoreError::Version(found) => otherwise(format!("its mapper is of version {found}")),
-            RestoreError::Capacity => otherwise(format!("profile {} had other bounds", plan.profile)),
-            RestoreError::Config => otherwise("its mapper knew other settings".to_owned()),
+            RestoreError::Version(found) => otherwise(format!("its mapper snapshot has version {found}")),
+            RestoreError::Capacity => otherwise(format!("profile {} has other capacities", plan.profile)),
+            RestoreError::Config => otherwise("its mapper has other settings".to_owned()),
             RestoreError::New(error) => otherwise(format!("the core refuses its settings: {error}")),
             other => otherwise(other.to_string()),
         })?;

@@ -1,12 +1,12 @@
 //! An append-only file of blocks.
 //!
-//! A block kept again gets a new record; the newest counts, and the ones before stay where they are: a drive that goes to and fro writes a
-//! record for each time a block leaves. A file left behind by a crash is read through once: every whole record is
-//! taken, and what follows the last whole one is cut off and reported. A write that fails (a full disk) ends the keeping, not the run.
+//! A block stored again gets a new record; the newest counts, the older ones stay: a camera that goes to and fro writes a record for each
+//! eviction. The file of a crashed run is scanned once: every complete record is taken, the rest is truncated and reported. A write that
+//! fails (a full disk) ends the storing, not the run.
 //!
-//! Memory: that of [`super::places`], two buffers of a record and a window of [`WINDOW`] bytes.
+//! Memory: that of [`super::block_index`], two buffers of a record and a window of [`WINDOW`] bytes.
 
-use super::places::{Places, Tile, tile_of};
+use super::block_index::{BlockIndexOnDisk, Tile, tile_of};
 use super::record::{self, HEADER, Header, LONGEST};
 use dynvox_core::volume::{BlockCoord, BlockStore, LeavingBlock, ReturningBlock};
 use hashbrown::HashMap;
@@ -21,38 +21,38 @@ use std::{
 const MAGIC: [u8; 8] = *b"dynvoxB2";
 /// Magic, then voxel size and truncation (`f32`, little endian).
 const PREAMBLE: usize = 16;
-/// Bytes read at once on the way back along a tile's records.
+/// Bytes read at once while following a tile's records backwards.
 const WINDOW: usize = 1 << 16;
 
 /// Why a store cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The file system said no.
+    /// The file system refuses.
     #[error("{path}: {source}")]
     Io {
         /// The store.
         path: PathBuf,
-        /// What it said.
+        /// What it says.
         source: io::Error,
     },
-    /// Something else is at that path.
+    /// The file is not a store.
     #[error("{path} is not a block store; name another file, or remove it")]
     Foreign {
         /// The file.
         path: PathBuf,
     },
-    /// It was there when the run stopped.
+    /// It existed at the checkpoint.
     #[error("{path} is missing: it holds the blocks that had left the pool. Put it back, or begin the run again with --overwrite")]
     Missing {
-        /// Where it was.
+        /// The store.
         path: PathBuf,
     },
-    /// It was changed after the run stopped.
+    /// It was changed after the checkpoint.
     #[error("{path} is not as the run left it: its first {bytes} bytes were cut short or changed. Begin the run again with --overwrite")]
     Parted {
         /// The store.
         path: PathBuf,
-        /// Bytes it had then.
+        /// Its length at the checkpoint, bytes.
         bytes: u64,
     },
     /// The store was written with other voxels.
@@ -74,16 +74,16 @@ pub enum StoreError {
     },
 }
 
-/// What was found in a store.
+/// An opened store's content.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Opened {
     /// Records in it, superseded ones included.
     pub records: u64,
-    /// Bytes of a torn or damaged tail that were cut off.
+    /// Bytes of an incomplete or damaged tail that were truncated.
     pub cut_bytes: u64,
 }
 
-/// How far a store had come, for a run that goes on from there: records are only ever added, so what it holds up to there is what it held then.
+/// The end of a store at a checkpoint. Records are only ever appended, so everything before it stays as it was.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Position {
     /// Bytes of the file.
@@ -92,7 +92,7 @@ pub struct Position {
     /// CRC-32 of all records.
     checksum: u32,
     unreadable: u64,
-    /// Why keeping had ended, if it had.
+    /// Why storing had ended, if it had.
     failure: Option<String>,
 }
 
@@ -100,16 +100,16 @@ pub struct Position {
 #[derive(Debug)]
 pub struct BlockFile<F> {
     file: F,
-    places: Places,
+    index: BlockIndexOnDisk,
     records: u64,
     end: u64,
     /// Of all records.
     checksum: crc32fast::Hasher,
     /// Bytes the file may grow to.
     most: u64,
-    /// Why keeping ended.
+    /// Why storing ended.
     failure: Option<io::Error>,
-    /// Records that were kept and cannot be read back.
+    /// Records that cannot be read back.
     unreadable: u64,
     record: Vec<u8>,
     scratch: Vec<u8>,
@@ -123,7 +123,7 @@ impl BlockFile<File> {
         let len = file.metadata().map_err(at)?.len();
         let mut store = Self::over(file);
         if len < PREAMBLE as u64 {
-            // New, or torn within its first bytes: nothing can have been kept in it.
+            // New, or incomplete within its first bytes: it holds no record.
             if !MAGIC.starts_with(&store.head(len.min(8)).map_err(at)?) {
                 return Err(StoreError::Foreign { path: path.to_owned() });
             }
@@ -139,7 +139,7 @@ impl BlockFile<File> {
         Ok((store, opened))
     }
 
-    /// Opens the store of a run that goes on, as it was at `position`; what was kept since is cut off.
+    /// Opens the store of a resumed run, as it was at `position`; records stored since are truncated.
     pub fn reopen(path: &Path, voxel_m: f32, truncation_m: f32, position: &Position) -> Result<Self, StoreError> {
         let at = |source| StoreError::Io { path: path.to_owned(), source };
         let file = OpenOptions::new().read(true).write(true).open(path).map_err(|source| match source.kind() {
@@ -163,8 +163,8 @@ impl BlockFile<File> {
         Ok(store)
     }
 
-    /// Puts what is kept on the disk itself, and says how far that is.
-    pub fn mark(&self) -> io::Result<Position> {
+    /// Syncs the file to the disk and returns its end.
+    pub fn position(&self) -> io::Result<Position> {
         self.file.sync_data()?;
         Ok(Position {
             bytes: self.end,
@@ -175,7 +175,7 @@ impl BlockFile<File> {
         })
     }
 
-    /// Refuses a file that is no store, or one of other voxels.
+    /// Refuses a file that is not a store, or one of other voxels.
     fn require(&mut self, path: &Path, voxel_m: f32, truncation_m: f32) -> Result<(), StoreError> {
         let found = self.head(PREAMBLE as u64).map_err(|source| StoreError::Io { path: path.to_owned(), source })?;
         if found[..8] != MAGIC {
@@ -204,12 +204,12 @@ fn preamble(voxel_m: f32, truncation_m: f32) -> [u8; PREAMBLE] {
 }
 
 impl<F: Read + Write + Seek> BlockFile<F> {
-    /// An empty store that appends behind the preamble.
+    /// An empty store that appends after the preamble.
     pub(super) fn over(file: F) -> Self {
         let (record, scratch) = (Vec::with_capacity(HEADER + LONGEST), Vec::with_capacity(LONGEST));
         Self {
             file,
-            places: Places::default(),
+            index: BlockIndexOnDisk::default(),
             records: 0,
             end: PREAMBLE as u64,
             checksum: crc32fast::Hasher::new(),
@@ -226,7 +226,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         self.most = most;
     }
 
-    /// Records in the store: more than blocks where one was kept again.
+    /// Records in the store, superseded ones included.
     pub fn records(&self) -> u64 {
         self.records
     }
@@ -236,30 +236,30 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         self.end
     }
 
-    /// Why keeping ended, if it did.
+    /// Why storing ended, if it did.
     pub fn failure(&self) -> Option<&io::Error> {
         self.failure.as_ref()
     }
 
-    /// Blocks that were kept and could not be read back.
+    /// Blocks that were stored and could not be read back.
     pub fn unreadable(&self) -> u64 {
         self.unreadable
     }
 
-    /// Whether a block is kept.
+    /// Whether a block is stored.
     pub fn holds(&mut self, coord: BlockCoord) -> bool {
         self.place(coord).is_some()
     }
 
-    /// The tiles in which blocks are kept, ascending.
+    /// The tiles in which blocks are stored, ascending.
     pub fn tiles(&self) -> Vec<Tile> {
-        self.places.tiles()
+        self.index.tiles()
     }
 
-    /// The blocks kept in a tile, ascending.
+    /// The blocks stored in a tile, ascending.
     pub fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord> {
-        self.read_up(tile);
-        let mut coords: Vec<_> = self.places.records(tile).into_iter().flatten().map(|(coord, _)| *coord).collect();
+        self.load_index(tile);
+        let mut coords: Vec<_> = self.index.records(tile).into_iter().flatten().map(|(coord, _)| *coord).collect();
         coords.sort_unstable();
         coords
     }
@@ -267,20 +267,20 @@ impl<F: Read + Write + Seek> BlockFile<F> {
     /// Where the newest record of a block begins.
     fn place(&mut self, coord: BlockCoord) -> Option<u64> {
         let tile = tile_of(coord);
-        self.read_up(tile);
-        self.places.records(tile)?.get(&coord).copied()
+        self.load_index(tile);
+        self.index.records(tile)?.get(&coord).copied()
     }
 
-    /// Reads up where the records of a tile begin, unless it is known or there are none.
-    fn read_up(&mut self, tile: Tile) {
-        let Some(newest) = self.places.newest(tile) else { return };
-        if self.places.records(tile).is_some() {
+    /// Reads the positions of a tile's records, unless they are known or there are none.
+    fn load_index(&mut self, tile: Tile) {
+        let Some(newest) = self.index.newest(tile) else { return };
+        if self.index.records(tile).is_some() {
             return;
         }
         let mut records = HashMap::new();
-        // What lies behind a record that cannot be read is out of reach.
+        // Records before one that cannot be read are unreachable.
         self.unreadable += u64::from(self.walk(tile, newest, &mut records).is_err());
-        self.places.open(tile, records);
+        self.index.open(tile, records);
     }
 
     /// Follows a tile's records from the newest back.
@@ -296,7 +296,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
                 self.file.read_exact(&mut window)?;
             }
             let header = window.get((at - first) as usize..).and_then(|bytes| bytes.first_chunk()).and_then(Header::read);
-            // Each record lies before the one that names it, so the way ends.
+            // Each record lies before the one that names it, so the walk ends.
             let header = header.filter(|header| tile_of(header.coord) == tile && header.previous < at);
             let header = header.ok_or(io::ErrorKind::InvalidData)?;
             records.entry(header.coord).or_insert(at);
@@ -313,7 +313,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         Ok(bytes)
     }
 
-    /// Indexes every whole record that begins before `until`; `end` is behind the last one.
+    /// Indexes every whole record that begins before `until`; `end` is after the last one.
     fn scan(&mut self, until: u64) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(PREAMBLE as u64))?;
         let mut reader = BufReader::with_capacity(1 << 20, &mut self.file);
@@ -329,7 +329,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
             if payload.len() < read.len || !read.fits(&header, &payload) {
                 return Ok(());
             }
-            self.places.enter(read.coord, self.end);
+            self.index.enter(read.coord, self.end);
             self.checksum.update(&header);
             self.checksum.update(&payload);
             self.records += 1;
@@ -351,7 +351,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
 
     fn append(&mut self) -> io::Result<()> {
         if self.end + self.record.len() as u64 > self.most {
-            return Err(io::Error::new(io::ErrorKind::QuotaExceeded, "it has grown as far as it may"));
+            return Err(io::Error::new(io::ErrorKind::QuotaExceeded, "it has reached its size limit"));
         }
         self.file.seek(SeekFrom::Start(self.end))?;
         self.file.write_all(&self.record)
@@ -363,11 +363,11 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
         if self.failure.is_some() {
             return false;
         }
-        let previous = self.places.newest(tile_of(block.coord)).unwrap_or(0);
+        let previous = self.index.newest(tile_of(block.coord)).unwrap_or(0);
         record::write(&block, previous, &mut self.scratch, &mut self.record);
         match self.append() {
             Ok(()) => {
-                self.places.enter(block.coord, self.end);
+                self.index.enter(block.coord, self.end);
                 self.checksum.update(&self.record);
                 self.records += 1;
                 self.end += self.record.len() as u64;
@@ -381,7 +381,7 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
     }
 
     fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
-        // The record stays: should the run end before the block leaves again, what was kept is still there.
+        // The record stays: should the run end before the block is evicted again, it is still stored.
         let Some(at) = self.place(block.coord) else { return false };
         let came = self.fetch(block.coord, at).unwrap_or(false) && record::read(&self.record, block, &mut self.scratch);
         self.unreadable += u64::from(!came);

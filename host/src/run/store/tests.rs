@@ -175,11 +175,11 @@ fn a_store_is_reopened_where_it_was_marked_and_what_came_after_is_cut() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.blocks");
     let (mut store, _) = BlockFile::open(&path, 0.05, 0.3).unwrap();
-    let empty = store.mark().unwrap();
+    let empty = store.position().unwrap();
     (0..5).for_each(|place| assert!(keep(&mut store, place, place)));
-    let marked = store.mark().unwrap();
+    let marked = store.position().unwrap();
     assert!(keep(&mut store, 3, 30) && keep(&mut store, 9, 9));
-    let after = store.mark().unwrap();
+    let after = store.position().unwrap();
     drop(store);
     let whole = fs::read(&path).unwrap();
     let mut store = BlockFile::reopen(&path, 0.05, 0.3, &marked).unwrap();
@@ -187,7 +187,7 @@ fn a_store_is_reopened_where_it_was_marked_and_what_came_after_is_cut() {
     assert!(is_back(&mut store, 3, 3) && !store.holds(coord(9)));
     // What is kept again is what was kept.
     assert!(keep(&mut store, 3, 30) && keep(&mut store, 9, 9));
-    assert_eq!(store.mark().unwrap(), after);
+    assert_eq!(store.position().unwrap(), after);
     assert!(fs::read(&path).unwrap() == whole);
     drop(store);
     for at in (16..marked.bytes as usize).step_by(7) {
@@ -214,7 +214,7 @@ fn a_store_that_took_no_more_takes_no_more_when_it_is_reopened() {
     assert!(keep(&mut store, 1, 1));
     store.limit(store.bytes() + 1);
     assert!(!keep(&mut store, 2, 2));
-    let (marked, said) = (store.mark().unwrap(), store.failure().unwrap().to_string());
+    let (marked, said) = (store.position().unwrap(), store.failure().unwrap().to_string());
     let mut store = BlockFile::reopen(&path, 0.05, 0.3, &marked).unwrap();
     assert!(!keep(&mut store, 2, 2) && is_back(&mut store, 1, 1));
     assert_eq!(store.failure().unwrap().to_string(), said);

@@ -1,4 +1,6 @@
-//! Counting points of one layer in one frame.
+//! Counting points of one region in one frame.
+
+use serde::{Deserialize, Serialize};
 
 /// When a disparity is wrong: off by more than `px` and by more than `share` of the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,12 +12,15 @@ pub struct Rule {
 }
 
 impl Rule {
-    /// KITTI's: 3 px and 5 %.
+    /// KITTI's: right when off by at most 3 px or 5 %.
     pub const KITTI: Self = Self { px: 3.0, share: 0.05 };
 
     const fn plain(px: f32) -> Self {
         Self { px, share: 0.0 }
     }
+
+    /// Its name in figures.
+    pub const KITTI_NAME: &'static str = "3 px or 5 %";
 
     /// Whether a disparity is wrong.
     pub fn is_error(&self, disparity_px: f32, true_px: f32) -> bool {
@@ -24,8 +29,8 @@ impl Rule {
     }
 }
 
-/// All rules counted: KITTI's, then the original's plain thresholds.
-pub const RULES: [Rule; 14] = [
+/// All rules counted: KITTI's, by which accuracy is reported, then the original's plain thresholds.
+pub const ACCEPTANCE_RULES: [Rule; 14] = [
     Rule::KITTI,
     Rule::plain(0.5),
     Rule::plain(1.0),
@@ -43,29 +48,29 @@ pub const RULES: [Rule; 14] = [
 ];
 
 /// Counts of one source.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SourceTally {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SourceCounts {
     /// Points this source lacks.
     pub missing_alone: u32,
     /// Wrong points by rule, of those both sources have.
-    pub errors: [u32; RULES.len()],
+    pub errors: [u32; ACCEPTANCE_RULES.len()],
     /// Wrong points by rule, of those this source has.
-    pub errors_alone: [u32; RULES.len()],
+    pub errors_alone: [u32; ACCEPTANCE_RULES.len()],
 }
 
-/// Counts of one layer in one frame. `total = errors + missing + correct` for either source and every rule.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
+/// Counts of one region in one frame. `total = errors + missing + correct` for either source and every rule.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
     /// Points.
     pub total: u32,
     /// Points that input or map lacks.
     pub missing: u32,
     /// Input, then map.
-    pub sources: [SourceTally; 2],
+    pub sources: [SourceCounts; 2],
 }
 
-impl Tally {
-    /// Takes in a point: its true disparity, the input's and the map's; 0 where there is none.
+impl Counts {
+    /// Takes in a point: its true disparity, the input's and the map's; 0 where it is unknown.
     pub fn add(&mut self, true_px: f32, seen_px: [f32; 2]) {
         self.total += 1;
         let both = seen_px.iter().all(|&seen| seen > 0.0);
@@ -75,7 +80,7 @@ impl Tally {
                 source.missing_alone += 1;
                 continue;
             }
-            for (at, rule) in RULES.iter().enumerate() {
+            for (at, rule) in ACCEPTANCE_RULES.iter().enumerate() {
                 let wrong = u32::from(rule.is_error(seen, true_px));
                 source.errors_alone[at] += wrong;
                 source.errors[at] += if both { wrong } else { 0 };
@@ -88,7 +93,7 @@ impl Tally {
         right(self.sources[source].errors[rule], self.total - self.missing)
     }
 
-    /// The same of the points this source has, whatever the other lacks.
+    /// The same of the points this source has, whether or not the other has them.
     pub fn accuracy_alone(&self, source: usize, rule: usize) -> Option<f64> {
         let of = &self.sources[source];
         right(of.errors_alone[rule], self.total - of.missing_alone)

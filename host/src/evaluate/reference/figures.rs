@@ -1,20 +1,20 @@
 //! Figures of a run: means over its evaluated frames.
 
-use super::{Layer, RULES, ScanCount, Tally};
-use serde::Serialize;
+use super::{ACCEPTANCE_RULES, Counts, DepthErrorFigures, Region, Rule, ScanCount};
+use serde::{Deserialize, Serialize};
 
 /// Counts of one evaluated frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EvaluatedFrame {
     /// Number of the frame in the data set.
     pub frame: usize,
-    /// What became of the scan's points.
+    /// The scan's points by outcome.
     pub count: ScanCount,
-    /// Counts by [`Layer`].
-    pub layers: [Tally; 3],
+    /// Counts by [`Region`].
+    pub regions: [Counts; 3],
 }
 
-/// Input or map in one layer, by KITTI's rule unless said otherwise.
+/// Input or map in one region, by KITTI's rule unless said otherwise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SourceFigures {
     /// Share that is right of the points both sources have.
@@ -35,75 +35,82 @@ pub struct SourceFigures {
     pub accuracy_by_px: Vec<(f32, f64)>,
 }
 
-/// Input and map in one layer.
+/// Input and map in one region.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PairFigures {
     /// The matcher's disparity.
     pub input: SourceFigures,
     /// The map's.
     pub fused: SourceFigures,
-    /// Frames with a point of this layer.
+    /// Frames with a point of this region.
     pub frames: usize,
 }
 
-/// A run against LiDAR.
+/// Input and map against a reference depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LidarFigures {
+pub struct ReferenceFigures {
     /// `lidar` or `exact`.
     pub source: &'static str,
-    /// Frames after which the map was looked at.
+    /// When a disparity counts as right.
+    pub rule: &'static str,
+    /// Frames after which the map was evaluated.
     pub delay_frames: usize,
     /// Frames evaluated.
     pub frames: usize,
-    /// The street.
+    /// The static background.
     #[serde(rename = "static")]
     pub still: PairFigures,
-    /// What has a volume of its own.
+    /// Objects with a volume of their own.
     pub dynamic: PairFigures,
-    /// Points on what could move and has none: not in the figures above.
+    /// Points on objects without a volume: not in the figures above.
     pub ignored_points: u64,
-    /// Points nearer or farther than what is fused, and points beside the image.
+    /// Points nearer or farther than what is fused, and points outside the image.
     pub left_out_points: u64,
+    /// Depth errors of the static map; `None` where it shows no point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map_depth_error: Option<DepthErrorFigures>,
     /// Points whose rows in the two images differ too much.
     pub epipolar_violations: u64,
 }
 
-impl LidarFigures {
+impl ReferenceFigures {
     /// Sums up; `None` without a frame.
-    pub fn of(source: &'static str, delay_frames: usize, frames: &[EvaluatedFrame]) -> Option<Self> {
+    pub fn of(source: &'static str, delay_frames: usize, frames: &[EvaluatedFrame], depth: Option<DepthErrorFigures>) -> Option<Self> {
         let counted = |of: fn(&EvaluatedFrame) -> u32| frames.iter().map(|frame| u64::from(of(frame))).sum::<u64>();
         (!frames.is_empty()).then(|| Self {
             source,
+            rule: Rule::KITTI_NAME,
             delay_frames,
             frames: frames.len(),
-            still: pair(frames, Layer::Static),
-            dynamic: pair(frames, Layer::Dynamic),
-            ignored_points: counted(|frame| frame.layers[Layer::Ignored as usize].total),
+            still: pair(frames, Region::Static),
+            dynamic: pair(frames, Region::Dynamic),
+            ignored_points: counted(|frame| frame.regions[Region::Ignored as usize].total),
             left_out_points: counted(|frame| frame.count.out_of_range + frame.count.outside),
+            map_depth_error: depth,
             epipolar_violations: counted(|frame| frame.count.epipolar),
         })
     }
 }
 
-fn pair(frames: &[EvaluatedFrame], layer: Layer) -> PairFigures {
-    let tallies: Vec<&Tally> = frames.iter().map(|frame| &frame.layers[layer as usize]).collect();
+fn pair(frames: &[EvaluatedFrame], region: Region) -> PairFigures {
+    let counts: Vec<&Counts> = frames.iter().map(|frame| &frame.regions[region as usize]).collect();
     let source = |source: usize| {
-        let over = |of: &dyn Fn(&Tally) -> Option<f64>| mean(tallies.iter().filter_map(|tally| of(tally)));
+        let over = |of: &dyn Fn(&Counts) -> Option<f64>| mean(counts.iter().filter_map(|counts| of(counts)));
         SourceFigures {
-            accuracy: over(&|tally| tally.accuracy(source, 0)),
-            completeness: over(&|tally| tally.completeness(source)),
-            f1: over(&|tally| tally.f1(source, 0)),
-            points: tallies.iter().map(|tally| u64::from(tally.total)).sum(),
-            accuracy_alone: over(&|tally| tally.accuracy_alone(source, 0)),
-            accuracy_by_px: (1..RULES.len())
-                .filter_map(|rule| Some((RULES[rule].px, over(&|tally| tally.accuracy(source, rule))?)))
+            accuracy: over(&|counts| counts.accuracy(source, 0)),
+            completeness: over(&|counts| counts.completeness(source)),
+            f1: over(&|counts| counts.f1(source, 0)),
+            points: counts.iter().map(|counts| u64::from(counts.total)).sum(),
+            accuracy_alone: over(&|counts| counts.accuracy_alone(source, 0)),
+            accuracy_by_px: (1..ACCEPTANCE_RULES.len())
+                .filter_map(|rule| Some((ACCEPTANCE_RULES[rule].px, over(&|counts| counts.accuracy(source, rule))?)))
                 .collect(),
         }
     };
     PairFigures {
         input: source(0),
         fused: source(1),
-        frames: tallies.iter().filter(|tally| tally.total > 0).count(),
+        frames: counts.iter().filter(|counts| counts.total > 0).count(),
     }
 }
 

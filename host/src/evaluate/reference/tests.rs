@@ -30,8 +30,8 @@ fn scan(hits: &[(i32, i32, f64)]) -> LidarScan {
 struct Masks(Vec<(PixelBox, ThingAt)>);
 
 impl Masks {
-    fn layer(&self, u: i32, v: i32) -> Layer {
-        Layer::of(self.0.iter().find(|(pixels, _)| pixels.contains(u, v)).map(|(_, thing)| thing))
+    fn region(&self, u: i32, v: i32) -> Region {
+        Region::of(self.0.iter().find(|(pixels, _)| pixels.contains(u, v)).map(|(_, thing)| thing))
     }
 }
 
@@ -66,9 +66,9 @@ const HITS: [Hit; 13] = [
 ];
 
 /// One frame's points, settled with that frame's masks; and the map's depth where the hits say so.
-fn settle(frame: usize, hits: &[Hit], masks: &Masks) -> (Awaited, Vec<f32>) {
+fn pending(frame: usize, hits: &[Hit], masks: &Masks) -> (PendingFrame, Vec<f32>) {
     let places: Vec<(i32, i32, f64)> = hits.iter().map(|&(u, v, true_px, ..)| (u, v, true_px)).collect();
-    let aim = aim(&scan(&places), &FIELD);
+    let scanned = project_scan(&scan(&places), &FIELD);
     let input = |u: usize, v: usize| hits.iter().find(|hit| (hit.0 as usize, hit.1 as usize) == (u, v)).map_or(0.0, |hit| hit.3);
     let mut map_depth_m = vec![0.0; FIELD.width * FIELD.height];
     for &(u, v, _, _, shown_px) in hits.iter().filter(|hit| hit.4 > 0.0) {
@@ -76,29 +76,29 @@ fn settle(frame: usize, hits: &[Hit], masks: &Masks) -> (Awaited, Vec<f32>) {
             *depth_m = (FOCAL_PX * BASELINE_M) as f32 / shown_px;
         }
     }
-    (Awaited::settle(frame, Transform::IDENTITY, &aim, input, |u, v| masks.layer(u, v)), map_depth_m)
+    (PendingFrame::new(frame, Transform::IDENTITY, &scanned, input, |u, v| masks.region(u, v)), map_depth_m)
 }
 
-fn compare(frame: &Awaited, map_depth_m: &[f32]) -> EvaluatedFrame {
+fn compare(frame: &PendingFrame, map_depth_m: &[f32]) -> EvaluatedFrame {
     frame.compare(&View::new(map_depth_m, FIELD.width, FIELD.height).unwrap(), FOCAL_PX * BASELINE_M, 1.0).0
 }
 
 /// Position of a plain threshold among the rules.
 fn plain(px: f32) -> usize {
-    RULES.iter().position(|rule| *rule == Rule { px, share: 0.0 }).unwrap()
+    ACCEPTANCE_RULES.iter().position(|rule| *rule == Rule { px, share: 0.0 }).unwrap()
 }
 
 /// Total, missing; then by source: missing alone, errors by KITTI's rule on the intersection and alone.
-fn numbers(tally: &Tally) -> (u32, u32, [[u32; 3]; 2]) {
-    (tally.total, tally.missing, tally.sources.map(|of| [of.missing_alone, of.errors[0], of.errors_alone[0]]))
+fn numbers(counts: &Counts) -> (u32, u32, [[u32; 3]; 2]) {
+    (counts.total, counts.missing, counts.sources.map(|of| [of.missing_alone, of.errors[0], of.errors_alone[0]]))
 }
 
 #[test]
 fn every_point_of_the_hand_made_scene_is_counted_once_and_right() {
-    let (frame, map) = settle(0, &HITS, &masks(0));
+    let (frame, map) = pending(0, &HITS, &masks(0));
     let found = compare(&frame, &map);
     assert_eq!(found.count, ScanCount { points: 13, out_of_range: 2, outside: 1, epipolar: 1 });
-    let [still, dynamic, ignored] = found.layers;
+    let [still, dynamic, ignored] = found.regions;
     // Seven points of the street, three of which input or map lacks: judged are 250, 40, 90 and 25 px.
     assert_eq!(numbers(&still), (7, 3, [[2, 0, 0], [2, 1, 2]]));
     assert_eq!(numbers(&dynamic), (1, 0, [[0, 0, 0], [0, 0, 0]]));
@@ -109,75 +109,75 @@ fn every_point_of_the_hand_made_scene_is_counted_once_and_right() {
     assert!((still.f1(1, 0).unwrap() - 2.0 * 0.75 * (5.0 / 7.0) / (0.75 + 5.0 / 7.0)).abs() < 1e-12);
     // Plain thresholds do not forgive 3.5 px at 90 px.
     assert_eq!([0.5, 1.0, 3.0, 4.0].map(|px| still.sources[1].errors[plain(px)]), [3, 2, 2, 0]);
-    for tally in found.layers {
+    for counts in found.regions {
         assert!(
-            tally
+            counts
                 .sources
                 .iter()
-                .all(|of| of.missing_alone <= tally.missing && of.errors.iter().all(|&errors| errors + tally.missing <= tally.total))
+                .all(|of| of.missing_alone <= counts.missing && of.errors.iter().all(|&errors| errors + counts.missing <= counts.total))
         );
     }
-    let figures = LidarFigures::of("lidar", 0, &[found]).unwrap();
+    let figures = ReferenceFigures::of("lidar", 0, &[found], None).unwrap();
     assert_eq!((figures.left_out_points, figures.ignored_points, figures.epipolar_violations), (3, 2, 1));
     assert_eq!((figures.still.fused.accuracy, figures.still.fused.points, figures.dynamic.frames), (Some(0.75), 7, 1));
 }
 
 #[test]
 fn a_delayed_evaluation_splits_the_points_by_the_masks_of_their_own_frame() {
-    let mut delay = Delay::new(2);
-    let (first, _) = settle(7, &HITS, &masks(0));
-    assert!(delay.step(Some(first)).is_none());
-    assert!(delay.step(None).is_none(), "a frame without a scan takes its place in the row");
+    let mut delay = PendingFrames::default();
+    let (first, _) = pending(7, &HITS, &masks(0));
+    assert!(delay.step(2, Some(first)).is_none());
+    assert!(delay.step(2, None).is_none(), "a frame without a scan takes its place in the row");
     // Two frames later the masks have moved on: over points that were street.
     let later = Masks(vec![(
         PixelBox { left: 320, top: 160, width: 60, height: 40 },
         ThingAt { class: Class::Car, track: Some(1), state: State::Dynamic },
     )]);
-    let (second, mut map) = settle(9, &HITS, &later);
-    let past = delay.step(Some(second)).unwrap();
+    let (second, mut map) = pending(9, &HITS, &later);
+    let past = delay.step(2, Some(second)).unwrap();
     assert_eq!(past.frame, 7);
     // The map is that of now, of the street alone: where the parked car was it shows nothing.
     map[220 * FIELD.width + 720] = 0.0;
     let found = compare(&past, &map);
     assert_eq!(found.count, ScanCount { points: 13, out_of_range: 2, outside: 1, epipolar: 1 });
-    let [still, dynamic, ignored] = found.layers;
+    let [still, dynamic, ignored] = found.regions;
     assert_eq!(numbers(&still), (7, 3, [[2, 0, 0], [2, 1, 2]]));
     assert_eq!(numbers(&dynamic), (1, 1, [[0, 0, 0], [1, 0, 0]]));
     assert_eq!(numbers(&ignored), (2, 0, [[0, 1, 1], [0, 1, 1]]));
     assert_eq!((dynamic.accuracy(1, 0), dynamic.completeness(1), dynamic.f1(1, 0)), (None, Some(0.0), None));
-    assert_eq!(delay.step(None).map(|frame| frame.frame), None);
-    let present = delay.step(None).unwrap();
+    assert_eq!(delay.step(2, None).map(|frame| frame.frame), None);
+    let present = delay.step(2, None).unwrap();
     assert_eq!(present.frame, 9);
     // The frame of the other masks: five points that were street lie on a car now.
-    let [still, dynamic, ignored] = compare(&present, &map).layers;
+    let [still, dynamic, ignored] = compare(&present, &map).regions;
     assert_eq!([still.total, dynamic.total, ignored.total], [5, 5, 0]);
 }
 
 #[test]
 fn frames_without_a_judged_point_are_left_out_of_the_means() {
-    let tally = |points: &[[f32; 3]]| {
-        let mut tally = Tally::default();
-        points.iter().for_each(|&[true_px, input, map]| tally.add(true_px, [input, map]));
+    let counts = |points: &[[f32; 3]]| {
+        let mut counts = Counts::default();
+        points.iter().for_each(|&[true_px, input, map]| counts.add(true_px, [input, map]));
         EvaluatedFrame {
             frame: 0,
             count: ScanCount::default(),
-            layers: [tally, Tally::default(), Tally::default()],
+            regions: [counts, Counts::default(), Counts::default()],
         }
     };
-    let frames = [tally(&[[20.0, 20.0, 20.0], [20.0, 20.0, 30.0]]), tally(&[[20.0, 20.0, 0.0]]), tally(&[])];
-    let fused = LidarFigures::of("lidar", 0, &frames).unwrap().still;
+    let frames = [counts(&[[20.0, 20.0, 20.0], [20.0, 20.0, 30.0]]), counts(&[[20.0, 20.0, 0.0]]), counts(&[])];
+    let fused = ReferenceFigures::of("lidar", 0, &frames, None).unwrap().still;
     assert_eq!((fused.fused.accuracy, fused.fused.completeness, fused.frames), (Some(0.5), Some(0.5), 2));
     assert!((fused.fused.f1.unwrap() - 2.0 / 3.0).abs() < 1e-12, "the second frame has no accuracy, hence no F1");
-    assert!(LidarFigures::of("lidar", 0, &[]).is_none());
+    assert!(ReferenceFigures::of("lidar", 0, &[], None).is_none());
 }
 
 #[test]
 fn errors_are_counted_at_full_size_whatever_the_scale() {
-    let (frame, map) = settle(0, &[(300, 180, 30.0, 30.0, 28.0)], &masks(0));
+    let (frame, map) = pending(0, &[(300, 180, 30.0, 30.0, 28.0)], &masks(0));
     let wrong = |enlarged: f32| {
         let view = View::new(&map, FIELD.width, FIELD.height).unwrap();
         let (found, _) = frame.compare(&view, FOCAL_PX * BASELINE_M, enlarged);
-        found.layers[Layer::Static as usize].sources[1].errors[0]
+        found.regions[Region::Static as usize].sources[1].errors[0]
     };
     assert_eq!((wrong(1.0), wrong(2.0)), (0, 1), "2 px at half the size are 4 px");
 }

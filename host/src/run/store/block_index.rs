@@ -30,14 +30,14 @@ struct OpenTile {
 
 /// The places.
 #[derive(Debug, Default)]
-pub(super) struct Places {
+pub(super) struct BlockIndexOnDisk {
     /// Where the newest record of each tile begins.
     newest: HashMap<Tile, u64>,
     open: HashMap<Tile, OpenTile>,
     uses: u64,
 }
 
-impl Places {
+impl BlockIndexOnDisk {
     /// Where the newest record of a tile begins, if there is one.
     pub fn newest(&self, tile: Tile) -> Option<u64> {
         self.newest.get(&tile).copied()

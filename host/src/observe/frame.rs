@@ -1,0 +1,119 @@
+//! What is recorded of every frame.
+
+use crate::input::MaskRefusals;
+use dynvox_core::egomotion::MotionStatus;
+use dynvox_core::egomotion::icp::IcpStatus;
+use dynvox_core::{PoseOrigin, Report, Severity, Stage};
+use serde::{Deserialize, Serialize};
+
+/// Stages whose time is taken.
+pub const STAGES: usize = Stage::ALL.len();
+
+/// What one stage took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StageTime {
+    /// Wall time, ms.
+    pub wall_ms: f64,
+    /// CPU time of all threads together, ms.
+    pub cpu_ms: f64,
+}
+
+/// One frame.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FrameRow {
+    /// Number of the frame in the data set.
+    pub frame: usize,
+    /// Its time, s.
+    pub time_s: f64,
+    /// What the core reports.
+    pub report: Report,
+    /// Frames in the pruning window's history.
+    pub history_frames: usize,
+    /// Tracks seen in this frame by motion state: uncertain, static, dynamic.
+    pub track_states: [u32; 3],
+    /// Masks of the source that could not be used.
+    pub mask_refusals: MaskRefusals,
+    /// Invalid values of a given depth image: not finite, negative, or no disparity of this rig.
+    pub depth_refused: u32,
+    /// Wall time of the whole step, ms.
+    pub step_ms: f64,
+    /// Resident memory of the process, where the machine tells.
+    pub rss_bytes: Option<u64>,
+    /// Time by stage, in the order of `Stage::ALL`.
+    pub stages: [StageTime; STAGES],
+}
+
+impl FrameRow {
+    /// How the camera's motion was found, in one word.
+    pub fn motion(&self) -> &'static str {
+        if let Some(icp) = &self.report.icp {
+            return match icp.status {
+                IcpStatus::Tracked => "tracked",
+                IcpStatus::TooFewPairs => "tracking_failure_too_few_pairs",
+                IcpStatus::NotHeld => "tracking_failure_direction_not_held",
+                IcpStatus::OffTheMap => "tracking_failure_off_the_map",
+                IcpStatus::TooFar => "tracking_failure_too_far",
+                IcpStatus::Contradicted => "tracking_failure_contradicted_by_the_images",
+            };
+        }
+        match self.report.egomotion.map(|motion| motion.status) {
+            None if self.report.pose == PoseOrigin::Given => "given",
+            None => "first",
+            Some(MotionStatus::Estimated) => "estimated",
+            Some(MotionStatus::TooFewMatches) => "too_few_matches",
+            Some(MotionStatus::TooFewInliers) => "too_few_inliers",
+            Some(MotionStatus::NotConverged) => "not_converged",
+            Some(MotionStatus::BadRig) => "bad_rig",
+        }
+    }
+
+    /// Whether the pose was extrapolated at constant velocity for want of an estimate.
+    pub fn held(&self) -> bool {
+        self.report.pose == PoseOrigin::Held
+    }
+
+    /// Matches the estimate was made of, inliers among them, and their root mean square error in px; for the depth tracker the
+    /// matches that were checked, and those that agree.
+    pub fn matches(&self) -> (u32, u32, f64) {
+        if let Some(icp) = &self.report.icp {
+            return (icp.matches[1], icp.matches[0], 0.0);
+        }
+        self.report.egomotion.map_or((0, 0, 0.0), |motion| (motion.matches, motion.inliers, motion.residual_rms_px))
+    }
+
+    /// The worst event of the frame: what the core reports, and what the sources of masks and depth refused. Objects of a frame
+    /// without masks go into the static map.
+    pub fn severity(&self) -> Severity {
+        let masks = &self.mask_refusals;
+        let of_sources = if masks.missing + masks.beyond > 0 {
+            Severity::MapAffected
+        } else if masks.unnamed + masks.unknown_class + masks.empty + self.depth_refused > 0 {
+            Severity::Recovered
+        } else {
+            Severity::Info
+        };
+        self.report.severity().max(of_sources)
+    }
+
+    /// What affected the map in this frame, in words.
+    pub fn cause(&self) -> String {
+        let (allocation, motion, masks) = (&self.report.allocation, self.motion(), &self.mask_refusals);
+        let guessed = self.held().then(|| format!("no motion estimate ({}), the frame was not fused", motion.replace('_', " ")));
+        let counts = [
+            (allocation.refused, "block requests refused, the pool is full"),
+            (allocation.beyond, "points beyond the map's coordinates"),
+            (allocation.unlisted, "visible blocks beyond the list's capacity"),
+            (allocation.eviction.lost, "blocks evicted and not stored"),
+            (masks.missing, "frame without masks"),
+            (masks.beyond, "masks beyond the source's limits"),
+        ];
+        let counted = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+        guessed.into_iter().chain(counted).collect::<Vec<_>>().join("; ")
+    }
+
+    /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the list of visible ones.
+    pub fn blocks_refused(&self) -> u32 {
+        let allocation = &self.report.allocation;
+        allocation.refused + allocation.beyond + allocation.unlisted
+    }
+}

@@ -1,0 +1,69 @@
+//! What was refused or lost, over a run.
+
+use super::{Finished, FrameContext, ObserveError, Observer, Setup};
+use crate::input::MaskRefusals;
+use dynvox_core::Severity;
+use dynvox_core::tracking::DetectionCount;
+use serde::{Deserialize, Serialize};
+
+/// What was refused or lost.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct HealthSection {
+    /// The worst event of all frames and of the end.
+    #[serde(skip)]
+    pub worst: Severity,
+    /// Features and matches for which there was no memory.
+    pub matches_dropped: u64,
+    /// Invalid values of given depth images.
+    pub depth_values_refused: u64,
+    /// Masks of the source that could not be used.
+    pub mask_refusals: MaskRefusals,
+    /// Detections by outcome.
+    pub detections: DetectionCount,
+    /// Tracks and object volumes for which there was no memory.
+    pub tracks_refused: u64,
+}
+
+/// Counts refusals.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct HealthObserver {
+    sums: HealthSection,
+}
+
+impl Observer for HealthObserver {
+    type Section = HealthSection;
+
+    fn frame(&mut self, _: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        let (sums, row) = (&mut self.sums, frame.row);
+        let instances = &row.report.instances;
+        sums.matches_dropped += u64::from(row.report.dropped_features());
+        sums.depth_values_refused += u64::from(row.depth_refused);
+        sums.mask_refusals.add(&row.mask_refusals);
+        sums.detections = sum(sums.detections, &instances.detections);
+        sums.tracks_refused += u64::from(instances.tracks.refused + instances.objects.refused);
+        Ok(())
+    }
+
+    fn finish(self, _: &Setup<'_>, finished: &Finished<'_>) -> Result<HealthSection, ObserveError> {
+        let store = &finished.store;
+        let end = if u64::from(store.end.lost) + store.unreadable > 0 { Severity::MapAffected } else { Severity::Info };
+        let worst = finished.rows.iter().map(|row| row.severity()).fold(end, Severity::max);
+        Ok(HealthSection { worst, ..self.sums })
+    }
+}
+
+fn sum(a: DetectionCount, b: &DetectionCount) -> DetectionCount {
+    DetectionCount {
+        given: a.given + b.given,
+        taken: a.taken + b.taken,
+        bad_score: a.bad_score + b.bad_score,
+        bad_box: a.bad_box + b.bad_box,
+        bad_mask: a.bad_mask + b.bad_mask,
+        ignored: a.ignored + b.ignored,
+        too_small: a.too_small + b.too_small,
+        tracked_only: a.tracked_only + b.tracked_only,
+        beyond: a.beyond + b.beyond,
+        no_room: a.no_room + b.no_room,
+        covered: a.covered + b.covered,
+    }
+}

@@ -1,0 +1,88 @@
+//! Pictures of some frames, and of the finished map.
+
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
+use dynvox_core::geometry::Transform;
+use serde::{Deserialize, Serialize};
+
+/// Frames shown in the report.
+const KEYFRAMES: usize = 5;
+/// Disparity shown in red, as a share of the image width.
+const NEAR_SHARE: f32 = 0.08;
+
+/// Position of the overview's camera relative to the last camera, m: behind and above.
+const OVERVIEW_OFFSET_M: [f64; 3] = [0.0, -7.0, -15.0];
+/// How far it is tilted down, rad.
+const OVERVIEW_PITCH_RAD: f64 = 0.33;
+
+/// Pictures of one frame, as PNG files.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Keyframe {
+    /// Number of the frame in the data set.
+    pub frame: usize,
+    /// Left image.
+    pub input_png: Vec<u8>,
+    /// Disparity in colours.
+    pub disparity_png: Vec<u8>,
+    /// The static map from the camera's pose.
+    pub raycast_png: Vec<u8>,
+    /// The same with every object in its place; empty without objects.
+    pub composed_png: Vec<u8>,
+}
+
+/// Pictures of a run.
+#[derive(Clone, Debug)]
+pub struct KeyframesSection {
+    /// Of some frames.
+    pub keyframes: Vec<Keyframe>,
+    /// The finished map from behind and above the last camera, as a PNG file; empty without frames.
+    pub overview_png: Vec<u8>,
+}
+
+/// Takes pictures.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct KeyframesObserver {
+    keyframes: Vec<Keyframe>,
+    #[serde(skip)]
+    overview_png: Vec<u8>,
+}
+
+impl Observer for KeyframesObserver {
+    type Section = KeyframesSection;
+
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        if spread(setup.indices.len(), KEYFRAMES)(frame.at) {
+            self.keyframes.extend(keyframe(frame));
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, _: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+        if let Some(row) = end.rows.last() {
+            let down = nalgebra::Vector3::new(-OVERVIEW_PITCH_RAD, 0.0, 0.0);
+            let t_world_camera = row.report.t_world_camera * Transform::new(down, OVERVIEW_OFFSET_M);
+            let seen = end.view.raycast(&t_world_camera);
+            self.overview_png = seen.map(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None)).unwrap_or_default();
+        }
+        Ok(())
+    }
+
+    fn finish(self, _: &Setup<'_>, _: &Finished<'_>) -> Result<KeyframesSection, ObserveError> {
+        Ok(KeyframesSection { keyframes: self.keyframes, overview_png: self.overview_png })
+    }
+}
+
+fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
+    let t_world_camera: Transform = frame.row.report.t_world_camera;
+    let grey = frame.images.left.view()?;
+    let colour = frame.images.colour.as_ref().and_then(|colour| colour.view());
+    let near_px = NEAR_SHARE * grey.width() as f32;
+    let disparity_png = pictures::disparity(&frame.view.mapper().disparity_q8(), near_px);
+    let seen = frame.view.raycast(&t_world_camera)?;
+    Some(Keyframe {
+        frame: frame.row.frame,
+        input_png: pictures::input(&grey, colour.as_ref()),
+        disparity_png,
+        raycast_png: pictures::map(pictures::SMALL_PX, seen, |_| None),
+        composed_png: pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera),
+    })
+}

@@ -1,0 +1,97 @@
+//! The last lines of a run on the console.
+
+use super::text::{MIB, lost_because, motion_error, states_in_time};
+use crate::evaluate::reference::{PairFigures, ReferenceFigures};
+use crate::evaluate::trajectory::TrajectoryErrors;
+use crate::observe::Sections;
+use crate::run::RunRecord;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Prints the figures of a run whose folder is `folder`.
+///
+/// # Errors
+/// The output is closed.
+pub fn print_summary(out: &mut impl Write, run: &RunRecord, folder: &Path) -> io::Result<()> {
+    let mut lines = vec![("frames", format!("{} at {:.1} fps", run.frames.len(), run.fps()))];
+    let Sections { trajectory, reference, tracks, .. } = &run.sections;
+    lines.extend(trajectory.errors.iter().flat_map(trajectory_lines));
+    lines.extend(reference.iter().filter_map(|reference| reference.figures.as_ref()).flat_map(reference_lines));
+    if let Some(figures) = &tracks.figures {
+        lines.push(("tracks, 20 m", states_in_time(&figures.late_near)));
+        lines.push(("tracks, 20 to 32 m", format!("{}; {} state flips", states_in_time(&figures.late_far), figures.flips)));
+        let error = |of| motion_error(of).unwrap_or_else(|| "-".to_owned());
+        let [near, far] = [&figures.moving_near, &figures.moving_far].map(error);
+        lines.push(("motion error", format!("per frame of moving objects: {near} within 20 m; {far} at 20 to 32 m")));
+    }
+    lines.extend(block_lines(run));
+    lines.extend(pose_lines(run));
+    lines.push(("digest", format!("{:016x}", run.digest())));
+    lines.push(("results", folder.display().to_string()));
+    lines.iter().try_for_each(|(name, value)| writeln!(out, "{name:<22}{value}"))
+}
+
+fn trajectory_lines(errors: &TrajectoryErrors) -> Vec<(&'static str, String)> {
+    let over_segments = errors.t_err_percent.zip(errors.r_err_deg_per_m);
+    let per_frame = format!("{:.2} cm, {:.4} deg per frame; ATE {:.3} m", 100.0 * errors.rpe_t_m, errors.rpe_r_deg, errors.ate_m);
+    match over_segments {
+        Some((percent, deg_per_m)) => {
+            vec![("trajectory error", format!("{percent:.3} %, {deg_per_m:.4} deg/m over segments")), ("", per_frame)]
+        }
+        None => vec![("trajectory error", per_frame)],
+    }
+}
+
+fn reference_lines(figures: &ReferenceFigures) -> Vec<(&'static str, String)> {
+    let percent = |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
+    let name = if figures.source == "exact" { "exact depth" } else { "LiDAR" };
+    let line = |label: &'static str, PairFigures { input, fused, .. }: &PairFigures| {
+        let [input, map] = [input, fused].map(|of| format!("{} accurate, {} complete", percent(of.accuracy), percent(of.completeness)));
+        (label, format!("against {name} ({}): input {input}; map {map}", figures.rule))
+    };
+    let mut lines = vec![line("static map", &figures.still)];
+    if figures.dynamic.frames > 0 {
+        lines.push(line("objects", &figures.dynamic));
+    }
+    if let Some(depth) = figures.map_depth_error {
+        let (error_cm, depth_m) = (100.0 * depth.median_error_m, depth.median_depth_m);
+        lines.push(("", format!("median depth error of the static map {error_cm:.1} cm at {depth_m:.1} m")));
+    }
+    lines
+}
+
+fn block_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
+    let blocks = &run.sections.blocks;
+    let (totals, store) = (&blocks.totals, &blocks.store);
+    let mut lines =
+        vec![("map", format!("{} triangles, peak {} of {} blocks", blocks.mesh.triangles, totals.peak, run.header.capacity.blocks))];
+    if totals.refused > 0 {
+        let advice = "Give more bytes with --memory, or a larger volume.voxel_size_m";
+        lines.push(("", format!("blocks refused: {}; the map has holes. {advice}", totals.refused)));
+    }
+    if store.records > 0 {
+        let mib = store.bytes as f64 / MIB;
+        lines.push(("", format!("blocks on disk: {} written, {} loaded back, {mib:.1} MiB", store.records, totals.loaded)));
+    }
+    if blocks.lost() > 0 {
+        lines.push(("", format!("blocks lost: {}; {}", blocks.lost(), lost_because(run))));
+    }
+    lines
+}
+
+fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
+    let trajectory = &run.sections.trajectory;
+    match trajectory.failures {
+        Some(failures) => vec![
+            (
+                "tracking failure",
+                format!("in {} of {} frames, first in frame {}: {}", failures.frames, run.frames.len(), failures.first, failures.cause),
+            ),
+            ("", "their poses are extrapolated, and they are not in the map. --egomotion stereo follows fast motion".to_owned()),
+        ],
+        None if trajectory.held_frames > 0 => {
+            vec![("poses extrapolated", format!("in {} frames: too few matches", trajectory.held_frames))]
+        }
+        None => Vec::new(),
+    }
+}

@@ -1,0 +1,65 @@
+//! The camera's path, and its errors against ground truth.
+
+use super::table;
+use crate::evaluate::trajectory::{TrajectoryErrors, travelled_m};
+use crate::report::chart::{Path, from_above};
+use crate::run::RunRecord;
+use dynvox_core::geometry::Transform;
+use maud::{Markup, html};
+
+pub fn section(run: &RunRecord) -> Markup {
+    let trajectory = &run.sections.trajectory;
+    let above = |poses: &[Transform]| poses.iter().map(|pose| (pose.translation_m[0], pose.translation_m[2])).collect();
+    let mut paths = vec![Path {
+        name: "estimate",
+        colour: "var(--accent)",
+        dashed: false,
+        points: above(&trajectory.poses),
+    }];
+    if let Some(truth) = &trajectory.truth {
+        paths.push(Path { name: "ground truth", colour: "var(--truth)", dashed: true, points: above(truth) });
+    }
+    let length_m = travelled_m(&trajectory.poses).last().copied().unwrap_or_default();
+    html! {
+        section {
+            h2 { "Trajectory from above" }
+            p.soft.small {
+                (format!("{length_m:.1} m travelled; ")) (trajectory.held_frames) " of " (run.frames.len())
+                " poses extrapolated at constant velocity"
+            }
+            (from_above(&paths))
+            @if let Some(failures) = trajectory.failures {
+                p {
+                    b { "Tracking failure in " (failures.frames) " of " (run.frames.len()) " frames" }
+                    ", first in frame " (failures.first) ": " (failures.cause)
+                    ". Their poses are extrapolated, and they are not in the map."
+                }
+            }
+            @if let Some(errors) = &trajectory.errors { (errors_of(errors)) }
+        }
+    }
+}
+
+fn errors_of(errors: &TrajectoryErrors) -> Markup {
+    let mut rows: Vec<Vec<String>> = errors
+        .per_length
+        .iter()
+        .map(|(length_m, percent, deg_per_m, segments)| {
+            vec![length_m.to_string(), format!("{percent:.3}"), format!("{deg_per_m:.5}"), segments.to_string()]
+        })
+        .collect();
+    if let (Some(percent), Some(deg_per_m)) = (errors.t_err_percent, errors.r_err_deg_per_m) {
+        rows.push(vec!["all".to_owned(), format!("{percent:.3}"), format!("{deg_per_m:.5}"), String::new()]);
+    }
+    html! {
+        p.small.apart {
+            (format!(
+                "Against ground truth: from frame to frame {:.2} cm and {:.4}° (RMS); {:.3} m (RMS) after rigid alignment.",
+                100.0 * errors.rpe_t_m, errors.rpe_r_deg, errors.ate_m
+            ))
+        }
+        @if !rows.is_empty() {
+            (table(&[("segment, m", true), ("translation, %", true), ("rotation, °/m", true), ("segments", true)], &rows))
+        }
+    }
+}

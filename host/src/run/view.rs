@@ -1,0 +1,33 @@
+//! The map as observers look at it: raycasts on the run's threads.
+
+use super::Threads;
+use crate::observe::{MapView, StageTime};
+use dynvox_core::geometry::Transform;
+use dynvox_core::view::Raycaster;
+use dynvox_core::{Mapper, Stage};
+
+/// The mapper and the threads that raycast.
+pub(super) struct LiveMap<'m, 's> {
+    pub mapper: &'m mut Mapper<'s>,
+    pub threads: &'m Threads,
+    /// What the first raycast took.
+    pub first_raycast: Option<StageTime>,
+}
+
+impl<'s> MapView<'s> for LiveMap<'_, 's> {
+    fn mapper(&self) -> &Mapper<'s> {
+        self.mapper
+    }
+
+    fn raycast(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>> {
+        let (mapper, threads) = (&mut *self.mapper, self.threads);
+        let seen = threads.run(|| mapper.raycast(t_world_camera, threads));
+        self.first_raycast.get_or_insert(threads.take_times()[Stage::Raycast as usize]);
+        seen.ok()
+    }
+
+    fn raycast_with_objects(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>> {
+        let (mapper, threads) = (&mut *self.mapper, self.threads);
+        threads.run(|| mapper.raycast_composed(t_world_camera, threads)).ok()
+    }
+}
