@@ -8,7 +8,7 @@ use dynvox_core::{
     geometry::Transform,
     image::View,
     objects::NoSink,
-    tracking::{Class, Detection, State, TrackReport},
+    tracking::{Class, Detection, MotionState, TrackReport},
     view::{MeshConfig, Raycaster},
     volume::NoStore,
 };
@@ -75,7 +75,7 @@ impl Drive {
 
     fn run_within(&self, capacity: &Capacity, dynamic: bool, backwards: bool, mut look: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
         let mut config = Config::for_rig(self.street.rig());
-        config.instances.dynamic = dynamic;
+        config.tracking.dynamic = dynamic;
         let mut slab = HeapSlab::of(capacity);
         let mut mapper = Mapper::new(capacity, &config, slab.bytes()).unwrap();
         for (index, (frame, seen)) in self.frames.iter().enumerate() {
@@ -135,7 +135,7 @@ fn moving_cars_leave_no_trail_in_the_static_map_and_do_without_masks() {
 #[test]
 fn each_cars_state_and_motion_are_the_true_ones_whatever_the_order_of_detections() {
     let drive = Drive::new();
-    let mut states: BTreeMap<u32, Vec<(bool, State)>> = BTreeMap::new();
+    let mut states: BTreeMap<u32, Vec<(bool, MotionState)>> = BTreeMap::new();
     let (mut errors_m, mut errors_deg) = (Vec::new(), Vec::new());
     let mut digests = Vec::new();
     drive.run(true, false, |index, report, mapper| {
@@ -144,7 +144,7 @@ fn each_cars_state_and_motion_are_the_true_ones_whatever_the_order_of_detections
         let Some((last, _)) = index.checked_sub(1).map(|last| &drive.frames[last]) else { return };
         // The truth, as seen from the estimated camera: the camera's own drift is not the object's error.
         let t_map_world = report.t_world_camera * frame.t_world_camera.inverse();
-        for track in mapper.tracks().filter(|track| track.seen && track.sightings > 4) {
+        for track in mapper.tracks().filter(|track| track.detected && track.sightings > 4) {
             let Some(car) = truth(frame, seen, &track) else { continue };
             states.entry(track.id).or_default().push((car.moving, track.state));
             let distance_m = (frame.t_world_camera.inverse() * car.t_world_object).translation_m[2];
@@ -159,10 +159,12 @@ fn each_cars_state_and_motion_are_the_true_ones_whatever_the_order_of_detections
         }
     });
     for (id, states) in &states {
-        let wrong = states.iter().filter(|(moving, state)| (*moving && *state == State::Static) || (!moving && *state == State::Dynamic));
+        let wrong = states
+            .iter()
+            .filter(|(moving, state)| (*moving && *state == MotionState::Static) || (!moving && *state == MotionState::Dynamic));
         assert_eq!(wrong.count(), 0, "track {id}: {states:?}");
     }
-    let known = states.values().flatten().filter(|(moving, state)| *moving && *state == State::Dynamic).count();
+    let known = states.values().flatten().filter(|(moving, state)| *moving && *state == MotionState::Dynamic).count();
     let moving = states.values().flatten().filter(|(moving, _)| *moving).count();
     assert!(moving > 15 && known * 10 >= moving * 8, "{known} of {moving} sightings of moving cars");
     let median = |values: &mut Vec<f64>| {
@@ -196,7 +198,7 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
         }
         let pose = report.t_world_camera;
         let mut nearest = picture(mapper.raycast(&pose, &Serial).unwrap());
-        let tracks: Vec<u32> = mapper.placed_objects().map(|placed| placed.summary.id).collect();
+        let tracks: Vec<u32> = mapper.posed_objects().map(|placed| placed.summary.id).collect();
         for (layer, track) in (1..).zip(&tracks) {
             let alone = picture(mapper.raycast_object(*track, &pose, &Serial).unwrap());
             for (nearest, pixel) in nearest.iter_mut().zip(alone) {
@@ -213,7 +215,7 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
         let (frame, seen) = &drive.frames[index];
         let states: BTreeMap<usize, &str> = mapper
             .tracks()
-            .filter(|track| track.seen && tracks.contains(&track.id))
+            .filter(|track| track.detected && tracks.contains(&track.id))
             .filter_map(|track| {
                 let near = |seen: &&Seen| (seen.pixels[0] - track.pixels.left).abs() + (seen.pixels[1] - track.pixels.top).abs();
                 Some((seen.iter().min_by_key(near)?.truth, track.state.name()))

@@ -69,7 +69,7 @@ impl DynvoxConfig {
         config.volume.far_m = self.far_m;
         config.volume.prune_weight = self.prune_weight;
         config.volume.prune_lag = self.prune_lag;
-        config.instances.dynamic = self.dynamic;
+        config.tracking.dynamic = self.dynamic;
         config
     }
 }
@@ -95,7 +95,7 @@ pub unsafe extern "C" fn dynvox_config_default(rig: *const DynvoxRig, config: *m
         far_m: defaults.volume.far_m,
         prune_weight: defaults.volume.prune_weight,
         prune_lag: defaults.volume.prune_lag,
-        dynamic: defaults.instances.dynamic,
+        dynamic: defaults.tracking.dynamic,
     };
     // SAFETY: not null and aligned, as checked; of the right type, as promised.
     unsafe { config.write(value) };

@@ -4,11 +4,12 @@ use super::MapperConfig;
 use crate::{
     egomotion::{EgomotionConfig, icp::IcpConfig},
     geometry::{RigProblem, StereoRig},
+    objects::ObjectsConfig,
     problem::{Problems, require},
     rectify::Rectification,
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
-    tracking::InstancesConfig,
+    tracking::TrackingConfig,
     view::{MeshConfig, RaycastConfig},
     volume::VolumeConfig,
 };
@@ -30,8 +31,10 @@ pub struct Config {
     pub icp: IcpConfig,
     /// What the loop does, and when.
     pub mapper: MapperConfig,
-    /// What moves or could.
-    pub instances: InstancesConfig,
+    /// Instances and tracks.
+    pub tracking: TrackingConfig,
+    /// The objects' maps.
+    pub objects: ObjectsConfig,
     /// The map.
     pub volume: VolumeConfig,
     /// Views of the map.
@@ -51,7 +54,8 @@ impl Config {
             egomotion: EgomotionConfig::default(),
             icp: IcpConfig::default(),
             mapper: MapperConfig::default(),
-            instances: InstancesConfig::default(),
+            tracking: TrackingConfig::default(),
+            objects: ObjectsConfig::default(),
             volume: VolumeConfig::default(),
             raycast: RaycastConfig::default(),
             mesh: MeshConfig::default(),
@@ -70,7 +74,8 @@ impl Config {
         self.egomotion.validate(&mut problems);
         self.icp.validate(&mut problems);
         self.mapper.validate(&mut problems);
-        self.instances.validate(&mut problems);
+        self.tracking.validate(&mut problems);
+        self.objects.validate(&mut problems);
         self.volume.validate(&mut problems);
         self.raycast.validate(&mut problems);
         self.mesh.validate(&mut problems);

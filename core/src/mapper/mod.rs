@@ -1,15 +1,17 @@
 //! The loop of the paper (Section III), one line per stage.
 
 mod budget;
-mod camera;
 mod config;
 mod digests;
 mod error;
 mod frame;
+mod localization;
 mod raycast;
 mod report;
 mod settings;
 pub mod snapshot;
+mod static_map;
+mod step;
 #[cfg(test)]
 mod tests;
 
@@ -23,19 +25,18 @@ pub use settings::{MapperConfig, MotionSource};
 pub use snapshot::RestoreError;
 
 use crate::{
-    Capacity, Executor, Footprint, Stage,
-    egomotion::{Egomotion, Estimator, MotionEstimate},
-    geometry::{StereoRig, Transform, depth_from_disparity},
-    image::{View, ViewMut},
+    Capacity, Footprint,
+    egomotion::{Egomotion, Estimator},
+    geometry::{StereoRig, Transform},
+    image::View,
     memory::{Carver, region_bytes},
-    objects::{NoSink, Object, ObjectFrame, ObjectSink, ObjectSummary, Objects, Picture},
-    rectify::{Pair, RawCamera, RectifiedImages, Rectifier},
-    scene_flow::{FlowMatcher, FlowStatus},
-    state::Hasher,
+    objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
+    rectify::{RawCamera, RectifiedImages, Rectifier},
+    scene_flow::FlowMatcher,
     stereo::StereoMatcher,
-    tracking::{CameraMotion, Seen, ThingAt, TrackReport, Tracker},
+    tracking::{InstanceAt, TrackReport, Tracker},
     view::{Raycaster, Triangle},
-    volume::{AllocationReport, BlockStore, EvictionReport, NoStore, Observation, PruneReport, Viewpoint, Volume},
+    volume::{BlockStore, EvictionReport, PruneReport, Volume},
 };
 
 /// A stereo mapper in a slab.
@@ -121,8 +122,8 @@ impl<'s> Mapper<'s> {
             scene_flow: FlowMatcher::new_in(capacity, carver),
             estimator: Estimator::new_in(capacity, carver),
             camera: Egomotion::default(),
-            tracker: Tracker::new_in(capacity, &config.instances, carver),
-            objects: Objects::new_in(capacity, &config.instances.volume, carver),
+            tracker: Tracker::new_in(capacity, &config.tracking, carver),
+            objects: Objects::new_in(capacity, &config.objects, carver),
             depth_m: carver.alloc("depth_m", capacity.pixels()),
             background: Volume::new_in(capacity, &config.volume, carver),
             raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
@@ -133,122 +134,8 @@ impl<'s> Mapper<'s> {
         }
     }
 
-    /// Takes one frame: depth, motion, map. Never allocates, never panics; what could not be done is counted in the report. Blocks that
-    /// must leave a full pool are lost, and counted.
-    pub fn step<E: Executor>(&mut self, frame: &StereoFrame<'_>, executor: &E) -> Result<Report, StepError> {
-        self.step_with(frame, executor, &mut NoStore, &mut NoSink)
-    }
-
-    /// As [`Mapper::step`], with a store that keeps the blocks that must leave and brings them back when they are seen again, and a sink
-    /// for objects that leave.
-    // Never inlined, so that a step's stack can be told from its caller's.
-    #[inline(never)]
-    pub fn step_with<E: Executor, S: BlockStore, O: ObjectSink>(
-        &mut self,
-        frame: &StereoFrame<'_>,
-        executor: &E,
-        store: &mut S,
-        objects: &mut O,
-    ) -> Result<Report, StepError> {
-        let size = self.admit(frame)?;
-        let input = frame.digest();
-        // The rectified images are lent out for the step, so that the stages may read them while they change the mapper.
-        let mut images = core::mem::take(&mut self.rectified);
-        let raw = Pair { left: frame.left, right: frame.right, colour: frame.colour };
-        let rectified = executor.stage(Stage::Rectify, || self.rectifier.rectify(&raw, &mut images, executor));
-        let Pair { left, right, colour } = rectified.unwrap_or(raw);
-        let rectification = self.rectifier.report(&Pair { left, right, colour });
-        let frame = StereoFrame { left, right, colour, ..*frame };
-        let report = self.step_rectified(&frame, size, executor, store, objects);
-        self.rectified = images;
-        Ok(report.with_input(input, rectification))
-    }
-
-    /// Takes a rectified frame that was admitted.
-    fn step_rectified<E: Executor, S: BlockStore, O: ObjectSink>(
-        &mut self,
-        frame: &StereoFrame<'_>,
-        [width, height]: [usize; 2],
-        executor: &E,
-        store: &mut S,
-        objects: &mut O,
-    ) -> Report {
-        let (config, left, right) = (self.config, frame.left, frame.right);
-        let invalid = self.rectifier.invalid();
-        let invalid = invalid.as_ref();
-
-        // (A) Depth from the pair, unless it is given, and (C.1) sparse scene flow over this pair and the last: neither needs the other.
-        let (stereo, scene_flow) = executor.join(
-            || {
-                executor.stage(Stage::Stereo, || match frame.disparity_q8 {
-                    Some(given) => self.stereo.take(given),
-                    None => self.stereo.compute_within(&config.stereo, left, right, invalid, executor),
-                })
-            },
-            || executor.stage(Stage::SceneFlow, || self.scene_flow.push_within(&config.scene_flow, left, right, invalid, executor)),
-        );
-        // (B) What a detector saw, joined to what is tracked, with the matches on it.
-        executor.stage(Stage::Instances, || {
-            self.tracker.admit(self.frame, frame.detections, [width, height]);
-            self.tracker.claim(self.scene_flow.refined(), self.scene_flow.sparse());
-        });
-        // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
-        let matched = scene_flow.status == FlowStatus::Matched;
-        let (pose, egomotion, icp) = executor.stage(Stage::Egomotion, || self.move_camera(frame, matched, [width, height], executor));
-        let known = pose != PoseOrigin::Held;
-        let fused = known && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
-        let moved = matches!(pose, PoseOrigin::Estimated | PoseOrigin::Given).then(|| *self.camera.t_current_previous());
-        let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous: moved };
-        // (D) The objects' motions.
-        executor.stage(Stage::Instances, || {
-            let seen = Seen {
-                refined: self.scene_flow.refined(),
-                sparse: self.scene_flow.sparse(),
-                images: Some((&self.scene_flow, self.stereo.disparity_q8())),
-            };
-            self.tracker.follow(&config.rig, &seen, &camera, &mut self.estimator);
-        });
-        // (E) What the camera sees goes into the map, but for what might move, which has maps of its own; unless the pose is a guess
-        // or the frame's turn has not come.
-        let view = Viewpoint { rig: config.rig, width, height, t_world_camera: camera.t_world_camera };
-        let allocation = if fused { self.fuse(frame, &view, executor, store) } else { AllocationReport::default() };
-        executor.stage(Stage::Instances, || {
-            let shown = ObjectFrame {
-                rig: &config.rig,
-                t_world_camera: &camera.t_world_camera,
-                picture: Picture { grey: left, colour: frame.colour },
-                disparity_q8: self.stereo.disparity_q8(),
-            };
-            self.objects.reconstruct(&self.tracker, fused.then_some(&shown), executor, objects);
-            self.tracker.settle();
-        });
-        // (F) Noise last seen a fixed lag ago goes.
-        let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
-
-        let digests = self.digests(egomotion.as_ref());
-        let report = Report {
-            frame: self.frame,
-            t_world_camera: camera.t_world_camera,
-            rectification: None,
-            stereo,
-            scene_flow,
-            pose,
-            egomotion,
-            icp,
-            instances: self.objects.report(self.tracker.report()),
-            fused,
-            allocation,
-            prune,
-            blocks: self.block_count(),
-            digests,
-            digest: digests.whole(self.frame),
-        };
-        self.frame += 1;
-        report
-    }
-
-    /// Checks a frame against the capacity and the frames before.
-    fn admit(&mut self, frame: &StereoFrame<'_>) -> Result<[usize; 2], StepError> {
+    /// Checks a frame against the capacity and the frames before; the size of the rectified images.
+    fn validate(&mut self, frame: &StereoFrame<'_>) -> Result<[usize; 2], StepError> {
         let given = [frame.left.width(), frame.left.height()];
         // Of the left image, of the right one, and of what comes out of them.
         let [left, right, size] = match self.rectifier.rectification() {
@@ -288,29 +175,6 @@ impl<'s> Mapper<'s> {
         Ok(size)
     }
 
-    /// Turns the disparity into depth, makes blocks around it and averages it in.
-    fn fuse<E: Executor, S: BlockStore>(
-        &mut self,
-        frame: &StereoFrame<'_>,
-        view: &Viewpoint,
-        executor: &E,
-        store: &mut S,
-    ) -> AllocationReport {
-        let Some(mut depth_m) = ViewMut::new(self.depth_m, view.width, view.height) else { return AllocationReport::default() };
-        let volume = &self.config.volume;
-        depth_from_disparity(&view.rig, volume.near_m, volume.far_m, self.stereo.disparity_q8(), &mut depth_m);
-        self.tracker.clear(&mut depth_m);
-        let seen = Observation {
-            depth_m: depth_m.as_view(),
-            grey: frame.left,
-            colour: frame.colour,
-            class: frame.class,
-        };
-        let allocation = executor.stage(Stage::Allocate, || self.background.allocate(view, seen.depth_m, store));
-        executor.stage(Stage::Fuse, || self.background.fuse(view, seen, executor));
-        allocation
-    }
-
     /// Ends a drive: prunes what is still in the window. Objects are lost; see [`Mapper::finish_with`].
     pub fn finish(&mut self) -> PruneReport {
         self.finish_with(&mut NoSink)
@@ -332,9 +196,9 @@ impl<'s> Mapper<'s> {
         self.objects.tracks(&self.tracker)
     }
 
-    /// What a pixel of the last frame shows; `None` for the street.
-    pub fn thing_at(&self, u: i32, v: i32) -> Option<ThingAt> {
-        self.tracker.at(u, v)
+    /// The instance a pixel of the last frame shows; `None` for the static map.
+    pub fn instance_at(&self, u: i32, v: i32) -> Option<InstanceAt> {
+        self.tracker.instance_at(u, v)
     }
 
     /// The objects reconstructed now, each with its own map.
@@ -345,37 +209,6 @@ impl<'s> Mapper<'s> {
     /// Lets every block of the static map leave into `store`, so that the store holds the whole map.
     pub fn stream_out<S: BlockStore>(&mut self, store: &mut S) -> EvictionReport {
         self.background.stream_out(store)
-    }
-
-    fn block_count(&self) -> BlockCount {
-        let pool = self.background.pool();
-        BlockCount {
-            used: pool.len() as u32,
-            peak: pool.peak() as u32,
-            capacity: pool.capacity() as u32,
-            visible: self.background.visible().slots().len() as u32,
-        }
-    }
-
-    /// Digests of what each stage made of a frame.
-    fn digests(&mut self, egomotion: Option<&MotionEstimate>) -> StageDigests {
-        StageDigests {
-            input: 0,
-            disparity: self.stereo.digest(),
-            matches: self.scene_flow.digest(),
-            egomotion: self.camera.digest(egomotion),
-            tracks: self.tracks_digest(),
-            background: self.background.digest(),
-            objects: ObjectDigests::of(self.objects.digests().map(|(id, digest)| ObjectDigest { id, digest })),
-        }
-    }
-
-    /// Digest of the tracks by age, their masks, and the crops that wait to be fused.
-    fn tracks_digest(&mut self) -> u64 {
-        Hasher::digest(|hasher| {
-            self.tracker.visit(hasher);
-            self.objects.visit_crops(hasher);
-        })
     }
 
     /// The static map's triangles, one after the other, in world coordinates. How many there were.

@@ -4,7 +4,7 @@ use super::Mapper;
 use crate::{
     Stage,
     geometry::Transform,
-    objects::PlacedObject,
+    objects::PosedObject,
     parallel::Executor,
     view::{RaycastError, Raycaster},
     volume::Viewpoint,
@@ -19,15 +19,15 @@ impl<'s> Mapper<'s> {
     }
 
     /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is nearest (the compositing of Section
-    /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of [`Mapper::placed_objects`]. Time: that of one raycast and
+    /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of [`Mapper::posed_objects`]. Time: that of one raycast and
     /// of one more for each object, of which there are at most [`crate::objects::MAX_OBJECTS`].
     pub fn raycast_composed<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(t_world_camera)?;
         executor.stage(Stage::Raycast, || {
             self.raycaster.cast(&self.background, &view, executor)?;
-            for (layer, placed) in (1..=u8::MAX).zip(self.objects.placed(&self.tracker)) {
+            for (layer, posed) in (1..=u8::MAX).zip(self.objects.posed(&self.tracker)) {
                 // An object too far away for its coordinates is too far away to be seen.
-                let _ = self.raycaster.cast_over(placed.object.volume(), &from_object(&view, &placed), layer, executor);
+                let _ = self.raycaster.cast_over(posed.object.volume(), &from_object(&view, &posed), layer, executor);
             }
             Ok::<(), RaycastError>(())
         })?;
@@ -42,15 +42,15 @@ impl<'s> Mapper<'s> {
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(t_world_camera)?;
-        let placed = self.objects.placed(&self.tracker).find(|placed| placed.summary.id == track).ok_or(RaycastError::Object)?;
-        let view = from_object(&view, &placed);
-        executor.stage(Stage::Raycast, || self.raycaster.cast(placed.object.volume(), &view, executor))?;
+        let posed = self.objects.posed(&self.tracker).find(|posed| posed.summary.id == track).ok_or(RaycastError::Object)?;
+        let view = from_object(&view, &posed);
+        executor.stage(Stage::Raycast, || self.raycaster.cast(posed.object.volume(), &view, executor))?;
         Ok(&self.raycaster)
     }
 
     /// The objects that are in the world after the last frame.
-    pub fn placed_objects(&self) -> impl Iterator<Item = PlacedObject<'_, 's>> {
-        self.objects.placed(&self.tracker)
+    pub fn posed_objects(&self) -> impl Iterator<Item = PosedObject<'_, 's>> {
+        self.objects.posed(&self.tracker)
     }
 
     fn viewpoint(&self, t_world_camera: &Transform) -> Result<Viewpoint, RaycastError> {
@@ -60,9 +60,9 @@ impl<'s> Mapper<'s> {
 }
 
 /// A view of the world as a view from an object's frame.
-fn from_object(view: &Viewpoint, placed: &PlacedObject<'_, '_>) -> Viewpoint {
+fn from_object(view: &Viewpoint, posed: &PosedObject<'_, '_>) -> Viewpoint {
     Viewpoint {
-        t_world_camera: (placed.t_world_object.inverse() * view.t_world_camera).normalized(),
+        t_world_camera: (posed.t_world_object.inverse() * view.t_world_camera).normalized(),
         ..*view
     }
 }

@@ -6,7 +6,7 @@ mod resume;
 
 use super::*;
 use crate::{
-    Serial,
+    Report, Serial,
     geometry::Transform,
     memory::SLAB_ALIGN,
     scene_flow::room::{HEIGHT, RIG, WIDTH, see},

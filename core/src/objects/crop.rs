@@ -1,32 +1,33 @@
-//! What a frame shows of one object: its virtual frame, cut to the object's box (Section III-B of the paper).
+//! What a frame shows of one object: its virtual frame, cropped to the object's box (Section III-B of the paper).
 //!
-//! A crop is the disparity under the copy mask, 0 elsewhere, and the picture of the box. Beside an edge the matcher's surface runs on behind
-//! what is in front, and would hang on the object like a flag that no later frame takes down: pixels just beside much nearer ones are left out.
-//! Crops of objects whose motion is not known yet wait
-//! in a ring until it is; when the ring is full the oldest crop goes, and is counted.
+//! A crop is the disparity under the copy mask, 0 elsewhere, and the picture of the box. Next to an edge the matcher's surface continues
+//! behind what is in front, and would stay attached to the object, for no later frame observes that space: pixels next to much nearer
+//! ones are left out. Crops of objects whose motion is uncertain are kept in a ring until it is known; when the ring is full the oldest
+//! is dropped, and counted.
 //!
 //! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of 152 bytes.
 
 use crate::{
     digest::Digest,
-    geometry::StereoRig,
+    geometry::{StereoRig, Transform},
     image::View,
-    masks::{MaskPlace, MaskStore, PixelBox},
+    masks::{MaskHandle, MaskStore, PixelBox},
     memory::{Capacity, Carver, region_bytes},
     state::Visitor,
 };
 use bytemuck::{Pod, Zeroable};
 
-/// Most crops that wait.
+/// Most crops kept for later.
 pub const CROPS_MAX: usize = 128;
-/// Half pixels of disparity the median is sought among: up to 256 px.
+/// Half pixels of disparity the median is searched among: up to 256 px.
 const BINS: usize = 512;
 /// Disparity units in a half pixel.
 const BIN: u16 = 128;
 
 /// How far an edge spoils what is behind it, px.
 const EDGE_REACH_PX: i32 = 3;
-/// What is nearer by more disparity than this is an edge: on a surface that wide a step is not that high unless it is seen edge-on.
+/// A neighbour nearer by more disparity than this is across an edge: within that distance a surface has no such step unless it is viewed
+/// edge-on.
 const EDGE_Q8: u16 = 384;
 
 /// Whether a pixel of that disparity lies just behind an edge.
@@ -38,24 +39,24 @@ fn is_behind_edge(disparity_q8: View<'_, u16>, u: i32, v: i32, disparity: u16) -
     (1..=EDGE_REACH_PX).any(|px| nearer(u - px, v) || nearer(u + px, v) || nearer(u, v - px) || nearer(u, v + px))
 }
 
-/// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 beside the mask, just behind edges, and where the depth is
+/// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 outside the mask, just behind edges, and where the depth is
 /// farther than `extent_m` from the median. Returns how many pixels have one.
-pub(super) fn cut(
+pub(super) fn crop(
     rig: &StereoRig,
     extent_m: f32,
     disparity_q8: View<'_, u16>,
     masks: &MaskStore<'_>,
-    place: &MaskPlace,
-    crop: &mut [u16],
+    mask: &MaskHandle,
+    disparities: &mut [u16],
 ) -> u32 {
-    let PixelBox { left, top, width, height } = place.pixels;
+    let PixelBox { left, top, width, height } = mask.pixels;
     let (Ok(left_u), Ok(top_v)) = (usize::try_from(left), usize::try_from(top)) else { return 0 };
     let mut counts = [0u32; BINS];
     let mut total = 0;
-    for (v, row) in (0..height.max(0) as usize).zip(crop.chunks_exact_mut(width.max(1) as usize)) {
+    for (v, row) in (0..height.max(0) as usize).zip(disparities.chunks_exact_mut(width.max(1) as usize)) {
         let from = disparity_q8.row(top_v + v).get(left_u..).unwrap_or(&[]);
         for ((u, to), &disparity) in (left..).zip(row.iter_mut()).zip(from) {
-            *to = if masks.contains(place, u, top + v as i32) { disparity } else { 0 };
+            *to = if masks.contains(mask, u, top + v as i32) { disparity } else { 0 };
             if let (true, Some(count)) = (*to > 0, counts.get_mut(usize::from(*to / BIN))) {
                 *count += 1;
                 total += 1;
@@ -73,23 +74,23 @@ pub(super) fn cut(
         if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
     });
     let mut kept = 0;
-    for (v, row) in (top..top + height.max(0)).zip(crop.chunks_exact_mut(width.max(1) as usize)) {
+    for (v, row) in (top..top + height.max(0)).zip(disparities.chunks_exact_mut(width.max(1) as usize)) {
         for (u, disparity) in (left..).zip(row) {
-            // What has none lies below `low`, or is found 0.
-            let near = *disparity >= low && *disparity <= high;
-            *disparity = if near && !is_behind_edge(disparity_q8, u, v, *disparity) { *disparity } else { 0 };
+            // A pixel without a disparity lies below `low`, or is 0.
+            let is_near = *disparity >= low && *disparity <= high;
+            *disparity = if is_near && !is_behind_edge(disparity_q8, u, v, *disparity) { *disparity } else { 0 };
             kept += u32::from(*disparity > 0);
         }
     }
     kept
 }
 
-/// A crop that waits. Transforms as in the track.
+/// A crop that is kept for later. Transforms as in the track.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Crop {
-    pub t_world_camera: [f64; 7],
-    pub t_world_object: [f64; 7],
+    pub t_world_camera: Transform,
+    pub t_world_object: Transform,
     pub pixels: PixelBox,
     /// Track it belongs to; 0 none.
     pub id: u32,
@@ -97,9 +98,9 @@ pub(super) struct Crop {
     pub start: u32,
     /// Pixels.
     pub len: u32,
-    /// Whether it has colour, 0 or 1.
+    /// Whether it has colour; 0 or 1.
     pub coloured: u32,
-    /// Digest of its pixels, which stay as they are while it waits.
+    /// Digest of its pixels, which do not change while it is kept.
     pub digest: u64,
 }
 
@@ -107,8 +108,8 @@ impl Crop {
     /// Visits every field; the pixels are [`Crops`]'.
     fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { t_world_camera, t_world_object, pixels, id, start, len, coloured, digest } = self;
-        visitor.f64s(t_world_camera);
-        visitor.f64s(t_world_object);
+        visitor.transform(t_world_camera);
+        visitor.transform(t_world_object);
         pixels.visit(visitor);
         visitor.u32s([id, start, len, coloured]);
         visitor.u64(digest);
@@ -157,17 +158,17 @@ impl<'s> Crops<'s> {
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let pixels = capacity.crop_pixels;
         Self {
-            disparity_q8: carver.alloc("instances.crop_disparity", pixels),
-            grey: carver.alloc("instances.crop_grey", pixels),
-            colour: if capacity.colour { carver.alloc("instances.crop_colour", pixels) } else { &mut [] },
-            entries: carver.alloc("instances.crop", CROPS_MAX),
+            disparity_q8: carver.alloc("objects.crop_disparity", pixels),
+            grey: carver.alloc("objects.crop_grey", pixels),
+            colour: if capacity.colour { carver.alloc("objects.crop_colour", pixels) } else { &mut [] },
+            entries: carver.alloc("objects.crop", CROPS_MAX),
             len: 0,
             next: 0,
         }
     }
 
-    /// Puts a crop, its disparity given row by row, into the ring. Returns how many crops still waiting went for it, or `None` when it is
-    /// larger than the ring.
+    /// Adds a crop, its disparity given row by row. Returns how many kept crops it displaced, or `None` when it is larger than the
+    /// ring.
     pub fn push(&mut self, crop: Crop, disparity_q8: &[u16], picture: &Picture<'_>) -> Option<u32> {
         let picture = picture.part(&crop.pixels)?;
         let len = crop.pixels.area() as usize;
@@ -177,24 +178,24 @@ impl<'s> Crops<'s> {
         if self.next + len > self.disparity_q8.len() {
             self.next = 0;
         }
-        let room = self.next..self.next + len;
-        let waiting = self.drop_where(|old, count| {
-            let overlaps = (old.start as usize) < room.end && (old.start + old.len) as usize > room.start;
+        let span = self.next..self.next + len;
+        let dropped = self.drop_where(|old, count| {
+            let overlaps = (old.start as usize) < span.end && (old.start + old.len) as usize > span.start;
             overlaps || count >= CROPS_MAX
         });
         let width = (crop.pixels.width as usize).max(1);
-        self.disparity_q8.get_mut(room.clone())?.iter_mut().zip(disparity_q8).for_each(|(to, from)| *to = *from);
-        for (to, from) in self.grey.get_mut(room.clone())?.chunks_exact_mut(width).zip(picture.grey.rows()) {
+        self.disparity_q8.get_mut(span.clone())?.iter_mut().zip(disparity_q8).for_each(|(to, from)| *to = *from);
+        for (to, from) in self.grey.get_mut(span.clone())?.chunks_exact_mut(width).zip(picture.grey.rows()) {
             to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
         }
         let coloured = picture.colour.filter(|_| !self.colour.is_empty());
         if let Some(image) = coloured {
-            for (to, from) in self.colour.get_mut(room.clone())?.chunks_exact_mut(width).zip(image.rows()) {
+            for (to, from) in self.colour.get_mut(span.clone())?.chunks_exact_mut(width).zip(image.rows()) {
                 to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
             }
         }
         let mut kept = Crop {
-            start: room.start as u32,
+            start: span.start as u32,
             len: len as u32,
             coloured: u32::from(coloured.is_some()),
             ..crop
@@ -202,25 +203,25 @@ impl<'s> Crops<'s> {
         kept.digest = self.digest(&kept);
         *self.entries.get_mut(self.len)? = kept;
         self.len += 1;
-        self.next = room.end;
-        Some(waiting)
+        self.next = span.end;
+        Some(dropped)
     }
 
-    /// Drops the crops `drop` says, handed each and how many are left; how many of those still waited.
+    /// Drops the crops `drop` says, handed each and how many are left; how many of those had a track.
     fn drop_where(&mut self, mut drop: impl FnMut(&Crop, usize) -> bool) -> u32 {
-        let (mut kept, mut left, mut waiting) = (0, self.len, 0);
+        let (mut kept, mut left, mut dropped) = (0, self.len, 0);
         for index in 0..self.len {
             let Some(crop) = self.entries.get(index).copied() else { break };
             if drop(&crop, left) {
                 left -= 1;
-                waiting += u32::from(crop.id != 0);
+                dropped += u32::from(crop.id != 0);
             } else if let Some(slot) = self.entries.get_mut(kept) {
                 *slot = crop;
                 kept += 1;
             }
         }
         self.len = kept;
-        waiting
+        dropped
     }
 
     /// Drops the crops of a track.
@@ -237,6 +238,39 @@ impl<'s> Crops<'s> {
         })
     }
 
+    fn picture(&self, crop: &Crop) -> Option<(&[u16], Picture<'_>)> {
+        let span = crop.start as usize..(crop.start + crop.len) as usize;
+        let (width, height) = (crop.pixels.width as usize, crop.pixels.height as usize);
+        let colour = match crop.coloured {
+            0 => None,
+            _ => View::new(self.colour.get(span.clone())?, width, height),
+        };
+        let grey = View::new(self.grey.get(span.clone())?, width, height)?;
+        Some((self.disparity_q8.get(span)?, Picture { grey, colour }))
+    }
+
+    /// Visits the crops, with their pixels.
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { disparity_q8, grey, colour, entries, len, next } = self;
+        visitor.count(len, entries.len());
+        visitor.count(next, disparity_q8.len());
+        for crop in entries.iter_mut().take(*len) {
+            crop.visit(visitor);
+            let span = crop.start as usize..crop.start as usize + crop.len as usize;
+            if span.end > disparity_q8.len() || i64::from(crop.len) != crop.pixels.area() {
+                visitor.refuse();
+                return;
+            }
+            visitor.content(crop.digest, |visitor| {
+                visitor.u16s(disparity_q8.get_mut(span.clone()).unwrap_or(&mut []));
+                visitor.bytes(grey.get_mut(span.clone()).unwrap_or(&mut []));
+                if crop.coloured > 0 {
+                    visitor.bytes(colour.get_mut(span).unwrap_or(&mut []).as_flattened_mut());
+                }
+            });
+        }
+    }
+
     /// Digest of a crop's pixels.
     fn digest(&self, crop: &Crop) -> u64 {
         let mut digest = Digest::default();
@@ -248,40 +282,7 @@ impl<'s> Crops<'s> {
         digest.finish()
     }
 
-    fn picture(&self, crop: &Crop) -> Option<(&[u16], Picture<'_>)> {
-        let room = crop.start as usize..(crop.start + crop.len) as usize;
-        let (width, height) = (crop.pixels.width as usize, crop.pixels.height as usize);
-        let colour = match crop.coloured {
-            0 => None,
-            _ => View::new(self.colour.get(room.clone())?, width, height),
-        };
-        let grey = View::new(self.grey.get(room.clone())?, width, height)?;
-        Some((self.disparity_q8.get(room)?, Picture { grey, colour }))
-    }
-
-    /// Visits the crops that wait, with their pixels.
-    pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { disparity_q8, grey, colour, entries, len, next } = self;
-        visitor.count(len, entries.len());
-        visitor.count(next, disparity_q8.len());
-        for crop in entries.iter_mut().take(*len) {
-            crop.visit(visitor);
-            let room = crop.start as usize..crop.start as usize + crop.len as usize;
-            if room.end > disparity_q8.len() || i64::from(crop.len) != crop.pixels.area() {
-                visitor.refuse();
-                return;
-            }
-            visitor.content(crop.digest, |visitor| {
-                visitor.u16s(disparity_q8.get_mut(room.clone()).unwrap_or(&mut []));
-                visitor.bytes(grey.get_mut(room.clone()).unwrap_or(&mut []));
-                if crop.coloured > 0 {
-                    visitor.bytes(colour.get_mut(room).unwrap_or(&mut []).as_flattened_mut());
-                }
-            });
-        }
-    }
-
-    /// Crops waiting.
+    /// Crops kept.
     pub fn len(&self) -> usize {
         self.len
     }

@@ -1,26 +1,27 @@
-//! Objects: what a frame shows of each is cut out and goes into a volume of its own (Section III-E of Bârsan et al., ICRA 2018).
+//! Objects: what a frame shows of each is cropped and fused into a volume of its own (Section III-E of Bârsan et al., ICRA 2018).
 //!
 //! Memory: crops and volumes as their modules say.
 
+mod config;
 mod crop;
 mod object;
-mod placed;
+mod posed;
 mod reconstruct;
 mod report;
 #[cfg(test)]
 mod tests;
 mod visit;
 
+pub use config::ObjectsConfig;
 pub use crop::{CROPS_MAX, Picture};
 pub use object::{MAX_OBJECTS, NoSink, Object, ObjectSink, ObjectSummary, RetiredObject, Retirement};
-pub use placed::PlacedObject;
+pub use posed::PosedObject;
 pub use reconstruct::ObjectFrame;
-pub use report::{InstancesReport, ObjectCount};
+pub use report::{InstancesReport, ObjectsReport};
 
 use crate::{
     memory::{Capacity, Carver, Footprint},
     state::Visitor,
-    tracking::ObjectVolumeConfig,
 };
 use crop::{Crop, Crops};
 use object::ObjectVolumes;
@@ -28,10 +29,10 @@ use object::ObjectVolumes;
 /// The objects' crops and volumes.
 #[derive(Debug)]
 pub struct Objects<'s> {
-    config: ObjectVolumeConfig,
+    config: ObjectsConfig,
     crops: Crops<'s>,
     volumes: ObjectVolumes<'s>,
-    report: ObjectCount,
+    report: ObjectsReport,
 }
 
 impl<'s> Objects<'s> {
@@ -40,17 +41,17 @@ impl<'s> Objects<'s> {
         Crops::bytes(capacity) + ObjectVolumes::bytes(capacity)
     }
 
-    /// Cuts its regions.
-    pub fn new_in(capacity: &Capacity, config: &ObjectVolumeConfig, carver: &mut Carver<'s>) -> Self {
+    /// Allocates its regions.
+    pub fn new_in(capacity: &Capacity, config: &ObjectsConfig, carver: &mut Carver<'s>) -> Self {
         Self {
             config: *config,
             crops: Crops::new_in(capacity, carver),
             volumes: ObjectVolumes::new_in(capacity, config, carver),
-            report: ObjectCount::default(),
+            report: ObjectsReport::default(),
         }
     }
 
-    /// Visits the crops that wait to be fused.
+    /// Visits the crops that are kept for later.
     pub(crate) fn visit_crops(&mut self, visitor: &mut impl Visitor) {
         self.crops.visit(visitor);
     }
@@ -60,8 +61,8 @@ impl<'s> Objects<'s> {
         self.volumes.objects.iter_mut().filter_map(|object| object.digest())
     }
 
-    /// Enters what is in use into a footprint.
+    /// Adds what is in use to a footprint.
     pub fn note_use(&self, footprint: &mut Footprint) {
-        footprint.set_use::<Crop>("instances.crop", self.crops.len(), CROPS_MAX);
+        footprint.set_use::<Crop>("objects.crop", self.crops.len(), CROPS_MAX);
     }
 }

@@ -1,27 +1,28 @@
 //! The objects' own volumes.
 //!
 //! An object that is static or dynamic and of a class to be reconstructed gets a volume: a map of its own whose frame moves with it. Its
-//! frame is the camera's at the beginning of the track's chain of poses. What was seen before its motion was known is fused first.
+//! frame is the camera's at the first pose of the track's trajectory segment. What was observed before its motion was known is fused first.
 //!
 //! | when | then |
 //! |---|---|
-//! | all volumes are taken | that of the object fused longest ago retires, of equals that of the older track, unless it was seen in this frame: then the new object gets none, and is counted |
-//! | a track is forgotten or leaves its table | its volume retires |
-//! | a track's chain of poses broke (a gap, a motion lost for too long) | its volume retires when the next chain has one to fill |
-//! | the drive ends | every volume retires |
+//! | all volumes are in use | the object fused longest ago retires, between equals the older track's, unless it was fused in this frame: then the new object is refused, and counted |
+//! | a track is forgotten or evicted | its volume retires |
+//! | a track's trajectory segment ended (a gap, a motion lost for too long) | its volume retires when the next segment fuses |
+//! | the sequence ends | every volume retires |
 //!
-//! What retires is handed to an [`ObjectSink`] first, so that nothing reconstructed is lost.
+//! A retired object is handed to an [`ObjectSink`] first, so that nothing reconstructed is lost.
 //!
-//! Every `prune_frames` fused frames, and before it retires, the whole volume is rid of voxels seen at most `prune_weight` times: the paper
-//! prunes objects whole at every frame (Section III-F); a voxel then needs the time to be seen twice, hence the interval.
+//! Every `prune_frames` fused frames, and before it retires, voxels of the whole volume that weigh at most `prune_weight` are reset: the
+//! paper prunes objects whole at every frame (Section III-F); a voxel needs time to be observed twice, hence the interval.
 //!
 //! Memory: `capacity.objects` times a [`Volume`] of `capacity.object_blocks` blocks and 640 bytes, and 6 bytes a pixel of the largest image.
 
+use super::ObjectsConfig;
 use crate::{
     geometry::Transform,
     memory::{Capacity, Carver, region_bytes},
     state::Hasher,
-    tracking::{Class, ObjectVolumeConfig, State},
+    tracking::{Class, MotionState},
     volume::Volume,
 };
 use heapless::Vec;
@@ -37,51 +38,51 @@ pub enum Retirement {
     Forgotten,
     /// Its volume was needed for another object.
     Displaced,
-    /// It was lost and found again: its poses do not connect, and it is reconstructed anew.
+    /// Its trajectory segment ended: it is reconstructed anew.
     Restarted,
-    /// The drive ended.
+    /// The sequence ended.
     Finished,
 }
 
-/// An object as its volume knows it.
+/// What is known of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectSummary {
-    /// Number of its track, from 1; for a track that was lost and found again there is more than one object.
+    /// Number of its track, from 1; a track of several trajectory segments has several objects.
     pub id: u32,
-    /// How many chains of poses the track began before this one ended, from 1.
-    pub chain: u32,
-    /// What it is.
+    /// Number of the track's trajectory segment, from 1.
+    pub segment_id: u32,
+    /// Its class.
     pub class: Class,
     /// What was last known of its motion.
-    pub state: State,
+    pub state: MotionState,
     /// First frame fused.
     pub first_frame: u32,
     /// Last frame fused.
     pub last_frame: u32,
     /// Frames fused.
     pub frames: u32,
-    /// Where it was last: its volume's frame to the world.
+    /// Its last pose: its volume's frame to the world.
     pub t_world_object: Transform,
 }
 
-/// An object that leaves the mapper.
+/// An object that retires.
 #[derive(Clone, Copy, Debug)]
 pub struct RetiredObject<'v, 's> {
     /// What is known of it.
     pub summary: ObjectSummary,
-    /// Why it leaves.
+    /// Why it retires.
     pub reason: Retirement,
     /// Its map, in its own frame.
     pub volume: &'v Volume<'s>,
 }
 
-/// Takes objects that leave the mapper.
+/// Takes objects that retire.
 pub trait ObjectSink {
     /// Takes one; its volume is empty afterwards.
     fn retire(&mut self, object: RetiredObject<'_, '_>);
 }
 
-/// Lets them go.
+/// Drops them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoSink;
 
@@ -102,18 +103,18 @@ impl<'s> Object<'s> {
         &self.volume
     }
 
-    /// What is known of it; `None` while the volume waits for an object.
+    /// What is known of it; `None` while the volume is free.
     pub fn summary(&self) -> Option<&ObjectSummary> {
         self.summary.as_ref()
     }
 
-    /// Number of its track, and the digest of what is known of it and of its map; `None` while the volume waits for an object.
+    /// Number of its track, and the digest of what is known of it and of its map; `None` while the volume is free.
     pub fn digest(&mut self) -> Option<(u32, u64)> {
         let id = self.summary.as_ref()?.id;
         Some((id, Hasher::digest(|hasher| self.visit(hasher))))
     }
 
-    pub(super) fn retire(&mut self, config: &ObjectVolumeConfig, reason: Retirement, sink: &mut impl ObjectSink) -> bool {
+    pub(super) fn retire(&mut self, config: &ObjectsConfig, reason: Retirement, sink: &mut impl ObjectSink) -> bool {
         let Some(summary) = self.summary.take() else { return false };
         self.volume.prune_whole(if summary.frames > u32::from(config.prune_frames) { config.prune_weight } else { 0 });
         sink.retire(RetiredObject { summary, reason, volume: &self.volume });
@@ -133,7 +134,7 @@ const fn bounds(capacity: &Capacity) -> Capacity {
     }
 }
 
-/// Room for an [`Object`] with pointers as wide as they come.
+/// Bytes for an [`Object`] with 64-bit pointers.
 const OBJECT_BYTES: usize = 640;
 const _: () = assert!(size_of::<Object<'_>>() <= OBJECT_BYTES);
 
@@ -158,15 +159,15 @@ impl<'s> ObjectVolumes<'s> {
             + region_bytes::<u16>(capacity.pixels())
     }
 
-    pub fn new_in(capacity: &Capacity, config: &ObjectVolumeConfig, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, config: &ObjectsConfig, carver: &mut Carver<'s>) -> Self {
         let (bounds, config, pixels) = (bounds(capacity), config.volume(), capacity.pixels());
         let mut made = Self {
-            depth_m: carver.alloc("instances.depth_m", pixels),
-            disparity_q8: carver.alloc("instances.disparity", pixels),
+            depth_m: carver.alloc("objects.depth_m", pixels),
+            disparity_q8: carver.alloc("objects.disparity", pixels),
             objects: Vec::new(),
         };
         for _ in 0..Self::volumes(capacity) {
-            let object = carver.group("instances.volumes", |carver| {
+            let object = carver.group("objects.volumes", |carver| {
                 let volume = Volume::new_in(&bounds, &config, carver);
                 carver.alloc_value("object", OBJECT_BYTES, Object { volume, summary: None })
             });
@@ -176,12 +177,12 @@ impl<'s> ObjectVolumes<'s> {
     }
 
     /// Position of the object of a track.
-    pub fn of(&self, id: u32) -> Option<usize> {
+    pub fn position_of(&self, id: u32) -> Option<usize> {
         self.objects.iter().position(|object| object.summary.is_some_and(|summary| summary.id == id))
     }
 
     /// A volume for a new object in frame `frame`: a free one, or that of the object fused longest ago, which retires.
-    pub fn find_room(&mut self, config: &ObjectVolumeConfig, frame: u32, retired: &mut u32, sink: &mut impl ObjectSink) -> Option<usize> {
+    pub fn allocate(&mut self, config: &ObjectsConfig, frame: u32, retired: &mut u32, sink: &mut impl ObjectSink) -> Option<usize> {
         if let Some(free) = self.objects.iter().position(|object| object.summary.is_none()) {
             return Some(free);
         }

@@ -1,7 +1,7 @@
-//! What a frame shows of each object goes into a volume of its own.
+//! Reconstruction: what a frame shows of each object is fused into its volume.
 
 use super::{
-    ObjectCount, ObjectSink, ObjectSummary, Objects, Picture, Retirement,
+    ObjectSink, ObjectSummary, Objects, ObjectsReport, Picture, Retirement,
     crop::{self, Crop},
     object::{Object, ObjectVolumes},
 };
@@ -9,10 +9,7 @@ use crate::{
     geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
     parallel::Executor,
-    tracking::{
-        State, Track, Tracker, Treatment,
-        pose::{numbers, transform},
-    },
+    tracking::{Instance, MotionState, Track, Tracked, Tracker, Treatment},
     volume::{NoStore, Observation, Viewpoint},
 };
 
@@ -30,65 +27,72 @@ pub struct ObjectFrame<'a> {
 }
 
 impl<'s> Objects<'s> {
-    /// Fuses what this frame shows of each object into its volume; nothing where `frame` is `None`, as when the camera's pose is a guess.
-    /// Objects that must go are handed to `sink`.
+    /// Fuses what this frame shows of each object into its volume; nothing where `frame` is `None`, as when the camera's pose is
+    /// extrapolated. Objects that retire are handed to `sink`.
     pub fn reconstruct<E: Executor>(
         &mut self,
-        tracker: &Tracker<'_>,
+        tracked: &Tracked<'_, '_>,
         frame: Option<&ObjectFrame<'_>>,
         executor: &E,
         sink: &mut impl ObjectSink,
     ) {
-        self.report = ObjectCount::default();
-        // What was cropped in a chain that broke does not connect to what comes.
-        tracker.all().iter().filter(|track| track.chain <= 1).for_each(|track| self.crops.forget(track.id));
+        let tracker = tracked.tracker();
+        self.report = ObjectsReport::default();
+        // The crops of a trajectory segment that ended do not connect to what follows.
+        let is_new_segment = |track: &&Track| track.segment_len <= 1;
+        tracker.tracks_with_instances().map(|(track, _)| track).filter(is_new_segment).for_each(|track| self.crops.forget(track.id));
         self.retire_orphans(tracker, sink);
         if let Some(frame) = frame {
-            tracker.all().iter().for_each(|track| self.take(tracker, track, frame, executor, sink));
+            let detected = tracker.tracks_with_instances().filter_map(|(track, instance)| Some((track, instance?)));
+            detected.for_each(|(track, instance)| self.integrate(tracker, track, instance, frame, executor, sink));
         }
         self.report.objects = self.volumes.objects.iter().filter(|object| object.summary.is_some()).count() as u32;
         self.report.blocks = self.volumes.blocks() as u32;
     }
 
-    /// Takes what a frame shows of one object: into its volume or, while its motion is not known, to those that wait.
-    fn take<E: Executor>(
+    /// Crops what a frame shows of one object, and fuses it into its volume or, while its motion is uncertain, keeps it for later.
+    fn integrate<E: Executor>(
         &mut self,
         tracker: &Tracker<'_>,
         track: &Track,
+        instance: &Instance,
         frame: &ObjectFrame<'_>,
         executor: &E,
         sink: &mut impl ObjectSink,
     ) {
-        let Some(detection) = track.detection.checked_sub(1).and_then(|at| tracker.detections().get(at as usize)) else { return };
-        if track.chain == 0 || track.class().treatment() != Treatment::Reconstruct || detection.small == 1 {
+        if track.segment_len == 0 || track.class().treatment() != Treatment::Reconstruct || instance.tracked_only.get() {
             return;
         }
-        let area = detection.place.pixels.area() as usize;
-        let Some(disparity) = self.volumes.disparity_q8.get_mut(..area) else { return };
+        let pixels = instance.mask.pixels;
+        let Some(disparity) = self.volumes.disparity_q8.get_mut(..pixels.area() as usize) else {
+            debug_assert!(false, "a box lies in the image");
+            return;
+        };
         let extent_m = self.config.extent_m;
-        if crop::cut(frame.rig, extent_m, frame.disparity_q8, tracker.masks_now(), &detection.place, disparity) == 0 {
+        if crop::crop(frame.rig, extent_m, frame.disparity_q8, tracker.masks(), &instance.mask, disparity) == 0 {
             return;
         }
         let crop = Crop {
-            t_world_camera: numbers(frame.t_world_camera),
+            t_world_camera: *frame.t_world_camera,
             t_world_object: track.t_world_object,
-            pixels: detection.place.pixels,
+            pixels,
             id: track.id,
             ..Crop::default()
         };
-        match track.judgement.state() {
-            State::Uncertain => {
+        match track.motion_state.state() {
+            MotionState::Uncertain => {
                 let dropped = self.crops.push(crop, disparity, &frame.picture);
                 self.report.crops_dropped += dropped.unwrap_or(1);
             }
-            // A moving object's pose is a guess in a frame without a motion of its own.
-            State::Dynamic if track.measured == 0 => {}
-            _ => self.fuse_into(tracker.frame(), track, &crop, frame, executor, sink),
+            // A moving object's pose is extrapolated in a frame without a motion of its own.
+            MotionState::Dynamic if !track.measured.get() => {}
+            _ => self.fuse(tracker.frame(), track, &crop, frame, executor, sink),
         }
     }
 
-    /// Fuses this frame's crop, whose disparity is in the scratch image, into the track's volume; first, if that is new, what waited.
-    fn fuse_into<E: Executor>(
+    /// Fuses this frame's crop, whose disparity is in the scratch image, into the track's volume; if that is new, the crops that were
+    /// kept for it first.
+    fn fuse<E: Executor>(
         &mut self,
         number: u32,
         track: &Track,
@@ -97,80 +101,90 @@ impl<'s> Objects<'s> {
         executor: &E,
         sink: &mut impl ObjectSink,
     ) {
-        let config = self.config;
-        let count = &mut self.report;
-        let mut at = self.volumes.of(track.id);
-        if let Some(object) = at.and_then(|at| self.volumes.objects.get_mut(at))
-            && object.summary.is_some_and(|summary| summary.chain != track.chains)
-        {
-            count.retired += u32::from(object.retire(&config, Retirement::Restarted, sink));
-            at = None;
+        let known = self.volume_of(track, sink);
+        let Some(at) = known.or_else(|| self.volumes.allocate(&self.config, number, &mut self.report.retired, sink)) else {
+            self.report.refused += 1;
+            return;
+        };
+        if known.is_none() {
+            self.begin(at, number, track, frame.rig, executor);
         }
-        let fresh = at.is_none();
-        let Some(at) = at.or_else(|| self.volumes.find_room(&config, number, &mut count.retired, sink)) else {
-            count.refused += 1;
+        let Some(picture) = frame.picture.part(&crop.pixels) else {
+            debug_assert!(false, "a crop lies in the image");
             return;
         };
         let ObjectVolumes { objects, depth_m, disparity_q8 } = &mut self.volumes;
         let Some(object) = objects.get_mut(at) else { return };
-        let mut fuse = |object: &mut Object<'s>, crop: &Crop, picture: &Picture<'_>, disparity: &[u16]| {
-            count.blocks_refused += fuse_crop(object, frame.rig, crop, disparity, picture, depth_m, executor);
-        };
-        if fresh {
-            count.begun += 1;
-            object.summary = Some(ObjectSummary {
-                id: track.id,
-                chain: track.chains,
-                class: track.class(),
-                state: State::Uncertain,
-                first_frame: number,
-                last_frame: number,
-                frames: 0,
-                t_world_object: Transform::IDENTITY,
-            });
-            let standing = track.judgement.state() == State::Static;
-            for (waiting, disparity, picture) in self.crops.of(track.id) {
-                // Of an object that stands every frame's pose is that of the first.
-                let t_world_object = if standing { track.t_world_origin } else { waiting.t_world_object };
-                fuse(object, &Crop { t_world_object, ..*waiting }, &picture, disparity);
-                count.caught_up += 1;
-            }
-            self.crops.forget(track.id);
-        }
-        let Some(picture) = frame.picture.part(&crop.pixels) else { return };
-        fuse(object, crop, &picture, disparity_q8);
-        count.fused += 1;
+        self.report.blocks_refused += fuse_crop(object, frame.rig, crop, disparity_q8, &picture, depth_m, executor);
+        self.report.fused += 1;
         if let Some(summary) = &mut object.summary {
             summary.class = track.class();
-            summary.state = track.judgement.state();
+            summary.state = track.motion_state.state();
             summary.last_frame = number;
             summary.frames += 1;
-            summary.t_world_object = transform(&track.t_world_object);
-            if config.prune_weight > 0 && summary.frames.is_multiple_of(u32::from(config.prune_frames)) {
-                object.volume.prune_whole(config.prune_weight);
+            summary.t_world_object = track.t_world_object;
+            if self.config.prune_weight > 0 && summary.frames.is_multiple_of(u32::from(self.config.prune_frames)) {
+                object.volume.prune_whole(self.config.prune_weight);
             }
         }
     }
 
-    /// Hands over the objects whose track is no more.
+    /// Position of the track's volume. That of an earlier trajectory segment retires.
+    fn volume_of(&mut self, track: &Track, sink: &mut impl ObjectSink) -> Option<usize> {
+        let at = self.volumes.position_of(track.id)?;
+        let object = self.volumes.objects.get_mut(at)?;
+        if object.summary.is_some_and(|summary| summary.segment_id == track.segment_id) {
+            return Some(at);
+        }
+        self.report.retired += u32::from(object.retire(&self.config, Retirement::Restarted, sink));
+        None
+    }
+
+    /// Begins an object in the free volume at `at`, with the crops that were kept for it.
+    fn begin<E: Executor>(&mut self, at: usize, number: u32, track: &Track, rig: &StereoRig, executor: &E) {
+        let ObjectVolumes { objects, depth_m, .. } = &mut self.volumes;
+        let Some(object) = objects.get_mut(at) else { return };
+        self.report.begun += 1;
+        object.summary = Some(ObjectSummary {
+            id: track.id,
+            segment_id: track.segment_id,
+            class: track.class(),
+            state: MotionState::Uncertain,
+            first_frame: number,
+            last_frame: number,
+            frames: 0,
+            t_world_object: Transform::IDENTITY,
+        });
+        let is_static = track.motion_state.state() == MotionState::Static;
+        for (kept, disparity, picture) in self.crops.of(track.id) {
+            // A static object has the pose of the first frame in every frame.
+            let t_world_object = if is_static { track.t_world_origin } else { kept.t_world_object };
+            let crop = Crop { t_world_object, ..*kept };
+            self.report.blocks_refused += fuse_crop(object, rig, &crop, disparity, &picture, depth_m, executor);
+            self.report.caught_up += 1;
+        }
+        self.crops.forget(track.id);
+    }
+
+    /// Retires the objects whose track was forgotten.
     fn retire_orphans(&mut self, tracker: &Tracker<'_>, sink: &mut impl ObjectSink) {
-        let tracks = tracker.all();
         for object in &mut self.volumes.objects {
-            let orphan = object.summary.is_some_and(|summary| tracks.iter().all(|track| track.id != summary.id));
-            if orphan && object.retire(&self.config, Retirement::Forgotten, sink) {
+            let is_tracked = |summary: &ObjectSummary| tracker.tracks_with_instances().any(|(track, _)| track.id == summary.id);
+            let is_orphan = object.summary.is_some_and(|summary| !is_tracked(&summary));
+            if is_orphan && object.retire(&self.config, Retirement::Forgotten, sink) {
                 self.report.retired += 1;
             }
         }
     }
 
-    /// Ends a drive: hands over every object. Returns how many.
+    /// Ends a sequence: retires every object. Returns how many.
     pub fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
         let config = &self.config;
         self.volumes.objects.iter_mut().map(|object| u32::from(object.retire(config, Retirement::Finished, sink))).sum()
     }
 }
 
-/// Fuses a crop as an image of its own, whose principal point lies where its box puts it. Returns the blocks refused.
+/// Fuses a crop as an image of its own, with the principal point relative to its box. Returns the blocks refused.
 fn fuse_crop<E: Executor>(
     object: &mut Object<'_>,
     rig: &StereoRig,
@@ -182,6 +196,7 @@ fn fuse_crop<E: Executor>(
 ) -> u32 {
     let (width, height) = (picture.grey.width(), picture.grey.height());
     let (Some(disparity), Some(mut depth)) = (View::new(disparity_q8, width, height), ViewMut::new(depth_m, width, height)) else {
+        debug_assert!(false, "a crop is as large as its box");
         return 0;
     };
     let volume = object.volume.config();
@@ -191,15 +206,15 @@ fn fuse_crop<E: Executor>(
         center_v_px: rig.center_v_px - f64::from(crop.pixels.top),
         ..*rig
     };
-    let t_object_camera = (transform(&crop.t_world_object).inverse() * transform(&crop.t_world_camera)).normalized();
+    let t_object_camera = (crop.t_world_object.inverse() * crop.t_world_camera).normalized();
     let view = Viewpoint { rig, width, height, t_world_camera: t_object_camera };
-    let seen = Observation {
+    let observation = Observation {
         depth_m: depth.as_view(),
         grey: picture.grey,
         colour: picture.colour,
         class: None,
     };
-    let allocation = object.volume.allocate(&view, seen.depth_m, &mut NoStore);
-    object.volume.fuse(&view, seen, executor);
+    let allocation = object.volume.allocate(&view, observation.depth_m, &mut NoStore);
+    object.volume.fuse(&view, observation, executor);
     allocation.refused + allocation.beyond + allocation.unlisted
 }

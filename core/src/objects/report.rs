@@ -1,12 +1,12 @@
-//! What a frame's instances came to, as plain values.
+//! Reports of a frame's instances, as plain values.
 
 use super::{Object, ObjectSummary, Objects};
 use crate::tracking::{DetectionCount, TrackCount, TrackReport, Tracker, TrackingReport};
 
-/// What became of volumes in a frame.
+/// How volumes were used in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ObjectCount {
+pub struct ObjectsReport {
     /// Objects with a volume.
     pub objects: u32,
     /// Objects fused in this frame.
@@ -15,13 +15,13 @@ pub struct ObjectCount {
     pub caught_up: u32,
     /// Volumes begun.
     pub begun: u32,
-    /// Volumes handed over.
+    /// Objects that retired.
     pub retired: u32,
-    /// Objects for which there was no volume.
+    /// Objects refused because all volumes were in use.
     pub refused: u32,
-    /// Blocks refused because an object's volume was full, and such beyond its bounds.
+    /// Blocks refused because an object's volume was full, and blocks outside its coordinates.
     pub blocks_refused: u32,
-    /// Crops that had to go although they still waited.
+    /// Crops kept for later that were dropped.
     pub crops_dropped: u32,
     /// Blocks in use over all objects.
     pub blocks: u32,
@@ -31,36 +31,41 @@ pub struct ObjectCount {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InstancesReport {
-    /// What became of the detections.
+    /// How detections were used.
     pub detections: DetectionCount,
-    /// What became of the tracks.
+    /// How they were associated with tracks.
     pub tracks: TrackCount,
-    /// What became of the volumes.
-    pub objects: ObjectCount,
-    /// Matches kept out of the camera's own motion.
-    pub matches_withheld: u32,
+    /// How volumes were used.
+    pub objects: ObjectsReport,
+    /// Matches excluded from the camera's own motion.
+    pub matches_excluded: u32,
     /// Pixels whose depth was kept out of the static map.
-    pub pixels_cleared: u32,
+    pub pixels_masked: u32,
 }
 
 impl InstancesReport {
-    /// Whether anything that should have been used was not.
+    /// Of a frame, from the reports of its stages. `matches_excluded` is the camera's.
+    pub fn of(tracking: &TrackingReport, objects: ObjectsReport, matches_excluded: u32) -> Self {
+        let &TrackingReport { detections, tracks, pixels_masked } = tracking;
+        Self { detections, tracks, objects, matches_excluded, pixels_masked }
+    }
+
+    /// What should have been used and was not.
     pub fn refused(&self) -> u32 {
         self.detections.refused() + self.tracks.refused + self.objects.refused + self.objects.blocks_refused
     }
 }
 
 impl<'s> Objects<'s> {
-    /// What the last frame came to, with what its tracking came to.
-    pub fn report(&self, tracking: &TrackingReport) -> InstancesReport {
-        let &TrackingReport { detections, tracks, matches_withheld, pixels_cleared } = tracking;
-        InstancesReport { detections, tracks, objects: self.report, matches_withheld, pixels_cleared }
+    /// The report of the last frame: that of the volumes.
+    pub fn report(&self) -> ObjectsReport {
+        self.report
     }
 
     /// The tracks as they stand, with the blocks of their volumes.
     pub fn tracks<'a>(&'a self, tracker: &'a Tracker<'_>) -> impl Iterator<Item = TrackReport> + 'a {
         tracker.tracks().map(|track| {
-            let object = self.volumes.of(track.id).and_then(|at| self.volumes.objects.get(at));
+            let object = self.volumes.position_of(track.id).and_then(|at| self.volumes.objects.get(at));
             TrackReport { blocks: object.map_or(0, |object| object.volume.pool().len() as u32), ..track }
         })
     }

@@ -4,7 +4,7 @@ use super::{Object, ObjectSummary, Objects};
 use crate::{
     geometry::Transform,
     state::Visitor,
-    tracking::{Class, State},
+    tracking::{Class, MotionState},
 };
 
 impl Objects<'_> {
@@ -15,7 +15,7 @@ impl Objects<'_> {
         volumes.objects.iter_mut().for_each(|object| object.visit(visitor));
     }
 
-    /// Makes anew what was not stored. Whether what was read can be.
+    /// Rebuilds what was not stored. Whether what was read allows it.
     pub(crate) fn rebuild(&mut self) -> bool {
         self.volumes.objects.iter_mut().all(|object| object.volume.rebuild())
     }
@@ -27,9 +27,9 @@ impl Object<'_> {
         let Self { volume, summary } = self;
         let blank = || ObjectSummary {
             id: 0,
-            chain: 0,
+            segment_id: 0,
             class: Class::Other,
-            state: State::Uncertain,
+            state: MotionState::Uncertain,
             first_frame: 0,
             last_frame: 0,
             frames: 0,
@@ -43,10 +43,10 @@ impl Object<'_> {
 impl ObjectSummary {
     /// Visits every field.
     fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { id, chain, class, state, first_frame, last_frame, frames, t_world_object } = self;
-        visitor.u32s([id, chain, first_frame, last_frame, frames]);
+        let Self { id, segment_id, class, state, first_frame, last_frame, frames, t_world_object } = self;
+        visitor.u32s([id, segment_id, first_frame, last_frame, frames]);
         visitor.code(class, Class::code, Class::from_code);
-        visitor.code(state, State::code, State::from_code);
+        visitor.code(state, MotionState::code, MotionState::from_code);
         visitor.transform(t_world_object);
     }
 }

@@ -1,9 +1,8 @@
-//! Settings of the instances. Speeds are in metres per second of real time: other frame rates need no other thresholds.
+//! Settings of tracking. Speeds are in metres per second of real time: other frame rates need no other thresholds.
 
 use crate::{
     egomotion::EgomotionConfig,
     problem::{Problems, require},
-    volume::{ObservationWeight, VolumeConfig, WhenFull},
 };
 
 /// Image width to which areas in px refer.
@@ -20,18 +19,19 @@ pub enum Overlap {
     Box,
 }
 
-/// What is made of detections. Defaults are the original's published ones unless said otherwise.
+/// How detections are accepted and tracked. Defaults are the original's published ones unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct InstancesConfig {
-    /// Whether things that might move are kept apart. Without, everything goes into one map (the paper's robust odometry baseline).
+pub struct TrackingConfig {
+    /// Whether objects that may move are kept out of the static map. Without, everything goes into one map (the paper's robust odometry
+    /// baseline).
     pub dynamic: bool,
     /// Time between two frames, s; above 0; 0.1.
     pub frame_interval_s: f32,
     /// Scores below are ignored; 0 to 1; 0.
     pub score_min: f32,
-    /// A detection's box must be larger than this to be reconstructed and kept out of the static map whatever it does, px at an image width
-    /// of 1242, at other widths in proportion to the width squared; 2025.
+    /// A detection's box must be larger than this to be reconstructed, and to be kept out of the static map in every state, px at an image
+    /// width of 1242, at other widths in proportion to the width squared; 2025.
     pub area_min_px: u32,
     /// It must be larger than this to be tracked, and kept out of the static map once it is known to move; 900: the 18 matches a first
     /// motion takes, 7 px apart. The original: as `area_min_px`.
@@ -40,23 +40,21 @@ pub struct InstancesConfig {
     pub delete_permille: u16,
     /// Boxes below this many times the least area, 1/1000, are scaled twice; 1375.
     pub small_permille: u16,
-    /// What is compared in finding a detection's track. The original: boxes.
+    /// What is compared in associating a detection with a track. The original: boxes.
     pub overlap: Overlap,
     /// Overlap times the geometric mean of both scores times the discount for frames missed must be above this; 0 to 1; 0.1.
     pub association_min: f32,
-    /// Frames after which a track not seen again is forgotten; 1 to 10000; 50.
+    /// Frames after which a track not detected again is forgotten; 1 to 10000; 50.
     pub forget_frames: u16,
-    /// Share of the image beyond which a thing of unknown state is kept out of the camera's egomotion; 0 to 1; 0.05. The original: 1.
+    /// Share of the image beyond which an object of unknown state is kept out of the camera's egomotion; 0 to 1; 0.05. The original: 1.
     pub large_share: f32,
     /// How motions are estimated.
     pub motion: MotionConfig,
-    /// What counts as moving.
+    /// What is classified as moving.
     pub state: StateConfig,
-    /// The objects' own volumes.
-    pub volume: ObjectVolumeConfig,
 }
 
-impl Default for InstancesConfig {
+impl Default for TrackingConfig {
     fn default() -> Self {
         Self {
             dynamic: true,
@@ -72,14 +70,13 @@ impl Default for InstancesConfig {
             large_share: 0.05,
             motion: MotionConfig::default(),
             state: StateConfig::default(),
-            volume: ObjectVolumeConfig::default(),
         }
     }
 }
 
-impl InstancesConfig {
+impl TrackingConfig {
     /// Whether a box of `area_px` in an image of that width can be reconstructed: strictly larger than the least area.
-    pub fn large_enough(&self, area_px: i64, width: usize) -> bool {
+    pub fn is_reconstructable(&self, area_px: i64, width: usize) -> bool {
         area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > least(self.area_min_px, width)
     }
 
@@ -91,27 +88,26 @@ impl InstancesConfig {
     /// How much the delete mask of a box is scaled, 1/1000.
     pub(crate) fn delete_permille(&self, area_px: i64, width: usize) -> u32 {
         let least = least(self.area_min_px, width);
-        let small = area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000 < least * u64::from(self.small_permille);
+        let is_small = area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000 < least * u64::from(self.small_permille);
         let once = u32::from(self.delete_permille);
-        if small { once * once / 1000 } else { once }
+        if is_small { once * once / 1000 } else { once }
     }
 
     /// Notes what is wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         let share = |value: f32| (0.0..=1.0).contains(&value);
-        require(problems, positive(self.frame_interval_s), "instances.frame_interval_s", "must be above 0");
-        require(problems, share(self.score_min), "instances.score_min", "must be from 0 to 1");
-        require(problems, self.area_min_px <= 1 << 20, "instances.area_min_px", "must be at most 1048576");
+        require(problems, positive(self.frame_interval_s), "tracking.frame_interval_s", "must be above 0");
+        require(problems, share(self.score_min), "tracking.score_min", "must be from 0 to 1");
+        require(problems, self.area_min_px <= 1 << 20, "tracking.area_min_px", "must be at most 1048576");
         let tracked = self.track_area_min_px <= 1 << 20;
-        require(problems, tracked, "instances.track_area_min_px", "must be at most 1048576");
-        require(problems, (1000..=4000).contains(&self.delete_permille), "instances.delete_permille", "must be in 1000..=4000");
-        require(problems, share(self.association_min), "instances.association_min", "must be from 0 to 1");
-        require(problems, (1..=10_000).contains(&self.forget_frames), "instances.forget_frames", "must be in 1..=10000");
-        require(problems, share(self.large_share), "instances.large_share", "must be from 0 to 1");
+        require(problems, tracked, "tracking.track_area_min_px", "must be at most 1048576");
+        require(problems, (1000..=4000).contains(&self.delete_permille), "tracking.delete_permille", "must be in 1000..=4000");
+        require(problems, share(self.association_min), "tracking.association_min", "must be from 0 to 1");
+        require(problems, (1..=10_000).contains(&self.forget_frames), "tracking.forget_frames", "must be in 1..=10000");
+        require(problems, share(self.large_share), "tracking.large_share", "must be from 0 to 1");
         self.motion.validate(problems);
         self.state.validate(problems);
-        self.volume.validate(problems);
     }
 }
 
@@ -124,38 +120,38 @@ fn least(area_px: u32, width: usize) -> u64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct MotionConfig {
-    /// Fewest matches a first motion is made of; 6 to 1000; 18.
+    /// Fewest matches for a first motion; 6 to 1000; 18.
     pub matches_min: u16,
-    /// Fewest matches once there is a motion to go by; 6 to 1000; 9 (the original: 18 always).
+    /// Fewest matches once a motion is known; 6 to 1000; 9 (the original: 18 always).
     pub matches_again: u16,
-    /// Refined matches from which on sparse ones are not looked at; at most 10000; 60 (the original: sparse ones only).
+    /// Refined matches from which on sparse ones are not used; at most 10000; 60 (the original: sparse ones only).
     pub matches_enough: u16,
     /// Most hypotheses; 1 to 10000; 200 (the original: 500).
     pub samples: u16,
-    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2. In the end three quarters of it.
+    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2. At the last refinement three quarters of it.
     pub inlier_px: f32,
-    /// Error of a match coordinate at the least, px; above 0.
+    /// Least error of a match coordinate, px; above 0.
     pub noise_px: f32,
-    /// How far from the middle one by depth a match may lie and still be on the object, m; what it errs by comes on top; above 0.
+    /// How far from the median depth a match may lie and still be on the object, m; its error comes on top; above 0.
     pub extent_m: f32,
-    /// Matches of one object err alike: no more than so many count as independent; 3 to 1000.
+    /// Errors of one object's matches are correlated: no more than this many count as independent; 3 to 1000.
     pub independent_matches: u16,
-    /// How fast an object may be turning about the vertical when it is first seen, one sigma, rad/s; above 0.
-    pub turn_rad_s: f32,
-    /// The same about any other axis: the road lets it do no more; above 0.
+    /// How fast an object may rotate about the vertical when it is first detected, one sigma, rad/s; above 0.
+    pub yaw_rad_s: f32,
+    /// The same about any other axis, which the road limits; above 0.
     pub tilt_rad_s: f32,
-    /// How fast it may be when first seen, one sigma, m/s; above 0.
+    /// How fast it may be when first detected, one sigma, m/s; above 0.
     pub speed_m_s: f32,
     /// Change of speed within a second, one sigma, m/s; above 0.
     pub acceleration_m_s2: f32,
-    /// Change of turning about the vertical within a second, one sigma, rad/s; above 0.
-    pub turn_acceleration_rad_s2: f32,
+    /// Change of rotation about the vertical within a second, one sigma, rad/s; above 0.
+    pub yaw_acceleration_rad_s2: f32,
     /// The same about any other axis; above 0.
     pub tilt_acceleration_rad_s2: f32,
-    /// By how much disparities may be too small throughout, px; at least 0. With a camera in motion a thing that stands then seems to move,
-    /// by twice this share of its disparity of the speed it passes by.
+    /// By how much all disparities may be too small, px; at least 0. To a moving camera a static object then seems to move, by twice
+    /// this share of its disparity of the speed it passes by.
     pub bias_px: f32,
-    /// The same, by what rectification leaves of the lenses' errors, at the left and right edge of the picture, px; at least 0. Grows with
+    /// The same, by the residual lens distortion after rectification, at the left and right edge of the picture, px; at least 0. Grows with
     /// the fourth power of the distance from the middle. KITTI's colour cameras: 3, as parked cars 30 m away show.
     pub lens_px: f32,
     /// Error of the camera's own rotation per frame, one sigma, rad: at a distance it looks like speed; at least 0.
@@ -173,11 +169,11 @@ impl Default for MotionConfig {
             noise_px: 0.3,
             extent_m: 5.0,
             independent_matches: 30,
-            turn_rad_s: 0.2,
+            yaw_rad_s: 0.2,
             tilt_rad_s: 0.03,
             speed_m_s: 20.0,
             acceleration_m_s2: 3.0,
-            turn_acceleration_rad_s2: 0.4,
+            yaw_acceleration_rad_s2: 0.4,
             tilt_acceleration_rad_s2: 0.03,
             bias_px: 0.25,
             lens_px: 3.0,
@@ -201,53 +197,52 @@ impl MotionConfig {
 
     fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(problems, (6..=1000).contains(&self.matches_min), "instances.motion.matches_min", "must be in 6..=1000");
-        require(problems, (6..=1000).contains(&self.matches_again), "instances.motion.matches_again", "must be in 6..=1000");
-        require(problems, self.matches_enough <= 10_000, "instances.motion.matches_enough", "must be at most 10000");
-        require(problems, (1..=10_000).contains(&self.samples), "instances.motion.samples", "must be in 1..=10000");
-        require(problems, positive(self.inlier_px), "instances.motion.inlier_px", "must be above 0");
-        require(problems, positive(self.noise_px), "instances.motion.noise_px", "must be above 0");
-        require(problems, positive(self.extent_m), "instances.motion.extent_m", "must be above 0");
-        require(problems, (3..=1000).contains(&self.independent_matches), "instances.motion.independent_matches", "must be in 3..=1000");
-        require(problems, positive(self.turn_rad_s), "instances.motion.turn_rad_s", "must be above 0");
-        require(problems, positive(self.tilt_rad_s), "instances.motion.tilt_rad_s", "must be above 0");
+        require(problems, (6..=1000).contains(&self.matches_min), "tracking.motion.matches_min", "must be in 6..=1000");
+        require(problems, (6..=1000).contains(&self.matches_again), "tracking.motion.matches_again", "must be in 6..=1000");
+        require(problems, self.matches_enough <= 10_000, "tracking.motion.matches_enough", "must be at most 10000");
+        require(problems, (1..=10_000).contains(&self.samples), "tracking.motion.samples", "must be in 1..=10000");
+        require(problems, positive(self.inlier_px), "tracking.motion.inlier_px", "must be above 0");
+        require(problems, positive(self.noise_px), "tracking.motion.noise_px", "must be above 0");
+        require(problems, positive(self.extent_m), "tracking.motion.extent_m", "must be above 0");
+        require(problems, (3..=1000).contains(&self.independent_matches), "tracking.motion.independent_matches", "must be in 3..=1000");
+        require(problems, positive(self.yaw_rad_s), "tracking.motion.yaw_rad_s", "must be above 0");
+        require(problems, positive(self.tilt_rad_s), "tracking.motion.tilt_rad_s", "must be above 0");
         let tilt = positive(self.tilt_acceleration_rad_s2);
-        require(problems, tilt, "instances.motion.tilt_acceleration_rad_s2", "must be above 0");
-        require(problems, positive(self.speed_m_s), "instances.motion.speed_m_s", "must be above 0");
-        require(problems, positive(self.acceleration_m_s2), "instances.motion.acceleration_m_s2", "must be above 0");
-        require(problems, positive(self.turn_acceleration_rad_s2), "instances.motion.turn_acceleration_rad_s2", "must be above 0");
-        require(problems, self.bias_px.is_finite() && self.bias_px >= 0.0, "instances.motion.bias_px", "must be at least 0");
-        require(problems, self.lens_px.is_finite() && self.lens_px >= 0.0, "instances.motion.lens_px", "must be at least 0");
-        require(problems, self.camera_rad.is_finite() && self.camera_rad >= 0.0, "instances.motion.camera_rad", "must be at least 0");
+        require(problems, tilt, "tracking.motion.tilt_acceleration_rad_s2", "must be above 0");
+        require(problems, positive(self.speed_m_s), "tracking.motion.speed_m_s", "must be above 0");
+        require(problems, positive(self.acceleration_m_s2), "tracking.motion.acceleration_m_s2", "must be above 0");
+        require(problems, positive(self.yaw_acceleration_rad_s2), "tracking.motion.yaw_acceleration_rad_s2", "must be above 0");
+        require(problems, self.bias_px.is_finite() && self.bias_px >= 0.0, "tracking.motion.bias_px", "must be at least 0");
+        require(problems, self.lens_px.is_finite() && self.lens_px >= 0.0, "tracking.motion.lens_px", "must be at least 0");
+        require(problems, self.camera_rad.is_finite() && self.camera_rad >= 0.0, "tracking.motion.camera_rad", "must be at least 0");
     }
 }
 
-/// When an object counts as moving or standing.
+/// When an object is classified as dynamic or static.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct StateConfig {
-    /// Surely faster: moving, m/s; at least `static_m_s`. The published code: 5.5 (0.55 m a frame), its experiments: 2.
+    /// Certainly faster: dynamic, m/s; at least `static_m_s`. The published code: 5.5 (0.55 m a frame), its experiments: 2.
     pub dynamic_m_s: f32,
-    /// Perhaps slower than this and likely slower than `slow_m_s`: standing, m/s; above 0. The published code: 0.3.
+    /// Possibly slower than this and likely slower than `slow_m_s`: static, m/s; above 0. The published code: 0.3.
     pub static_m_s: f32,
-    /// What is not known to move counts as standing only if it is likely slower than this, m/s; at least `static_m_s`; 1.2, slower than
-    /// somebody walking. What is known to move: only if it is likely slower than `dynamic_m_s`.
+    /// What is not known to move is static only if it is likely slower than this, m/s; at least `static_m_s`; 1.2, slower than a
+    /// pedestrian. A dynamic object becomes static only if it is likely slower than `dynamic_m_s`.
     pub slow_m_s: f32,
-    /// How many sigmas are "surely"; at least 0. The published code: 0.
+    /// How many sigmas are "certainly"; at least 0. The published code: 0.
     pub sigmas: f32,
     /// How many sigmas are "likely"; at least 0. The published code: 0.
     pub static_sigmas: f32,
-    /// Frames in a row that must say so before an uncertain object counts as moving; 1 to 100. The published code: 1.
+    /// Consecutive frames that confirm an uncertain object as dynamic; 1 to 100. The published code: 1.
     pub confirm_frames: u8,
-    /// The same before it counts as standing; 1 to 100; 2: the filter that says so has made its way through several frames by then. The
-    /// published code: 1.
-    pub standing_frames: u8,
-    /// Frames in a row that must say so before a moving object counts as standing, or the other way round; 1 to 100. The published code
-    /// knows no such change.
+    /// The same for static; 1 to 100; 2: the filter has averaged over several frames by then. The published code: 1.
+    pub confirm_static_frames: u8,
+    /// Consecutive frames that change a dynamic object to static, or the other way round; 1 to 100. The published code has no such
+    /// change.
     pub change_frames: u8,
-    /// Frames without a motion over which a standing object stays one; 0 to 255; 5.
+    /// Frames without a motion over which a static object stays static; 0 to 255; 5.
     pub static_frames: u8,
-    /// Frames without a motion over which a moving object goes on as before; 0 to 255; 3: the filter knows how it went on. The published
+    /// Frames without a motion over which a dynamic object stays dynamic; 0 to 255; 3: the filter predicts its motion. The published
     /// code: 1, its experiments: 2.
     pub dynamic_frames: u8,
 }
@@ -261,7 +256,7 @@ impl Default for StateConfig {
             sigmas: 2.5,
             static_sigmas: 1.0,
             confirm_frames: 3,
-            standing_frames: 2,
+            confirm_static_frames: 2,
             change_frames: 2,
             static_frames: 5,
             dynamic_frames: 3,
@@ -272,89 +267,16 @@ impl Default for StateConfig {
 impl StateConfig {
     fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(problems, positive(self.static_m_s), "instances.state.static_m_s", "must be above 0");
+        require(problems, positive(self.static_m_s), "tracking.state.static_m_s", "must be above 0");
         let above = positive(self.dynamic_m_s) && self.dynamic_m_s >= self.static_m_s;
-        require(problems, above, "instances.state.dynamic_m_s", "must be at least instances.state.static_m_s");
+        require(problems, above, "tracking.state.dynamic_m_s", "must be at least tracking.state.static_m_s");
         let slow = positive(self.slow_m_s) && self.slow_m_s >= self.static_m_s;
-        require(problems, slow, "instances.state.slow_m_s", "must be at least instances.state.static_m_s");
-        require(problems, self.sigmas.is_finite() && self.sigmas >= 0.0, "instances.state.sigmas", "must be at least 0");
+        require(problems, slow, "tracking.state.slow_m_s", "must be at least tracking.state.static_m_s");
+        require(problems, self.sigmas.is_finite() && self.sigmas >= 0.0, "tracking.state.sigmas", "must be at least 0");
         let likely = self.static_sigmas.is_finite() && self.static_sigmas >= 0.0;
-        require(problems, likely, "instances.state.static_sigmas", "must be at least 0");
-        require(problems, (1..=100).contains(&self.confirm_frames), "instances.state.confirm_frames", "must be in 1..=100");
-        require(problems, (1..=100).contains(&self.standing_frames), "instances.state.standing_frames", "must be in 1..=100");
-        require(problems, (1..=100).contains(&self.change_frames), "instances.state.change_frames", "must be in 1..=100");
-    }
-}
-
-/// The objects' volumes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct ObjectVolumeConfig {
-    /// Distance between lattice points, m; 0.001 to 10; the original: 0.035.
-    pub voxel_size_m: f32,
-    /// Truncation, m; 2 to 64 voxels; the original: 1.0.
-    pub truncation_m: f32,
-    /// Farthest depth fused, m; above the map's `near_m`; 20.
-    pub far_m: f32,
-    /// How far from the object's median depth a pixel may lie, m: what shows through windows and at the rim stays out; above 0; 3. Of a bus
-    /// seen lengthwise a frame shows no more than twice this.
-    pub extent_m: f32,
-    /// What one observation of a voxel weighs; by depth (the original: one).
-    pub observation_weight: ObservationWeight,
-    /// Weight at which the average stops forgetting less, 1 to 255; 200.
-    pub max_weight: u8,
-    /// Voxels that weigh at most this go when the object is pruned; 0 is off; 8: what was seen once from beyond 11 m.
-    pub prune_weight: u8,
-    /// Fused frames from one pruning of the whole object to the next; 1 to 255. With 1 a voxel must weigh more than `prune_weight` in its
-    /// first frame to stay.
-    pub prune_frames: u8,
-}
-
-impl Default for ObjectVolumeConfig {
-    fn default() -> Self {
-        Self {
-            voxel_size_m: 0.05,
-            truncation_m: 0.3,
-            far_m: 20.0,
-            extent_m: 3.0,
-            observation_weight: ObservationWeight::Depth,
-            max_weight: 200,
-            prune_weight: 8,
-            prune_frames: 4,
-        }
-    }
-}
-
-impl ObjectVolumeConfig {
-    /// As the volume takes it: objects refuse blocks beyond their bound, for what leaves one could not come back.
-    pub(crate) fn volume(&self) -> VolumeConfig {
-        VolumeConfig {
-            voxel_size_m: self.voxel_size_m,
-            truncation_m: self.truncation_m,
-            far_m: self.far_m,
-            observation_weight: self.observation_weight,
-            max_weight: self.max_weight,
-            when_full: WhenFull::Refuse,
-            prune_weight: 0,
-            ..VolumeConfig::default()
-        }
-    }
-
-    fn validate(&self, problems: &mut Problems) {
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        let voxel = positive(self.voxel_size_m) && (0.001..=10.0).contains(&self.voxel_size_m);
-        require(problems, voxel, "instances.volume.voxel_size_m", "must be from 0.001 to 10 m");
-        let truncation = positive(self.truncation_m) && (2.0..=64.0).contains(&(self.truncation_m / self.voxel_size_m));
-        require(problems, truncation, "instances.volume.truncation_m", "must be from 2 to 64 voxels");
-        require(problems, positive(self.far_m), "instances.volume.far_m", "must be above 0");
-        require(problems, positive(self.extent_m), "instances.volume.extent_m", "must be above 0");
-        require(problems, self.max_weight >= 1, "instances.volume.max_weight", "must be from 1 to 255");
-        require(
-            problems,
-            self.prune_weight < self.max_weight,
-            "instances.volume.prune_weight",
-            "must be below instances.volume.max_weight",
-        );
-        require(problems, self.prune_frames >= 1, "instances.volume.prune_frames", "must be at least 1");
+        require(problems, likely, "tracking.state.static_sigmas", "must be at least 0");
+        require(problems, (1..=100).contains(&self.confirm_frames), "tracking.state.confirm_frames", "must be in 1..=100");
+        require(problems, (1..=100).contains(&self.confirm_static_frames), "tracking.state.confirm_static_frames", "must be in 1..=100");
+        require(problems, (1..=100).contains(&self.change_frames), "tracking.state.change_frames", "must be in 1..=100");
     }
 }

@@ -1,24 +1,70 @@
 //! What tests of other modules need to see.
 
 use super::*;
+use crate::{egomotion::Estimator, geometry::StereoRig, image::ViewMut};
 
-pub(crate) use claim::AMBIGUOUS;
-pub(crate) use filter::{Filter, Sighting};
-pub(crate) use look::{LOOKS, step_px};
+pub(crate) use guided_matching::{GUIDED_MATCHES_MAX, step_px};
+pub(crate) use match_assignment::MatchOwner;
+pub(crate) use motion_filter::{MotionFilter, Observation};
 
+/// The stages one by one, so that what lies between two of them can be looked at.
 impl<'s> Tracker<'s> {
-    /// Flips the lowest bit of where a track's object lies.
-    pub(crate) fn flip_track(&mut self, at: usize) {
-        let number = &mut self.all_mut()[at].t_world_object[4];
-        *number = f64::from_bits(number.to_bits() ^ 1);
+    pub(crate) fn test_ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) {
+        self.ingest(frame, detections, size);
     }
 
-    pub(crate) fn all_mut(&mut self) -> &mut [Track] {
+    pub(crate) fn test_assign_matches(&mut self, matches: FrameMatches<'_>) {
+        self.assign_matches(&matches);
+    }
+
+    pub(crate) fn test_estimate_motions(
+        &mut self,
+        rig: &StereoRig,
+        camera: &CameraMotion,
+        matches: FrameMatches<'_>,
+        search: Option<GuidedMatching<'_, '_>>,
+        estimator: &mut Estimator<'_>,
+    ) {
+        self.estimate_motions(&MotionInput { rig, camera: *camera, matches, search }, estimator);
+    }
+
+    pub(crate) fn test_mask_dynamic_depth(&mut self, depth_m: &mut ViewMut<'_, f32>) {
+        self.report.pixels_masked = self.mask_dynamic_depth(depth_m);
+    }
+
+    pub(crate) fn test_tracked(&mut self) -> Tracked<'_, 's> {
+        Tracked { tracker: self }
+    }
+
+    pub(crate) fn test_report(&self) -> TrackingReport {
+        self.report
+    }
+
+    /// Whether egomotion may use the refined match at that position.
+    pub(crate) fn test_egomotion_includes(&self, index: u32) -> bool {
+        self.egomotion_mask().includes(index)
+    }
+
+    pub(crate) fn test_instances(&self) -> &[Instance] {
+        self.instances.all()
+    }
+
+    pub(crate) fn test_track_of(&self, instance: &Instance) -> Option<&Track> {
+        self.track_of(instance)
+    }
+
+    pub(crate) fn test_tracks(&mut self) -> &mut [Track] {
         self.tracks.all_mut()
     }
 
-    /// For each refined match the position of the detection it lies on, plus 1.
-    pub(crate) fn owner(&self) -> &[u8] {
-        self.owner
+    /// What the refined match at that position is assigned to.
+    pub(crate) fn test_owner(&self, index: usize) -> MatchOwner {
+        self.owner[index].get()
+    }
+
+    /// Flips the lowest bit of a track's pose.
+    pub(crate) fn flip_track(&mut self, at: usize) {
+        let number = &mut self.tracks.all_mut()[at].t_world_object.translation_m[0];
+        *number = f64::from_bits(number.to_bits() ^ 1);
     }
 }

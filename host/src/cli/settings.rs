@@ -5,9 +5,10 @@ use anyhow::{Context, bail};
 use dynvox_core::egomotion::EgomotionConfig;
 use dynvox_core::egomotion::icp::IcpConfig;
 use dynvox_core::geometry::StereoRig;
+use dynvox_core::objects::ObjectsConfig;
 use dynvox_core::scene_flow::SceneFlowConfig;
 use dynvox_core::stereo::StereoConfig;
-use dynvox_core::tracking::InstancesConfig;
+use dynvox_core::tracking::TrackingConfig;
 use dynvox_core::view::{MeshConfig, RaycastConfig};
 use dynvox_core::volume::VolumeConfig;
 use dynvox_core::{Capacity, Config};
@@ -25,7 +26,8 @@ pub struct Settings {
     egomotion: EgomotionConfig,
     icp: IcpConfig,
     mapper: MapperConfig,
-    instances: InstancesConfig,
+    tracking: TrackingConfig,
+    objects: ObjectsConfig,
     volume: VolumeConfig,
     raycast: RaycastConfig,
     mesh: MeshConfig,
@@ -71,7 +73,8 @@ impl Settings {
             egomotion,
             icp,
             mapper,
-            instances,
+            tracking,
+            objects,
             volume,
             raycast,
             mesh,
@@ -85,7 +88,8 @@ impl Settings {
             egomotion: *egomotion,
             icp: *icp,
             mapper: *mapper,
-            instances: *instances,
+            tracking: *tracking,
+            objects: *objects,
             volume: *volume,
             raycast: *raycast,
             mesh: *mesh,
@@ -107,7 +111,7 @@ impl Settings {
 
     /// Sets the time between two frames, which comes with the data set.
     pub fn set_frame_interval_s(&mut self, interval_s: f64) {
-        self.instances.frame_interval_s = interval_s as f32;
+        self.tracking.frame_interval_s = interval_s as f32;
     }
 
     /// Says where the camera's motion comes from.
@@ -122,7 +126,7 @@ impl Settings {
 
     /// Says whether what moves is kept apart.
     pub fn set_dynamic(&mut self, dynamic: bool) {
-        self.instances.dynamic = dynamic;
+        self.tracking.dynamic = dynamic;
     }
 
     /// The street's configuration.

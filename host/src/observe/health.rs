@@ -55,15 +55,15 @@ impl Observer for HealthObserver {
 fn sum(a: DetectionCount, b: &DetectionCount) -> DetectionCount {
     DetectionCount {
         given: a.given + b.given,
-        taken: a.taken + b.taken,
+        accepted: a.accepted + b.accepted,
         bad_score: a.bad_score + b.bad_score,
         bad_box: a.bad_box + b.bad_box,
         bad_mask: a.bad_mask + b.bad_mask,
         ignored: a.ignored + b.ignored,
         too_small: a.too_small + b.too_small,
         tracked_only: a.tracked_only + b.tracked_only,
-        beyond: a.beyond + b.beyond,
-        no_room: a.no_room + b.no_room,
+        over_capacity: a.over_capacity + b.over_capacity,
+        mask_store_full: a.mask_store_full + b.mask_store_full,
         covered: a.covered + b.covered,
     }
 }

@@ -9,7 +9,7 @@ use crate::evaluate::swept::Swept;
 use crate::formats::{PlyWriter, write_numbered};
 use dynvox_core::geometry::Transform;
 use dynvox_core::objects::ObjectSummary;
-use dynvox_core::tracking::{Class, State, TrackReport};
+use dynvox_core::tracking::{Class, MotionState, TrackReport};
 use dynvox_core::view::Triangle;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -32,7 +32,7 @@ pub struct ReconstructedObject {
     /// Its class.
     pub class: Class,
     /// Its last motion state.
-    pub state: State,
+    pub state: MotionState,
     /// Frames fused.
     pub frames: u32,
     /// Blocks of its volume.
@@ -89,7 +89,7 @@ impl Observer for ObjectsObserver {
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
         self.write_all(setup, frame.retired)?;
         for object in fused(frame) {
-            self.paths.entry((object.id, object.chain)).or_default().push((frame.row.frame, object.t_world_object));
+            self.paths.entry((object.id, object.segment_id)).or_default().push((frame.row.frame, object.t_world_object));
         }
         self.note_truth(setup, frame);
         Ok(())
@@ -124,14 +124,14 @@ impl ObjectsObserver {
             rig: &setup.config.rig,
             depth_m,
             t_world_camera: truth.t_world_camera,
-            far_m: f64::from(setup.config.instances.volume.far_m),
+            far_m: f64::from(setup.config.objects.far_m),
         };
-        let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.seen).collect();
+        let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.detected).collect();
         for object in fused(frame) {
             let track = tracks.iter().find(|track| track.id == object.id);
             if let Some(truth) = track.and_then(|track| true_object(&track.pixels, truth)) {
                 let t_truth_object = truth.t_world_object.inverse() * t_map_world.inverse() * object.t_world_object;
-                self.sides.entry((object.id, object.chain)).or_default().add(&view, truth, &t_truth_object);
+                self.sides.entry((object.id, object.segment_id)).or_default().add(&view, truth, &t_truth_object);
             }
         }
     }
@@ -142,8 +142,8 @@ impl ObjectsObserver {
 
     /// Writes an object's mesh and poses. One without triangles leaves no file.
     fn write(&mut self, setup: &Setup<'_>, RetiredVolume { summary, volume }: &RetiredVolume) -> Result<(), ObserveError> {
-        let poses = self.paths.remove(&(summary.id, summary.chain)).unwrap_or_default();
-        let side = self.sides.remove(&(summary.id, summary.chain));
+        let poses = self.paths.remove(&(summary.id, summary.segment_id)).unwrap_or_default();
+        let side = self.sides.remove(&(summary.id, summary.segment_id));
         let folder = setup.folder.join(FOLDER);
         let mut triangles: Vec<Triangle> = Vec::new();
         let meshed = volume.triangles(&setup.config.mesh, &mut |triangle| triangles.push(triangle));
@@ -156,7 +156,7 @@ impl ObjectsObserver {
         write_files(&folder, &name, &triangles, &poses)?;
         self.retired.push(ReconstructedObject {
             id: summary.id,
-            segment: summary.chain,
+            segment: summary.segment_id,
             name,
             class: summary.class,
             state: summary.state,

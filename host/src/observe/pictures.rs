@@ -4,7 +4,7 @@ use super::MapView;
 use crate::evaluate::reference::{Region, Rule, Sample};
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
-use dynvox_core::tracking::State;
+use dynvox_core::tracking::MotionState;
 use dynvox_core::view::{NORMAL_ONE, Raycaster};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
@@ -112,12 +112,12 @@ pub fn map(widest_px: usize, seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[
 
 /// The static map with every object in its place: dynamic ones tinted orange, static ones blue. Empty without objects.
 pub fn composed(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &Transform) -> Vec<u8> {
-    let states: Vec<State> = view.mapper().placed_objects().map(|placed| placed.summary.state).collect();
+    let states: Vec<MotionState> = view.mapper().posed_objects().map(|placed| placed.summary.state).collect();
     if states.is_empty() {
         return Vec::new();
     }
     let tint = |layer: u8| match states.get(usize::from(layer).checked_sub(1)?)? {
-        State::Dynamic => Some(MOVING),
+        MotionState::Dynamic => Some(MOVING),
         _ => Some(STATIC),
     };
     view.raycast_with_objects(t_world_camera).map(|seen| map(widest_px, seen, tint)).unwrap_or_default()

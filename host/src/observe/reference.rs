@@ -10,7 +10,7 @@ use crate::input::{FrameSource, StereoImages};
 use dynvox_core::Mapper;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::masks::PixelBox;
-use dynvox_core::tracking::{State, ThingAt, Treatment};
+use dynvox_core::tracking::{InstanceAt, MotionState, Treatment};
 use serde::{Deserialize, Serialize};
 
 /// Frames whose errors are drawn at most.
@@ -192,9 +192,9 @@ fn pending(setup: &Setup<'_>, plan: &ReferencePlan, frame: &FrameContext<'_, '_>
 /// The region of a pixel. Without object tracking every masked object counts as one of unknown motion, so that maps with and without it
 /// are evaluated at the same points of the background.
 fn region(setup: &Setup<'_>, mapper: &Mapper<'_>, images: &StereoImages, u: i32, v: i32) -> Region {
-    let instances = &setup.config.instances;
+    let instances = &setup.config.tracking;
     if instances.dynamic {
-        return Region::of(mapper.thing_at(u, v).as_ref());
+        return Region::of(mapper.instance_at(u, v).as_ref());
     }
     let (width, height) = setup.dataset.size();
     let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
@@ -202,8 +202,8 @@ fn region(setup: &Setup<'_>, mapper: &Mapper<'_>, images: &StereoImages, u: i32,
         one.contains(u, v)
             && one.class.treatment() != Treatment::Ignore
             && one.score >= instances.score_min
-            && instances.large_enough(one.pixels.intersection(&image).area(), width)
+            && instances.is_reconstructable(one.pixels.intersection(&image).area(), width)
     };
     let object = images.masks.instances.iter().find(taken);
-    Region::of(object.map(|one| ThingAt { class: one.class, track: None, state: State::Uncertain }).as_ref())
+    Region::of(object.map(|one| InstanceAt { class: one.class, track: None, state: MotionState::Uncertain }).as_ref())
 }

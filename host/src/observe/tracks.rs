@@ -4,16 +4,16 @@ use super::{Finished, FrameContext, ObserveError, Observer, Setup};
 use crate::evaluate::objects::{ObjectErrors, ObjectFigures, TrackComparison, TrackErrors};
 use crate::evaluate::quantile::median;
 use dynvox_core::masks::PixelBox;
-use dynvox_core::tracking::{Class, State, TrackReport};
+use dynvox_core::tracking::{Class, MotionState, TrackReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Name of a motion state in tables and files.
-pub const fn state_name(state: State) -> &'static str {
+pub const fn state_name(state: MotionState) -> &'static str {
     match state {
-        State::Uncertain => "uncertain",
-        State::Static => "static",
-        State::Dynamic => "dynamic",
+        MotionState::Uncertain => "uncertain",
+        MotionState::Static => "static",
+        MotionState::Dynamic => "dynamic",
     }
 }
 
@@ -25,7 +25,7 @@ pub struct TrackRow {
     /// Its class.
     pub class: Class,
     /// Its motion state.
-    pub state: State,
+    pub state: MotionState,
     /// Whether its motion was measured in this frame.
     pub measured: bool,
     /// Score of its detection.
@@ -86,7 +86,7 @@ pub struct TrackRecord {
     /// Of these, frames in each state: uncertain, static, dynamic.
     pub states: [usize; 3],
     /// The more frequent of static and dynamic; uncertain if it was neither.
-    pub state: State,
+    pub state: MotionState,
     /// Median speed over the frames in that state, m/s.
     pub speed_m_s: Option<f64>,
     /// Most blocks of its volume.
@@ -119,10 +119,10 @@ impl Observer for TracksObserver {
     type Section = TracksSection;
 
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
-        let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.seen).collect();
+        let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.detected).collect();
         if let Some(truth) = &frame.images.objects {
             let size = (frame.images.left.width(), frame.images.left.height());
-            let large_enough = |pixels: &PixelBox| setup.config.instances.large_enough(pixels.area(), size.0);
+            let large_enough = |pixels: &PixelBox| setup.config.tracking.is_reconstructable(pixels.area(), size.0);
             self.errors.add(&tracks, &frame.row.report.t_world_camera, truth, size, large_enough);
         }
         self.frames.push(FrameTracks { frame: frame.row.frame, tracks: tracks.iter().map(TrackRow::from).collect() });
@@ -146,12 +146,12 @@ fn track_records(frames: &[FrameTracks], errors: &BTreeMap<u32, TrackErrors>) ->
         seen.entry(track.id).or_default().push((frame, track));
     }
     let record = |(id, seen): (u32, Vec<(usize, &TrackRow)>)| {
-        let of = |state: State| seen.iter().filter(move |(_, track)| track.state == state);
-        let states = [State::Uncertain, State::Static, State::Dynamic].map(|state| of(state).count());
+        let of = |state: MotionState| seen.iter().filter(move |(_, track)| track.state == state);
+        let states = [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(|state| of(state).count());
         let state = match states {
-            [_, 0, 0] => State::Uncertain,
-            [_, still, moving] if moving > still => State::Dynamic,
-            _ => State::Static,
+            [_, 0, 0] => MotionState::Uncertain,
+            [_, still, moving] if moving > still => MotionState::Dynamic,
+            _ => MotionState::Static,
         };
         let (first, last) = (seen.first()?, seen.last()?);
         Some(TrackRecord {

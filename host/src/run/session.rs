@@ -11,7 +11,7 @@ use crate::input::StereoImages;
 use crate::observe::{EndContext, FrameContext, FrameRow, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy, from_first};
 use dynvox_core::geometry::Transform;
 use dynvox_core::objects::{ObjectSink, RetiredObject};
-use dynvox_core::tracking::{Detection, State};
+use dynvox_core::tracking::{Detection, MotionState};
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Mapper, Report, Severity, Stage, StereoFrame};
 use std::time::Instant;
@@ -167,13 +167,13 @@ impl<'p, 's> Session<'p, 's> {
     }
 
     fn row(&self, index: usize, images: &StereoImages, report: Report, (step_ms, stages): (f64, [StageTime; STAGES])) -> FrameRow {
-        let tracks_in = |state: State| self.mapper.tracks().filter(|track| track.seen && track.state == state).count() as u32;
+        let tracks_in = |state: MotionState| self.mapper.tracks().filter(|track| track.detected && track.state == state).count() as u32;
         FrameRow {
             frame: index,
             time_s: self.plan.dataset.time_s(index),
             report,
             history_frames: self.mapper.background().history().len(),
-            track_states: [State::Uncertain, State::Static, State::Dynamic].map(tracks_in),
+            track_states: [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(tracks_in),
             mask_refusals: images.masks.refusals,
             depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count()) + report.stereo.refused,
             step_ms,

@@ -6,11 +6,11 @@ fn pixels(left: i32, top: i32, width: i32, height: i32) -> PixelBox {
     PixelBox { left, top, width, height }
 }
 
-fn admitted(config: &InstancesConfig, size: [usize; 2], detections: &[Detection<'_>]) -> (DetectionCount, Vec<f32>, u64) {
+fn admitted(config: &TrackingConfig, size: [usize; 2], detections: &[Detection<'_>]) -> (DetectionCount, Vec<f32>, u64) {
     let capacity = Capacity { image_width: 1242, image_height: 375, mask_words: 20_000, ..CAPACITY };
     with(&capacity, config, |instances, _| {
-        instances.admit(0, detections, size);
-        let scores = instances.tracker.detections().iter().map(|taken| taken.score).collect();
+        instances.ingest(0, detections, size);
+        let scores = instances.tracker.test_instances().iter().map(|instance| instance.score).collect();
         (instances.report().detections, scores, instances.digest())
     })
 }
@@ -20,7 +20,7 @@ fn a_box_must_be_strictly_larger_than_45_by_45_at_kittis_width_and_in_proportion
     let mask = vec![1; 3000];
     let taken = |width, height, image: usize| {
         let car = detection(Class::Car, 0.9, &pixels(10, 10, width, height), &mask);
-        admitted(&InstancesConfig::default(), [image, 200], &[car]).0.taken
+        admitted(&TrackingConfig::default(), [image, 200], &[car]).0.accepted
     };
     // 2024, 2025 and 2026 px.
     assert_eq!([taken(46, 44, 1242), taken(45, 45, 1242), taken(1013, 2, 1242)], [0, 0, 1]);
@@ -52,10 +52,10 @@ fn nonsense_is_refused_by_name_and_counted_once() {
         at(10, 10, 5, 5),
         with_score(0.7),
     ];
-    let (count, scores, _) = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
+    let (count, scores, _) = admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
     let expected = DetectionCount {
         given: 15,
-        taken: 1,
+        accepted: 1,
         bad_score: 4,
         bad_box: 6,
         bad_mask: 2,
@@ -76,14 +76,14 @@ fn of_ten_thousand_the_best_are_taken_in_whatever_order_they_come() {
             detection(Class::Car, random.below(1000) as f32 / 1000.0, &pixels(left, top, 60, 60), &mask)
         })
         .collect();
-    let (count, scores, digest) = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
-    assert_eq!(count.taken + count.covered + count.beyond, 10_000);
-    assert_eq!(count.beyond, 9_996, "four are the bound");
+    let (count, scores, digest) = admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
+    assert_eq!(count.accepted + count.covered + count.over_capacity, 10_000);
+    assert_eq!(count.over_capacity, 9_996, "four are the bound");
     assert!(scores.iter().all(|&score| score > 0.99), "{scores:?}");
     for i in (1..all.len()).rev() {
         all.swap(i, random.below(i as u32 + 1) as usize);
     }
-    assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), (count, scores, digest));
+    assert_eq!(admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), (count, scores, digest));
 }
 
 #[test]
@@ -94,10 +94,10 @@ fn where_masks_overlap_the_higher_score_is_on_top() {
     let hidden = detection(Class::Car, 0.1, &pixels(15, 12, 50, 50), &mask);
     for order in [[low, high, hidden], [hidden, high, low]] {
         with(&CAPACITY, &any_size(), |instances, _| {
-            instances.admit(0, &order, [WIDTH, HEIGHT]);
-            let taken = instances.tracker.detections();
+            instances.ingest(0, &order, [WIDTH, HEIGHT]);
+            let taken = instances.tracker.test_instances();
             assert_eq!((taken.len(), instances.report().detections.covered), (2, 1));
-            let on = |n: usize, u| instances.tracker.masks_now().contains(&taken[n].place, u, 20);
+            let on = |n: usize, u| instances.tracker.masks().contains(&taken[n].mask, u, 20);
             assert_eq!([on(0, 39), on(0, 40), on(1, 39), on(1, 40)], [false, true, true, false]);
         });
     }
@@ -108,19 +108,19 @@ fn the_static_map_sees_nothing_under_any_delete_mask_tracked_or_not() {
     let mask = vec![1; 3600];
     let walker = detection(Class::Person, 0.6, &pixels(300, 30, 60, 60), &mask);
     let car = detection(Class::Car, 0.9, &pixels(20, 30, 60, 60), &mask);
-    let config = InstancesConfig { area_min_px: 2025, ..InstancesConfig::default() };
+    let config = TrackingConfig { area_min_px: 2025, ..TrackingConfig::default() };
     // A table of one track: the walker, of lower score, gets none.
     with(&Capacity { tracks: 1, ..CAPACITY }, &config, |instances, _| {
-        instances.admit(0, &[walker, car], [WIDTH, HEIGHT]);
+        instances.ingest(0, &[walker, car], [WIDTH, HEIGHT]);
         assert_eq!((instances.report().tracks.tracks, instances.report().tracks.refused), (1, 1));
         let mut depth = vec![5.0f32; WIDTH * HEIGHT];
-        instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+        instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
         for (at, &depth) in depth.iter().enumerate() {
             let (u, v) = ((at % WIDTH) as i32, (at / WIDTH) as i32);
             let under = [pixels(300, 30, 60, 60), pixels(20, 30, 60, 60)].iter().any(|pixels| pixels.scaled(1200).contains(u, v));
             assert_eq!(depth == 0.0, under, "({u}, {v})");
         }
-        assert_eq!(instances.report().pixels_cleared, 2 * 72 * 72);
+        assert_eq!(instances.report().pixels_masked, 2 * 72 * 72);
     });
 }
 
@@ -128,27 +128,27 @@ fn the_static_map_sees_nothing_under_any_delete_mask_tracked_or_not() {
 fn without_dynamic_everything_is_background() {
     let mask = vec![1; 3600];
     let car = detection(Class::Car, 0.9, &pixels(20, 30, 60, 60), &mask);
-    with(&CAPACITY, &InstancesConfig { dynamic: false, ..any_size() }, |instances, _| {
-        instances.admit(0, &[car], [WIDTH, HEIGHT]);
+    with(&CAPACITY, &TrackingConfig { dynamic: false, ..any_size() }, |instances, _| {
+        instances.ingest(0, &[car], [WIDTH, HEIGHT]);
         let mut depth = vec![5.0f32; WIDTH * HEIGHT];
-        instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+        instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
         assert!(depth.iter().all(|&depth| depth == 5.0) && instances.tracks().count() == 0);
     });
 }
 
 #[test]
-fn what_is_too_small_to_be_reconstructed_is_tracked_in_the_room_that_is_left() {
+fn what_is_too_small_to_be_reconstructed_is_tracked_with_the_space_that_is_left() {
     let mask = vec![1; 3600];
-    let config = InstancesConfig::default();
+    let config = TrackingConfig::default();
     let car = |score, pixels: &PixelBox| detection(Class::Car, score, pixels, &mask[..pixels.area() as usize]);
     let [least, most] = [(30, 30), (31, 30)].map(|(width, height)| car(0.9, &pixels(200, 10, width, height)));
     let count = |all: &[Detection<'_>]| admitted(&config, [1242, 375], all).0;
-    let counted = |taken, too_small, tracked_only, beyond, given| DetectionCount {
+    let counted = |accepted, too_small, tracked_only, over_capacity, given| DetectionCount {
         given,
-        taken,
+        accepted,
         too_small,
         tracked_only,
-        beyond,
+        over_capacity,
         ..DetectionCount::default()
     };
     assert_eq!(count(&[least]), counted(0, 1, 0, 0, 1));
@@ -169,13 +169,13 @@ fn of_more_equals_than_there_is_room_for_the_same_are_taken_in_whatever_order() 
     let mask = vec![1; 3600];
     let boxes: Vec<_> = (0..7).map(|n| pixels(10 + 40 * n, 10, 60, 60)).collect();
     let mut all: Vec<_> = boxes.iter().map(|pixels| detection(Class::Car, 0.5, pixels, &mask)).collect();
-    let first = admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all);
+    let first = admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
     for _ in 0..7 {
         all.rotate_left(1);
-        assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), first);
+        assert_eq!(admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), first);
     }
     all.reverse();
-    assert_eq!(admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &all), first);
+    assert_eq!(admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), first);
 }
 
 #[test]
@@ -188,8 +188,8 @@ fn a_box_of_absurd_width_is_refused_though_its_mask_is_as_wide() {
         height: 4,
         ..detection(Class::Car, 0.9, &pixels(0, 0, 1, 1), &mask)
     };
-    let count = |width| admitted(&InstancesConfig::default(), [WIDTH, HEIGHT], &[wide(width)]).0;
-    assert_eq!((count(32_768).taken, count(32_769).bad_box, count(40_000).bad_box), (1, 1, 1));
+    let count = |width| admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &[wide(width)]).0;
+    assert_eq!((count(32_768).accepted, count(32_769).bad_box, count(40_000).bad_box), (1, 1, 1));
 }
 
 #[test]
@@ -197,10 +197,10 @@ fn of_a_box_half_beside_the_image_the_half_within_counts() {
     let mask = vec![1; 3600];
     for (left, within) in [(-30, 0), (370, 370)] {
         with(&CAPACITY, &any_size(), |instances, _| {
-            instances.admit(0, &[detection(Class::Car, 0.9, &pixels(left, 100, 60, 60), &mask)], [WIDTH, HEIGHT]);
-            let taken = instances.tracker.detections()[0];
-            assert_eq!(taken.place.pixels, pixels(within, 100, 30, 20));
-            assert_eq!(instances.tracker.masks_now().area(&taken.place), 30 * 20, "and no pixel beside it");
+            instances.ingest(0, &[detection(Class::Car, 0.9, &pixels(left, 100, 60, 60), &mask)], [WIDTH, HEIGHT]);
+            let taken = instances.tracker.test_instances()[0];
+            assert_eq!(taken.mask.pixels, pixels(within, 100, 30, 20));
+            assert_eq!(instances.tracker.masks().area(&taken.mask), 30 * 20, "and no pixel beside it");
         });
     }
 }
@@ -209,9 +209,9 @@ fn of_a_box_half_beside_the_image_the_half_within_counts() {
 fn a_score_below_the_least_is_ignored() {
     let mask = vec![1; 3600];
     let car = |score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask);
-    let config = InstancesConfig { score_min: 0.4, ..any_size() };
+    let config = TrackingConfig { score_min: 0.4, ..any_size() };
     let count = |score| admitted(&config, [WIDTH, HEIGHT], &[car(score)]).0;
-    assert_eq!([count(0.39), count(0.4)].map(|count| (count.taken, count.ignored)), [(0, 1), (1, 0)]);
+    assert_eq!([count(0.39), count(0.4)].map(|count| (count.accepted, count.ignored)), [(0, 1), (1, 0)]);
 }
 
 #[test]
@@ -236,9 +236,9 @@ fn of_two_alike_but_for_class_box_or_mask_the_same_is_on_top_in_either_order() {
     for [a, b] in pairs {
         let seen = |order: [Detection<'_>; 2]| {
             with(&CAPACITY, &any_size(), |instances, _| {
-                instances.admit(0, &order, [WIDTH, HEIGHT]);
-                let (masks, taken) = (instances.tracker.masks_now(), instances.tracker.detections());
-                taken.iter().map(|taken| (taken.class(), taken.place.pixels, masks.area(&taken.place))).collect::<Vec<_>>()
+                instances.ingest(0, &order, [WIDTH, HEIGHT]);
+                let (masks, taken) = (instances.tracker.masks(), instances.tracker.test_instances());
+                taken.iter().map(|taken| (taken.class(), taken.mask.pixels, masks.area(&taken.mask))).collect::<Vec<_>>()
             })
         };
         let digest = |order: [Detection<'_>; 2]| admitted(&any_size(), [WIDTH, HEIGHT], &order).2;

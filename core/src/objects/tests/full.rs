@@ -12,33 +12,33 @@ fn car(left: i32) -> Detection<'static> {
 /// Takes a frame without matches; the tracks it sees.
 fn take(instances: &mut Instances<'_>, estimator: &mut Estimator<'_>, frame: u32, detections: &[Detection<'_>]) -> Vec<u32> {
     take_frame(instances, estimator, frame, detections, [&[], &[]]);
-    instances.tracks().filter(|track| track.seen).map(|track| track.id).collect()
+    instances.tracks().filter(|track| track.detected).map(|track| track.id).collect()
 }
 
 #[test]
-fn a_mask_for_which_there_is_no_room_is_refused_and_counted_and_a_smaller_one_still_fits() {
+fn a_mask_for_which_there_is_mask_store_full_is_refused_and_counted_and_a_smaller_one_still_fits() {
     // 60 rows of two words for the first, none for the second, 30 rows of one for the third.
     let third = detection(Class::Car, 0.3, &PixelBox { left: 330, top: 30, width: 30, height: 30 }, &MASK[..900]);
     let all = [Detection { score: 0.8, ..car(100) }, Detection { score: 0.5, ..car(180) }, third];
     with(&Capacity { mask_words: 150, ..CAPACITY }, &any_size(), |instances, _| {
-        instances.admit(0, &all, [WIDTH, HEIGHT]);
-        let lefts: Vec<i32> = instances.tracker.detections().iter().map(|taken| taken.place.pixels.left).collect();
-        assert_eq!((lefts, instances.report().detections.no_room), (vec![100, 330], 1));
+        instances.ingest(0, &all, [WIDTH, HEIGHT]);
+        let lefts: Vec<i32> = instances.tracker.test_instances().iter().map(|instance| instance.mask.pixels.left).collect();
+        assert_eq!((lefts, instances.report().detections.mask_store_full), (vec![100, 330], 1));
     });
 }
 
 #[test]
-fn a_mask_of_which_nothing_is_left_takes_no_room() {
+fn a_mask_of_which_nothing_is_left_takes_mask_store_full() {
     let hidden = detection(Class::Car, 0.5, &PixelBox { left: 105, top: 35, width: 50, height: 50 }, &MASK[..2500]);
     with(&Capacity { mask_words: 250, ..CAPACITY }, &any_size(), |instances, _| {
-        instances.admit(0, &[Detection { score: 0.8, ..car(100) }, hidden, Detection { score: 0.2, ..car(180) }], [WIDTH, HEIGHT]);
+        instances.ingest(0, &[Detection { score: 0.8, ..car(100) }, hidden, Detection { score: 0.2, ..car(180) }], [WIDTH, HEIGHT]);
         let count = instances.report().detections;
-        assert_eq!((count.taken, count.covered, count.no_room), (2, 1, 0));
+        assert_eq!((count.accepted, count.covered, count.mask_store_full), (2, 1, 0));
     });
 }
 
 #[test]
-fn where_there_is_no_room_for_an_unseen_tracks_mask_its_box_stands_for_it() {
+fn where_there_is_mask_store_full_for_an_unseen_tracks_mask_its_box_stands_for_it() {
     with(&Capacity { mask_words: 130, ..CAPACITY }, &any_size(), |instances, estimator| {
         assert_eq!(take(instances, estimator, 0, &[car(100)]), [1]);
         assert_eq!(take(instances, estimator, 1, &[car(250)]), [2]);
@@ -74,9 +74,9 @@ fn when_one_track_goes_the_others_keep_their_detections() {
             take(instances, estimator, frame, &[car(110), car(210)]);
         }
         assert_eq!(take(instances, estimator, 3, &[car(110), car(210), car(310)]), [2, 3, 4]);
-        for detection in instances.tracker.detections() {
-            let track = instances.tracker.track_of(detection).unwrap();
-            assert_eq!(track.place.pixels, detection.place.pixels, "track {}", track.id);
+        for detection in instances.tracker.test_instances() {
+            let track = instances.tracker.test_track_of(detection).unwrap();
+            assert_eq!(track.mask.pixels, detection.mask.pixels, "track {}", track.id);
         }
     });
 }
@@ -129,15 +129,15 @@ fn the_ring_of_crops_begins_anew_where_the_next_would_not_fit() {
         for frame in 0..3 {
             drive.step(shift(0.0, 0.0, 0.5 * f64::from(frame)), &[(&Board::CAR, Some(shift(1.0, 0.3, 10.0)))]);
         }
-        let cameras: Vec<f64> = drive.instances.objects.crops.of(1).map(|(crop, ..)| crop.t_world_camera[6]).collect();
+        let cameras: Vec<f64> = drive.instances.objects.crops.of(1).map(|(crop, ..)| crop.t_world_camera.translation_m[2]).collect();
         assert_eq!(cameras, [1.0], "the latest");
     });
 }
 
 #[test]
 fn of_more_crops_than_there_are_entries_the_latest_wait() {
-    let config = InstancesConfig {
-        state: StateConfig { confirm_frames: 255, standing_frames: 255, ..StateConfig::default() },
+    let config = TrackingConfig {
+        state: StateConfig { confirm_frames: 255, confirm_static_frames: 255, ..StateConfig::default() },
         ..any_size()
     };
     with(&Capacity { crop_pixels: 400_000, ..CAPACITY }, &config, |instances, estimator| {
@@ -149,7 +149,7 @@ fn of_more_crops_than_there_are_entries_the_latest_wait() {
                 drive.step(shift(0.0, 0.0, z), &[(&board, Some(shift(0.0, 0.0, 9.0)))]).objects.crops_dropped
             })
             .sum();
-        let cameras: Vec<f64> = drive.instances.objects.crops.of(1).map(|(crop, ..)| crop.t_world_camera[6]).collect();
+        let cameras: Vec<f64> = drive.instances.objects.crops.of(1).map(|(crop, ..)| crop.t_world_camera.translation_m[2]).collect();
         assert_eq!((cameras.len(), dropped), (CROPS_MAX, 12));
         assert!((cameras[0] - 0.12).abs() < 1e-9 && (cameras[CROPS_MAX - 1] - 1.39).abs() < 1e-9, "{cameras:?}");
     });
@@ -190,18 +190,18 @@ fn whatever_could_not_be_used_is_in_the_sum_of_refusals() {
         DetectionCount { bad_score: 1, ..DetectionCount::default() },
         DetectionCount { bad_box: 1, ..DetectionCount::default() },
         DetectionCount { bad_mask: 1, ..DetectionCount::default() },
-        DetectionCount { beyond: 1, ..DetectionCount::default() },
-        DetectionCount { no_room: 1, ..DetectionCount::default() },
+        DetectionCount { over_capacity: 1, ..DetectionCount::default() },
+        DetectionCount { mask_store_full: 1, ..DetectionCount::default() },
     ];
     for detections in detections {
         assert_eq!(InstancesReport { detections, ..InstancesReport::default() }.refused(), 1, "{detections:?}");
     }
     let tracks = TrackCount { refused: 2, ..TrackCount::default() };
-    let objects = ObjectCount { refused: 4, blocks_refused: 8, ..ObjectCount::default() };
+    let objects = ObjectsReport { refused: 4, blocks_refused: 8, ..ObjectsReport::default() };
     assert_eq!(InstancesReport { tracks, objects, ..InstancesReport::default() }.refused(), 14);
     let fine = DetectionCount {
         given: 9,
-        taken: 1,
+        accepted: 1,
         ignored: 1,
         too_small: 1,
         tracked_only: 1,

@@ -26,7 +26,7 @@ fn drive(frames: u32, place: fn(u32) -> [Transform; 2], shown: impl Fn(u32) -> b
 
 #[test]
 fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_five() {
-    for (place, state, most) in [(ahead as fn(u32) -> [Transform; 2], State::Dynamic, 3), (parked, State::Static, 5)] {
+    for (place, state, most) in [(ahead as fn(u32) -> [Transform; 2], MotionState::Dynamic, 3), (parked, MotionState::Static, 5)] {
         let mut states = Vec::new();
         let mut places = Vec::new();
         drive(
@@ -40,8 +40,8 @@ fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_f
             },
         );
         let lost = 6 + most;
-        assert!(states[5..lost].iter().all(|now| *now == state) && states[lost] == State::Uncertain, "{states:?}");
-        let step_m = if state == State::Dynamic { 0.8 } else { 0.0 };
+        assert!(states[5..lost].iter().all(|now| *now == state) && states[lost] == MotionState::Uncertain, "{states:?}");
+        let step_m = if state == MotionState::Dynamic { 0.8 } else { 0.0 };
         for frame in 6..lost {
             let moved = places[frame].unwrap() - places[frame - 1].unwrap();
             assert!((moved - step_m).abs() < 0.02, "frame {frame}: {moved} m");
@@ -81,7 +81,7 @@ fn a_car_that_stops_stays_where_it_stopped() {
     let mut last = None;
     drive(30, place, |_| true, |_, drive| last = drive.track(1));
     let track = last.unwrap();
-    assert_eq!(track.state, State::Static);
+    assert_eq!(track.state, MotionState::Static);
     let came = track.t_world_object.unwrap().translation().z;
     let drove = place(29)[1].translation().z - place(0)[1].translation().z;
     assert!((came / drove - 1.0).abs() < 0.1, "{came} of {drove} m");
@@ -126,7 +126,7 @@ fn a_motion_that_comes_too_late_after_a_gap_restarts_the_volume_and_in_time_does
             ahead,
             |frame| !(6..6 + missed).contains(&frame),
             |_, drive| {
-                chains = drive.instances.objects().next().map_or(0, |(summary, _)| summary.chain);
+                chains = drive.instances.objects().next().map_or(0, |(summary, _)| summary.segment_id);
             },
         );
         chains

@@ -82,7 +82,7 @@ fn crossing(frame: u32) -> [Transform; 2] {
 }
 
 /// The car's track in the frame after `boards`, each shown in one frame.
-fn after(config: &InstancesConfig, boards: &[Board]) -> TrackReport {
+fn after(config: &TrackingConfig, boards: &[Board]) -> TrackReport {
     with(&CAPACITY, config, |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         for (frame, board) in (0..).zip(boards) {
@@ -102,7 +102,7 @@ fn nine_matches_do_once_there_is_a_motion_to_go_by_and_eight_do_not() {
 #[test]
 fn the_motion_so_far_is_found_again_where_draws_alone_would_miss_it() {
     // One draw only, and two thirds of what is under the mask stands: three points of the car are drawn once in 27 times.
-    let config = InstancesConfig { motion: MotionConfig { samples: 1, ..MotionConfig::default() }, ..any_size() };
+    let config = TrackingConfig { motion: MotionConfig { samples: 1, ..MotionConfig::default() }, ..any_size() };
     let hidden = Board { background: 40, ..Board::CAR };
     let track = after(&config, &[Board::CAR, Board::CAR, Board::CAR, hidden]);
     assert!(track.measured && (15..=25).contains(&track.inliers), "{} inliers", track.inliers);
@@ -111,7 +111,7 @@ fn the_motion_so_far_is_found_again_where_draws_alone_would_miss_it() {
 
 #[test]
 fn matches_of_one_thing_err_alike_so_four_times_as_many_do_not_make_it_twice_as_sure() {
-    let config = InstancesConfig {
+    let config = TrackingConfig {
         motion: MotionConfig { camera_rad: 0.0, ..MotionConfig::default() },
         ..any_size()
     };
@@ -123,7 +123,7 @@ fn matches_of_one_thing_err_alike_so_four_times_as_many_do_not_make_it_twice_as_
 #[test]
 fn a_slow_car_is_not_called_moving_where_the_cameras_errors_could_make_it_seem_so() {
     let state = |motion: MotionConfig| {
-        with(&CAPACITY, &InstancesConfig { motion, ..any_size() }, |instances, estimator| {
+        with(&CAPACITY, &TrackingConfig { motion, ..any_size() }, |instances, estimator| {
             let mut drive = Drive::new(instances, estimator);
             for frame in 0..8 {
                 let t = 0.1 * f64::from(frame);
@@ -133,11 +133,11 @@ fn a_slow_car_is_not_called_moving_where_the_cameras_errors_could_make_it_seem_s
         })
     };
     let exact = MotionConfig { bias_px: 0.0, lens_px: 0.0, camera_rad: 0.0, ..MotionConfig::default() };
-    assert_eq!(state(exact), State::Dynamic);
+    assert_eq!(state(exact), MotionState::Dynamic);
     for poor in
         [MotionConfig { bias_px: 5.0, ..exact }, MotionConfig { lens_px: 200.0, ..exact }, MotionConfig { camera_rad: 0.02, ..exact }]
     {
-        assert_eq!(state(poor), State::Uncertain, "{poor:?}");
+        assert_eq!(state(poor), MotionState::Uncertain, "{poor:?}");
     }
 }
 
@@ -149,54 +149,54 @@ fn at(u: f32) -> Match {
 fn under_its_own_mask_a_match_is_a_things_own_though_anothers_delete_mask_is_there_too() {
     with(&CAPACITY, &any_size(), |instances, _| {
         // The first one's mask ends at 99, its delete mask at 105; the second's begins at 101.
-        instances.admit(0, &[car(40, 0.9), car(101, 0.5)], [WIDTH, HEIGHT]);
-        instances.claim(&[at(100.0), at(105.0)], &[]);
-        assert_eq!(instances.tracker.owner()[1], 2);
+        instances.ingest(0, &[car(40, 0.9), car(101, 0.5)], [WIDTH, HEIGHT]);
+        instances.assign_matches(&[at(100.0), at(105.0)], &[]);
+        assert_eq!(instances.tracker.test_owner(1), MatchOwner::Instance(1));
     });
 }
 
 /// A thing seen to be as fast as that, surely.
-fn seen_at(speed_m_s: f32) -> Option<Evidence> {
-    Some(Evidence { speed_m_s, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s: 0.0 })
+fn seen_at(speed_m_s: f32) -> Option<MotionEvidence> {
+    Some(MotionEvidence { speed_m_s, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s: 0.0 })
 }
 
 #[test]
 fn a_small_thing_takes_its_neighbours_matches_only_once_it_moves() {
-    let config = InstancesConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..InstancesConfig::default() };
+    let config = TrackingConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..TrackingConfig::default() };
     with(&CAPACITY, &config, |instances, _| {
-        instances.admit(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
-        instances.claim(&[at(97.0)], &[]);
-        assert_eq!(instances.tracker.owner()[0], 1);
+        instances.ingest(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
+        instances.assign_matches(&[at(97.0)], &[]);
+        assert_eq!(instances.tracker.test_owner(0), MatchOwner::Instance(0));
         let certain = StateConfig { confirm_frames: 1, ..StateConfig::default() };
-        instances.tracker.all_mut()[1].judgement.advance(&certain, seen_at(9.0));
-        instances.claim(&[at(97.0)], &[]);
-        assert_eq!(instances.tracker.owner()[0], AMBIGUOUS);
+        instances.tracker.test_tracks()[1].motion_state.update(&certain, seen_at(9.0));
+        instances.assign_matches(&[at(97.0)], &[]);
+        assert_eq!(instances.tracker.test_owner(0), MatchOwner::Ambiguous);
     });
 }
 
 #[test]
 fn what_may_lie_on_either_of_two_things_guides_the_camera_only_if_both_may() {
     for (large_share, guides) in [(1.0, true), (0.0, false)] {
-        with(&CAPACITY, &InstancesConfig { large_share, ..any_size() }, |instances, _| {
-            instances.admit(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
-            instances.claim(&[at(97.0)], &[]);
-            assert_eq!(instances.tracker.owner()[0], AMBIGUOUS);
-            assert_eq!(instances.tracker.guides_camera([WIDTH, HEIGHT])(0), guides);
+        with(&CAPACITY, &TrackingConfig { large_share, ..any_size() }, |instances, _| {
+            instances.ingest(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
+            instances.assign_matches(&[at(97.0)], &[]);
+            assert_eq!(instances.tracker.test_owner(0), MatchOwner::Ambiguous);
+            assert_eq!(instances.tracker.test_egomotion_includes(0), guides);
         });
     }
 }
 
 #[test]
 fn a_motion_is_not_made_of_two_points() {
-    use crate::tracking::tests::{Filter, Sighting};
+    use crate::tracking::tests::{MotionFilter, Observation};
     let config = MotionConfig::default();
-    let sighting = |x: f64| Sighting {
-        standing: Point3::new(x, 0.0, 10.0),
+    let sighting = |x: f64| Observation {
+        static_prediction: Point3::new(x, 0.0, 10.0),
         left: [30.0 * x, 0.0],
         right: [30.0 * x - 15.0, 0.0],
     };
     let taken = |count: usize| {
-        let mut filter = Filter::default();
+        let mut filter = MotionFilter::default();
         filter.predict(&config, 0.1);
         filter.update(&config, &RIG, &Transform::IDENTITY, 0.1, 0.3, [0.0, 1.0, 0.5].into_iter().take(count).map(sighting))
     };

@@ -3,7 +3,7 @@
 mod detections;
 mod full;
 mod gaps;
-mod looks;
+mod guided_matching;
 mod masks;
 mod matches;
 mod motions;
@@ -23,9 +23,9 @@ use crate::{
     random::Random,
     scene_flow::Match,
     tracking::{
-        CameraMotion, Class, Detection, DetectionCount, Evidence, InstancesConfig, MotionConfig, Overlap, Seen, State, StateConfig,
-        ThingAt, TrackCount, TrackReport, Tracker,
-        tests::{AMBIGUOUS, LOOKS, step_px},
+        CameraMotion, Class, Detection, DetectionCount, FrameMatches, GuidedMatching, InstanceAt, MotionConfig, MotionEvidence,
+        MotionState, Overlap, StateConfig, TrackCount, TrackReport, Tracker, TrackingConfig,
+        tests::{GUIDED_MATCHES_MAX, MatchOwner, step_px},
     },
 };
 use nalgebra::{Point3, Vector3};
@@ -56,7 +56,7 @@ impl ObjectSink for Taken {
     }
 }
 
-/// Tracks and objects as a mapper has them.
+/// Tracker and objects as a mapper has them.
 pub(super) struct Instances<'s> {
     pub tracker: Tracker<'s>,
     pub objects: Objects<'s>,
@@ -67,32 +67,30 @@ impl<'s> Instances<'s> {
         Tracker::bytes(capacity) + Objects::bytes(capacity)
     }
 
-    fn new_in(capacity: &Capacity, config: &InstancesConfig, carver: &mut Carver<'s>) -> Self {
+    fn new_in(capacity: &Capacity, config: &TrackingConfig, carver: &mut Carver<'s>) -> Self {
         Self {
             tracker: Tracker::new_in(capacity, config, carver),
-            objects: Objects::new_in(capacity, &config.volume, carver),
+            objects: Objects::new_in(capacity, &ObjectsConfig::default(), carver),
         }
     }
 
-    pub fn admit(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) {
-        self.tracker.admit(frame, detections, size);
+    pub fn ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) {
+        self.tracker.test_ingest(frame, detections, size);
     }
 
-    pub fn claim(&mut self, refined: &[Match], sparse: &[Match]) {
-        self.tracker.claim(refined, sparse);
+    pub fn assign_matches(&mut self, refined: &[Match], sparse: &[Match]) {
+        self.tracker.test_assign_matches(FrameMatches { refined, sparse });
     }
 
-    pub fn follow(&mut self, rig: &StereoRig, seen: &Seen<'_, '_>, camera: &CameraMotion, estimator: &mut Estimator<'_>) {
-        self.tracker.follow(rig, seen, camera, estimator);
+    pub fn mask_dynamic_depth(&mut self, depth_m: &mut ViewMut<'_, f32>) {
+        self.tracker.test_mask_dynamic_depth(depth_m);
     }
 
-    pub fn clear(&mut self, depth_m: &mut ViewMut<'_, f32>) {
-        self.tracker.clear(depth_m);
-    }
-
-    pub fn reconstruct(&mut self, frame: Option<&ObjectFrame<'_>>, sink: &mut impl ObjectSink) {
-        self.objects.reconstruct(&self.tracker, frame, &Serial, sink);
-        self.tracker.settle();
+    /// Reconstructs and ends the frame.
+    pub fn reconstruct(&mut self, frame: Option<&ObjectFrame<'_>>, sink: &mut impl ObjectSink) -> InstancesReport {
+        let tracked = self.tracker.test_tracked();
+        self.objects.reconstruct(&tracked, frame, &Serial, sink);
+        InstancesReport::of(&tracked.commit(), self.objects.report(), 0)
     }
 
     pub fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
@@ -100,7 +98,7 @@ impl<'s> Instances<'s> {
     }
 
     pub fn report(&self) -> InstancesReport {
-        self.objects.report(self.tracker.report())
+        InstancesReport::of(&self.tracker.test_report(), self.objects.report(), 0)
     }
 
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> {
@@ -111,12 +109,12 @@ impl<'s> Instances<'s> {
         self.objects.objects()
     }
 
-    pub fn placed(&self) -> impl Iterator<Item = PlacedObject<'_, 's>> {
-        self.objects.placed(&self.tracker)
+    pub fn posed(&self) -> impl Iterator<Item = PosedObject<'_, 's>> {
+        self.objects.posed(&self.tracker)
     }
 
-    pub fn at(&self, u: i32, v: i32) -> Option<ThingAt> {
-        self.tracker.at(u, v)
+    pub fn instance_at(&self, u: i32, v: i32) -> Option<InstanceAt> {
+        self.tracker.instance_at(u, v)
     }
 
     fn digest(&mut self) -> u64 {
@@ -128,7 +126,7 @@ impl<'s> Instances<'s> {
 }
 
 /// Calls `drive` with instances and an estimator in a slab.
-pub(super) fn with<R>(capacity: &Capacity, config: &InstancesConfig, drive: impl FnOnce(&mut Instances<'_>, &mut Estimator<'_>) -> R) -> R {
+pub(super) fn with<R>(capacity: &Capacity, config: &TrackingConfig, drive: impl FnOnce(&mut Instances<'_>, &mut Estimator<'_>) -> R) -> R {
     let bytes = Instances::bytes(capacity) + Estimator::bytes(capacity);
     let mut room = vec![0u8; bytes + SLAB_ALIGN];
     let start = room.as_ptr().align_offset(SLAB_ALIGN);
@@ -239,9 +237,10 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
             t_world_camera,
             t_current_previous: (self.frame > 0).then_some(t_current_previous),
         };
-        self.instances.admit(self.frame, &detections, [WIDTH, HEIGHT]);
-        self.instances.claim(&matches, &[]);
-        self.instances.follow(&RIG, &Seen { refined: &matches, sparse: &[], images: None }, &camera, self.estimator);
+        self.instances.ingest(self.frame, &detections, [WIDTH, HEIGHT]);
+        self.instances.assign_matches(&matches, &[]);
+        let matches = FrameMatches { refined: &matches, sparse: &[] };
+        self.instances.tracker.test_estimate_motions(&RIG, &camera, matches, None, self.estimator);
         let grey = vec![128u8; WIDTH * HEIGHT];
         let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
         let disparity = View::new(&disparity, WIDTH, HEIGHT).unwrap();
@@ -275,9 +274,9 @@ pub(super) fn take_frame(
         t_world_camera: Transform::IDENTITY,
         t_current_previous: (frame > 0).then_some(Transform::IDENTITY),
     };
-    instances.admit(frame, detections, [WIDTH, HEIGHT]);
-    instances.claim(refined, sparse);
-    instances.follow(&RIG, &Seen { refined, sparse, images: None }, &camera, estimator);
+    instances.ingest(frame, detections, [WIDTH, HEIGHT]);
+    instances.assign_matches(refined, sparse);
+    instances.tracker.test_estimate_motions(&RIG, &camera, FrameMatches { refined, sparse }, None, estimator);
     let (grey, nothing) = (vec![128u8; WIDTH * HEIGHT], vec![0u16; WIDTH * HEIGHT]);
     let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
     let disparity_q8 = View::new(&nothing, WIDTH, HEIGHT).unwrap();
@@ -286,14 +285,14 @@ pub(super) fn take_frame(
 }
 
 /// No detection is too small.
-pub(super) fn any_size() -> InstancesConfig {
-    InstancesConfig { area_min_px: 0, ..InstancesConfig::default() }
+pub(super) fn any_size() -> TrackingConfig {
+    TrackingConfig { area_min_px: 0, ..TrackingConfig::default() }
 }
 
 /// The same where standing takes as long to confirm as moving: either is known in the fourth frame.
-pub(super) fn known_in_the_fourth_frame() -> InstancesConfig {
-    let state = StateConfig { standing_frames: 3, ..StateConfig::default() };
-    InstancesConfig { state, ..any_size() }
+pub(super) fn known_in_the_fourth_frame() -> TrackingConfig {
+    let state = StateConfig { confirm_static_frames: 3, ..StateConfig::default() };
+    TrackingConfig { state, ..any_size() }
 }
 
 impl Objects<'_> {

@@ -31,9 +31,9 @@ fn a_moving_cars_motion_is_its_own_and_not_the_cameras() {
         assert!(error.norm() < 0.02, "{error}");
         assert!(track.motion_world.angle_rad().to_degrees() < 0.3);
     }
-    let states: Vec<State> = tracks.iter().map(|track| track.state).collect();
-    assert_eq!(states[..3], [State::Uncertain; 3]);
-    assert_eq!(states[3..], [State::Dynamic; 5]);
+    let states: Vec<MotionState> = tracks.iter().map(|track| track.state).collect();
+    assert_eq!(states[..3], [MotionState::Uncertain; 3]);
+    assert_eq!(states[3..], [MotionState::Dynamic; 5]);
     let at = tracks[7].t_world_object.unwrap().translation() - tracks[3].t_world_object.unwrap().translation();
     assert!((at - Vector3::new(0.0, 0.0, 3.2)).norm() < 0.05, "{at}");
 }
@@ -41,7 +41,7 @@ fn a_moving_cars_motion_is_its_own_and_not_the_cameras() {
 #[test]
 fn a_parked_car_follows_the_camera_and_stays_where_it_is_in_the_world() {
     let tracks = drive(&Board::CAR, 8, |frame| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)]);
-    assert_eq!(tracks[7].state, State::Static);
+    assert_eq!(tracks[7].state, MotionState::Static);
     assert_eq!(tracks[7].motion_world, Transform::IDENTITY);
     assert_eq!(tracks[7].t_world_object, tracks[0].t_world_object, "seen from the moving camera it moves, in the world it does not");
 }
@@ -71,16 +71,19 @@ fn a_match_counts_only_from_mask_to_mask() {
         let delete = pixels.scaled(1200);
         let at = |u: i32, v: i32| Match { current_left: [u as f32, v as f32], ..Match::default() };
         let (last, beyond) = (delete.left, delete.left - 1);
-        drive.instances.claim(&[at(last, pixels.top + 5), at(beyond, pixels.top + 5), at(pixels.left + 5, pixels.top + 5)], &[]);
-        assert_eq!(drive.instances.tracker.owner()[..3], [1, 0, 1]);
-        drive.instances.claim(&[Match { current_left: [f32::NAN, 5.0], ..Match::default() }], &[]);
-        assert_eq!(drive.instances.tracker.owner()[0], 0);
+        drive.instances.assign_matches(&[at(last, pixels.top + 5), at(beyond, pixels.top + 5), at(pixels.left + 5, pixels.top + 5)], &[]);
+        assert_eq!(
+            [0, 1, 2].map(|at| drive.instances.tracker.test_owner(at)),
+            [MatchOwner::Instance(0), MatchOwner::None, MatchOwner::Instance(0)]
+        );
+        drive.instances.assign_matches(&[Match { current_left: [f32::NAN, 5.0], ..Match::default() }], &[]);
+        assert_eq!(drive.instances.tracker.test_owner(0), MatchOwner::None);
     });
 }
 
 #[test]
 fn the_camera_listens_to_no_moving_car_and_to_no_large_one_of_unknown_state() {
-    let guides = |config: &InstancesConfig, frames: u32, place: &dyn Fn(u32) -> [Transform; 2], board: &Board| {
+    let guides = |config: &TrackingConfig, frames: u32, place: &dyn Fn(u32) -> [Transform; 2], board: &Board| {
         with(&CAPACITY, config, |instances, estimator| {
             let mut drive = Drive::new(instances, estimator);
             for frame in 0..frames {
@@ -89,9 +92,8 @@ fn the_camera_listens_to_no_moving_car_and_to_no_large_one_of_unknown_state() {
             }
             let pixels = drive.track(1).unwrap().pixels;
             let middle = [pixels.left + pixels.width / 2, pixels.top + pixels.height / 2].map(|px| px as f32);
-            drive.instances.claim(&[Match { current_left: middle, ..Match::default() }], &[]);
-            let guides = drive.instances.tracker.guides_camera([WIDTH, HEIGHT]);
-            guides(0)
+            drive.instances.assign_matches(&[Match { current_left: middle, ..Match::default() }], &[]);
+            drive.instances.tracker.test_egomotion_includes(0)
         })
     };
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)];
@@ -116,9 +118,9 @@ fn starting_and_stopping_show_within_five_frames() {
     };
     let place =
         |frame: u32| [shift(0.0, 0.0, 0.3 * f64::from(frame)), shift(1.0, 0.3, 10.0 + (0..=frame).map(|n| 0.1 * speed(n)).sum::<f64>())];
-    let states: Vec<State> = drive(&Board::CAR, 50, place).iter().map(|track| track.state).collect();
+    let states: Vec<MotionState> = drive(&Board::CAR, 50, place).iter().map(|track| track.state).collect();
     let is = |state, range: core::ops::Range<usize>| range.clone().all(|frame| states[frame] == state);
-    assert!(is(State::Static, 4..9) && is(State::Dynamic, 13..38) && is(State::Static, 43..50), "{states:?}");
+    assert!(is(MotionState::Static, 4..9) && is(MotionState::Dynamic, 13..38) && is(MotionState::Static, 43..50), "{states:?}");
 }
 
 #[test]
@@ -127,12 +129,13 @@ fn silhouettes_belong_to_nobody() {
     let boxes = [PixelBox { left: 40, top: 30, width: 60, height: 60 }, PixelBox { left: 100, top: 30, width: 60, height: 60 }];
     with(&CAPACITY, &any_size(), |instances, _| {
         let cars = boxes.map(|pixels| detection(Class::Car, 0.5, &pixels, &mask));
-        instances.admit(0, &cars, [WIDTH, HEIGHT]);
+        instances.ingest(0, &cars, [WIDTH, HEIGHT]);
         let at = |u: f32| Match { current_left: [u, 60.0], ..Match::default() };
-        instances.claim(&[at(90.0), at(97.0), at(102.0), at(110.0)], &[]);
-        assert_eq!(instances.tracker.owner()[1..3], [AMBIGUOUS; 2]);
-        assert_ne!(instances.tracker.owner()[0], instances.tracker.owner()[3]);
-        assert!(instances.tracker.owner()[0] != AMBIGUOUS && instances.tracker.owner()[3] != AMBIGUOUS);
+        instances.assign_matches(&[at(90.0), at(97.0), at(102.0), at(110.0)], &[]);
+        let owner = |at| instances.tracker.test_owner(at);
+        assert_eq!([owner(1), owner(2)], [MatchOwner::Ambiguous; 2]);
+        assert_ne!(owner(0), owner(3));
+        assert!(owner(0) != MatchOwner::Ambiguous && owner(3) != MatchOwner::Ambiguous);
     });
 }
 
@@ -146,8 +149,8 @@ fn small_car(speed_m_s: f64) -> impl Fn(u32) -> [Transform; 2] {
 
 #[test]
 fn a_small_thing_is_nothing_until_its_motion_is_measured_and_left_in_the_static_map_until_it_moves() {
-    let config = InstancesConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..InstancesConfig::default() };
-    for (speed_m_s, state) in [(8.0, State::Dynamic), (0.0, State::Static)] {
+    let config = TrackingConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..TrackingConfig::default() };
+    for (speed_m_s, state) in [(8.0, MotionState::Dynamic), (0.0, MotionState::Static)] {
         with(&CAPACITY, &config, |instances, estimator| {
             let mut drive = Drive::new(instances, estimator);
             for frame in 0..8 {
@@ -155,8 +158,8 @@ fn a_small_thing_is_nothing_until_its_motion_is_measured_and_left_in_the_static_
                 drive.step(camera, &[(&Board::CAR, Some(car))]);
                 assert_eq!(drive.track(1).is_some(), frame > 0, "frame {frame}");
                 let mut depth_m = vec![5.0; WIDTH * HEIGHT];
-                drive.instances.clear(&mut ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap());
-                let moves = drive.track(1).is_some_and(|track| track.state == State::Dynamic);
+                drive.instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap());
+                let moves = drive.track(1).is_some_and(|track| track.state == MotionState::Dynamic);
                 assert_eq!(depth_m.contains(&0.0), moves, "frame {frame}");
             }
             assert_eq!(drive.track(1).unwrap().state, state);

@@ -21,7 +21,7 @@ fn what_was_seen_before_the_motion_was_known_is_fused_when_it_is() {
         assert_eq!(begun, [0, 0, 0, 1, 0], "the motion is confirmed in the fourth frame");
         assert_eq!((reports[3].caught_up, reports[3].fused, reports[4].fused), (3, 1, 1));
         let (summary, object) = drive.instances.objects().next().unwrap();
-        assert_eq!((summary.frames, summary.state), (2, State::Dynamic));
+        assert_eq!((summary.frames, summary.state), (2, MotionState::Dynamic));
         // A board square to the camera: its blocks lie in one layer, however far it drove meanwhile.
         let volume = object.volume();
         let layers = volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)).map(|coord| coord.z);
@@ -34,7 +34,7 @@ fn what_was_seen_before_the_motion_was_known_is_fused_when_it_is() {
 fn a_car_lost_for_too_long_is_handed_over_and_begun_anew() {
     // The frame in which it is found again has no motion either.
     for (dynamic_frames, missed, restarts) in [(1, 0, 0), (1, 1, 1), (2, 1, 0), (2, 2, 1)] {
-        let config = InstancesConfig { state: StateConfig { dynamic_frames, ..StateConfig::default() }, ..any_size() };
+        let config = TrackingConfig { state: StateConfig { dynamic_frames, ..StateConfig::default() }, ..any_size() };
         with(&CAPACITY, &config, |instances, estimator| {
             let mut drive = Drive::new(instances, estimator);
             for frame in 0..16 {
@@ -42,7 +42,7 @@ fn a_car_lost_for_too_long_is_handed_over_and_begun_anew() {
                 let seen = !(6..6 + missed).contains(&frame);
                 drive.step(camera, &[(&Board::CAR, seen.then_some(car))]);
             }
-            assert_eq!(drive.track(1).unwrap().state, State::Dynamic);
+            assert_eq!(drive.track(1).unwrap().state, MotionState::Dynamic);
             let reasons: Vec<_> = drive.sink.0.iter().map(|taken| taken.1).collect();
             assert_eq!(reasons, vec![Retirement::Restarted; restarts], "{missed} frames missed");
             assert!(drive.sink.0.iter().all(|taken| taken.2 > 0), "with what was made of it");
@@ -82,7 +82,7 @@ fn full_volumes_are_handed_over_for_new_objects_but_not_in_the_frame_they_grow()
 
 #[test]
 fn the_forgotten_and_the_last_are_handed_over_too() {
-    with(&CAPACITY, &InstancesConfig { forget_frames: 3, ..any_size() }, |instances, estimator| {
+    with(&CAPACITY, &TrackingConfig { forget_frames: 3, ..any_size() }, |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         for frame in 0..16 {
             let [camera, car] = at(frame);
@@ -106,7 +106,7 @@ fn people_are_tracked_but_not_reconstructed() {
             let [camera, place] = at(frame);
             drive.step(camera, &[(&walker, Some(place))]);
         }
-        assert_eq!(drive.track(1).unwrap().state, State::Dynamic);
+        assert_eq!(drive.track(1).unwrap().state, MotionState::Dynamic);
         assert_eq!(drive.instances.objects().count(), 0);
     });
 }
@@ -144,7 +144,7 @@ fn a_short_ring_of_crops_keeps_the_latest_and_counts_the_rest() {
 #[test]
 fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_it_drove_off() {
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 14.0)];
-    for (place, state) in [(at as fn(u32) -> [Transform; 2], State::Dynamic), (parked, State::Static)] {
+    for (place, state) in [(at as fn(u32) -> [Transform; 2], MotionState::Dynamic), (parked, MotionState::Static)] {
         with(&CAPACITY, &any_size(), |instances, estimator| {
             let mut drive = Drive::new(instances, estimator);
             let mut last = None;
@@ -152,20 +152,20 @@ fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_
                 let [camera, car] = place(frame);
                 drive.step(camera, &[(&Board::CAR, (frame < 6).then_some(car))]);
                 let track = drive.track(1).unwrap();
-                let placed = drive.instances.placed().next().map(|placed| placed.t_world_object);
+                let placed = drive.instances.posed().next().map(|placed| placed.t_world_object);
                 let expected = match frame {
                     0..2 => None,
                     // That it moves is confirmed a frame later than that it stands.
-                    2 if state == State::Dynamic => None,
+                    2 if state == MotionState::Dynamic => None,
                     // Seen, or carried on over a frame or a few without a motion.
                     _ if track.t_world_object.is_some() => track.t_world_object,
-                    _ if state == State::Static => last,
+                    _ if state == MotionState::Static => last,
                     _ => None,
                 };
                 assert_eq!(placed, expected, "frame {frame} {state:?}");
                 last = placed;
             }
-            assert_eq!(last.is_some(), state == State::Static);
+            assert_eq!(last.is_some(), state == MotionState::Static);
             assert_eq!(drive.instances.objects().count(), 1, "either has its volume");
         });
     }
@@ -180,7 +180,7 @@ fn an_object_of_a_chain_that_broke_is_not_shown_where_the_next_chain_is() {
             drive.step(camera, &[(&Board::CAR, (!(6..9).contains(&frame)).then_some(car))]);
             if (9..12).contains(&frame) {
                 assert!(drive.track(1).unwrap().t_world_object.is_some(), "a new chain has begun");
-                assert_eq!(drive.instances.placed().count(), 0);
+                assert_eq!(drive.instances.posed().count(), 0);
             }
         }
     });

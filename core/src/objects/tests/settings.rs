@@ -3,19 +3,20 @@
 use super::*;
 use crate::problem::Problems;
 
-type Spoil = fn(&mut InstancesConfig);
+type Spoil = fn(&mut TrackingConfig);
+type SpoilVolumes = fn(&mut ObjectsConfig);
 
 #[test]
 fn each_setting_out_of_its_range_is_named() {
     let named = |spoil: Spoil| {
-        let mut config = InstancesConfig::default();
+        let mut config = TrackingConfig::default();
         spoil(&mut config);
         let mut problems = Problems::new();
         config.validate(&mut problems);
-        problems.iter().map(|problem| problem.key.strip_prefix("instances.").unwrap()).collect::<Vec<_>>()
+        problems.iter().map(|problem| problem.key.strip_prefix("tracking.").unwrap()).collect::<Vec<_>>()
     };
     assert_eq!(named(|_| {}), [""; 0]);
-    let spoilt: [(Spoil, &str); 41] = [
+    let spoilt: [(Spoil, &str); 33] = [
         (|c| c.frame_interval_s = 0.0, "frame_interval_s"),
         (|c| c.score_min = f32::NAN, "score_min"),
         (|c| c.area_min_px = 1 << 21, "area_min_px"),
@@ -32,12 +33,12 @@ fn each_setting_out_of_its_range_is_named() {
         (|c| c.motion.noise_px = -1.0, "motion.noise_px"),
         (|c| c.motion.extent_m = 0.0, "motion.extent_m"),
         (|c| c.motion.independent_matches = 2, "motion.independent_matches"),
-        (|c| c.motion.turn_rad_s = 0.0, "motion.turn_rad_s"),
+        (|c| c.motion.yaw_rad_s = 0.0, "motion.yaw_rad_s"),
         (|c| c.motion.tilt_rad_s = f32::INFINITY, "motion.tilt_rad_s"),
         (|c| c.motion.tilt_acceleration_rad_s2 = 0.0, "motion.tilt_acceleration_rad_s2"),
         (|c| c.motion.speed_m_s = 0.0, "motion.speed_m_s"),
         (|c| c.motion.acceleration_m_s2 = 0.0, "motion.acceleration_m_s2"),
-        (|c| c.motion.turn_acceleration_rad_s2 = 0.0, "motion.turn_acceleration_rad_s2"),
+        (|c| c.motion.yaw_acceleration_rad_s2 = 0.0, "motion.yaw_acceleration_rad_s2"),
         (|c| c.motion.bias_px = -0.1, "motion.bias_px"),
         (|c| c.motion.lens_px = -0.1, "motion.lens_px"),
         (|c| c.motion.camera_rad = f32::NAN, "motion.camera_rad"),
@@ -48,15 +49,32 @@ fn each_setting_out_of_its_range_is_named() {
         (|c| c.state.static_sigmas = -1.0, "state.static_sigmas"),
         (|c| c.state.confirm_frames = 0, "state.confirm_frames"),
         (|c| c.state.change_frames = 101, "state.change_frames"),
-        (|c| c.volume.voxel_size_m = 0.0, "volume.voxel_size_m"),
-        (|c| c.volume.truncation_m = 0.05, "volume.truncation_m"),
-        (|c| c.volume.far_m = 0.0, "volume.far_m"),
-        (|c| c.volume.extent_m = 0.0, "volume.extent_m"),
-        (|c| c.volume.max_weight = 0, "volume.max_weight"),
-        (|c| c.volume.prune_weight = 200, "volume.prune_weight"),
-        (|c| c.volume.prune_frames = 0, "volume.prune_frames"),
-        (|c| c.volume.far_m = f32::NAN, "volume.far_m"),
         (|c| c.delete_permille = 4001, "delete_permille"),
+    ];
+    for (spoil, key) in spoilt {
+        assert!(named(spoil).contains(&key), "{key}: {:?}", named(spoil));
+    }
+}
+
+#[test]
+fn each_setting_of_the_volumes_out_of_its_range_is_named() {
+    let named = |spoil: SpoilVolumes| {
+        let mut config = ObjectsConfig::default();
+        spoil(&mut config);
+        let mut problems = Problems::new();
+        config.validate(&mut problems);
+        problems.iter().map(|problem| problem.key).collect::<Vec<_>>()
+    };
+    assert_eq!(named(|_| {}), [""; 0]);
+    let spoilt: [(SpoilVolumes, &str); 8] = [
+        (|c| c.voxel_size_m = 0.0, "objects.voxel_size_m"),
+        (|c| c.truncation_m = 0.05, "objects.truncation_m"),
+        (|c| c.far_m = 0.0, "objects.far_m"),
+        (|c| c.extent_m = 0.0, "objects.extent_m"),
+        (|c| c.max_weight = 0, "objects.max_weight"),
+        (|c| c.prune_weight = 200, "objects.prune_weight"),
+        (|c| c.prune_frames = 0, "objects.prune_frames"),
+        (|c| c.far_m = f32::NAN, "objects.far_m"),
     ];
     for (spoil, key) in spoilt {
         assert!(named(spoil).contains(&key), "{key}: {:?}", named(spoil));

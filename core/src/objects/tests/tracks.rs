@@ -9,9 +9,9 @@ fn car(left: i32) -> Detection<'static> {
 }
 
 fn take(instances: &mut Instances<'_>, frame: u32, detections: &[Detection<'_>]) -> Vec<u32> {
-    instances.admit(frame, detections, [WIDTH, HEIGHT]);
-    instances.tracker.settle();
-    instances.tracks().filter(|track| track.seen).map(|track| track.id).collect()
+    instances.ingest(frame, detections, [WIDTH, HEIGHT]);
+    instances.tracker.test_tracked().commit();
+    instances.tracks().filter(|track| track.detected).map(|track| track.id).collect()
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn frames_missed_cost_a_half_then_three_quarters() {
     let score = 48.0 / 72.0 * 0.9;
     for (gap, discount) in [(1, 1.0), (2, 0.5), (3, 0.25), (9, 0.25)] {
         for (margin, expected) in [(0.99, 1), (1.01, 2)] {
-            let config = InstancesConfig { association_min: score * discount * margin, ..any_size() };
+            let config = TrackingConfig { association_min: score * discount * margin, ..any_size() };
             with(&CAPACITY, &config, |instances, _| {
                 take(instances, 0, &[car(100)]);
                 assert_eq!(take(instances, gap, &[car(112)]), [expected], "gap {gap}");
@@ -101,7 +101,7 @@ fn a_mask_that_stops_filling_its_box_still_overlaps_by_what_it_fills() {
     let half = |upper: bool| -> Vec<u8> { (0..3600).map(|i| u8::from((i % 60 > i / 60) == upper)).collect() };
     let (upper, lower) = (half(true), half(false));
     for (overlap, id) in [(any_size().overlap, 2), (Overlap::Box, 1)] {
-        with(&CAPACITY, &InstancesConfig { overlap, ..any_size() }, |instances, _| {
+        with(&CAPACITY, &TrackingConfig { overlap, ..any_size() }, |instances, _| {
             take(instances, 0, &[Detection { mask: &upper, ..car(100) }]);
             assert_eq!(take(instances, 1, &[Detection { mask: &lower, ..car(100) }]), [id]);
         });
@@ -132,10 +132,10 @@ fn a_movement_goes_on_over_a_gap_by_its_frames_up_to_four_of_them() {
 
 #[test]
 fn a_movement_over_a_gap_is_shared_among_its_frames() {
-    with(&CAPACITY, &InstancesConfig { association_min: 0.01, ..any_size() }, |instances, _| {
+    with(&CAPACITY, &TrackingConfig { association_min: 0.01, ..any_size() }, |instances, _| {
         take(instances, 0, &[car(100)]);
         assert_eq!(take(instances, 3, &[car(130)]), [1]);
-        assert_eq!(instances.tracker.all()[0].drift, [10, 0]);
+        assert_eq!(instances.tracker.test_tracks()[0].box_velocity_px, [10, 0]);
     });
 }
 
@@ -174,7 +174,7 @@ fn a_class_holds_until_others_were_seen_more_often() {
 fn a_small_thing_that_grows_is_something_though_no_motion_was_measured() {
     let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
     let grown = detection(Class::Car, 0.9, &PixelBox { left: 98, top: 28, width: 16, height: 16 }, &MASK[..256]);
-    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+    with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         assert_eq!([take(instances, 0, &[small]), take(instances, 1, &[grown])], [vec![], vec![1]]);
     });
 }
@@ -185,27 +185,27 @@ fn what_a_pixel_shows_is_the_best_thing_whose_mask_holds_it() {
         let half: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 < 30)).collect();
         let walker = Detection { class: Class::Person, score: 0.5, ..car(100) };
         take(instances, 0, &[walker, Detection { mask: &half, ..car(100) }]);
-        let shown = |u| instances.at(u, 50).map(|thing| (thing.class, thing.track));
+        let shown = |u| instances.instance_at(u, 50).map(|thing| (thing.class, thing.track));
         assert_eq!([shown(110), shown(140), shown(99)], [Some((Class::Car, Some(1))), Some((Class::Person, None)), None]);
     });
 }
 
 /// The box cleared of depth in a frame, and how many pixels of it.
 fn cleared(instances: &mut Instances<'_>, frame: u32, detections: &[Detection<'_>]) -> Option<(PixelBox, u32)> {
-    instances.admit(frame, detections, [WIDTH, HEIGHT]);
+    instances.ingest(frame, detections, [WIDTH, HEIGHT]);
     let mut depth = vec![5.0f32; WIDTH * HEIGHT];
-    instances.clear(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
-    instances.tracker.settle();
+    instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
+    instances.tracker.test_tracked().commit();
     let pixels = || (0..).zip(&depth).filter(|(_, depth)| **depth == 0.0).map(|(at, _)| (at % WIDTH as i32, at / WIDTH as i32));
     let (left, right) = (pixels().map(|(u, _)| u).min()?, pixels().map(|(u, _)| u).max()?);
     let (top, bottom) = (pixels().map(|(_, v)| v).min()?, pixels().map(|(_, v)| v).max()?);
     let pixels = PixelBox { left, top, width: right + 1 - left, height: bottom + 1 - top };
-    Some((pixels, instances.report().pixels_cleared))
+    Some((pixels, instances.report().pixels_masked))
 }
 
 #[test]
 fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_it_would_be() {
-    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+    with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         take(instances, 0, &[car(100)]);
         take(instances, 1, &[car(110)]);
         for (frame, left) in [(2, 120), (3, 130), (4, 140)] {
@@ -215,18 +215,18 @@ fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_i
         assert_eq!(cleared(instances, 5, &[]), None, "it may be anywhere");
         let found = PixelBox { left: 150, top: 30, width: 60, height: 60 }.scaled(1200);
         assert_eq!(cleared(instances, 6, &[car(150)]), Some((found, 72 * 72)), "found again: nowhere else");
-        assert_eq!(instances.tracks().next().map(|track| (track.id, track.seen)), Some((1, true)));
+        assert_eq!(instances.tracks().next().map(|track| (track.id, track.detected)), Some((1, true)));
     });
 }
 
 #[test]
 fn what_was_seen_once_and_never_again_is_not_kept_out_longer_nor_what_is_too_small() {
-    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+    with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         take(instances, 0, &[car(100)]);
         assert_eq!(cleared(instances, 1, &[]), None, "a ghost");
     });
     let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
-    with(&CAPACITY, &InstancesConfig::default(), |instances, _| {
+    with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         (0..3).for_each(|frame| drop(take(instances, frame, &[small])));
         assert_eq!(cleared(instances, 3, &[]), None);
     });

@@ -94,12 +94,12 @@ fn a_volume_lies_where_the_thing_is() {
 fn what_counts_as_standing_is_put_where_it_was_seen_in_the_world() {
     // Whatever it does, it counts as standing.
     let state = StateConfig { dynamic_m_s: 50.0, static_m_s: 50.0, slow_m_s: 50.0, ..StateConfig::default() };
-    with(&Capacity { object_blocks: 2000, ..CAPACITY }, &InstancesConfig { state, ..any_size() }, |instances, estimator| {
+    with(&Capacity { object_blocks: 2000, ..CAPACITY }, &TrackingConfig { state, ..any_size() }, |instances, estimator| {
         let mut drive = Drive::new(instances, estimator);
         for frame in 0..4 {
             drive.step(Transform::IDENTITY, &[(&SMALL, Some(shift(0.0, 0.0, 8.0 + 0.8 * f64::from(frame))))]);
         }
-        assert_eq!(drive.track(1).unwrap().state, State::Static);
+        assert_eq!(drive.track(1).unwrap().state, MotionState::Static);
         let mut layers: Vec<i16> = content(drive.instances).0.iter().map(|at| at.z).collect();
         layers.sort_unstable();
         layers.dedup();
@@ -141,12 +141,12 @@ fn cropped(disparity_px: impl Fn(i32) -> f64) -> Vec<i32> {
     let pixels = PixelBox { left: 20, top: 10, width: 60, height: 30 };
     let mut words = vec![0; 1000];
     let mut store = MaskStore::new(&mut words);
-    let place = store.take(pixels).unwrap();
-    (10..40).for_each(|v| store.enter_row(&place, v, 20, &[1; 54]));
+    let place = store.alloc(pixels).unwrap();
+    (10..40).for_each(|v| store.set_row(&place, v, 20, &[1; 54]));
     let row: Vec<u16> = (0..WIDTH as i32).map(|u| (disparity_px(u - 20) * 256.0) as u16).collect();
     let disparity = row.repeat(HEIGHT);
     let mut crop = vec![7u16; pixels.area() as usize];
-    let kept = crop::cut(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &place, &mut crop);
+    let kept = crop::crop(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &place, &mut crop);
     let columns = |row: &[u16]| (0..60).filter(|&u| row[u as usize] > 0).collect::<Vec<i32>>();
     let first = columns(&crop[..60]);
     assert!(crop.chunks_exact(60).all(|row| columns(row) == first));

@@ -22,7 +22,7 @@ use crate::input::{ObjectsTruth, TrueObject};
 use association::Association;
 use dynvox_core::geometry::Transform;
 use dynvox_core::masks::PixelBox;
-use dynvox_core::tracking::{State, TrackReport};
+use dynvox_core::tracking::{MotionState, TrackReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -81,7 +81,7 @@ pub struct TrackComparison {
     /// Whether it moves.
     pub moving: bool,
     /// The track's motion state.
-    pub state: State,
+    pub state: MotionState,
     /// Frames since the track began and since the true state last changed.
     pub settled: u32,
     /// Distance of the true object along the camera's axis, m.
@@ -104,7 +104,7 @@ impl TrackComparison {
 
     /// Whether the state should be right by now and is not.
     fn is_late(&self) -> bool {
-        self.is_due() && self.state != if self.moving { State::Dynamic } else { State::Static }
+        self.is_due() && self.state != if self.moving { MotionState::Dynamic } else { MotionState::Static }
     }
 }
 
@@ -132,7 +132,7 @@ impl ObjectErrors {
         size: (usize, usize),
         large_enough: impl Fn(&PixelBox) -> bool,
     ) {
-        let boxes: Vec<(u32, PixelBox)> = tracks.iter().filter(|track| track.seen).map(|track| (track.id, track.pixels)).collect();
+        let boxes: Vec<(u32, PixelBox)> = tracks.iter().filter(|track| track.detected).map(|track| (track.id, track.pixels)).collect();
         let objects: Vec<_> = truth.objects.iter().map(|one| (one.id, one.pixels, large_enough(&one.pixels))).collect();
         self.association.add(&boxes, &objects, &truth.unlabelled);
         let frame = self.frame;
@@ -143,11 +143,11 @@ impl ObjectErrors {
             }
         }
         let t_true_estimated = truth.t_world_camera * t_world_camera.inverse();
-        for track in tracks.iter().filter(|track| track.seen) {
+        for track in tracks.iter().filter(|track| track.detected) {
             let Some(object) = true_object(&track.pixels, truth) else { continue };
             let first = *self.first_seen.entry(track.id).or_insert(frame);
             let changed = self.truths.get(&object.id).map_or(frame, |known| known.1);
-            let estimated = track.measured || track.state != State::Uncertain;
+            let estimated = track.measured || track.state != MotionState::Uncertain;
             let error = self.before.get(&object.id).filter(|_| estimated).map(|before| {
                 let estimate = t_true_estimated * track.motion_world * t_true_estimated.inverse();
                 motion_error(before, &object.t_world_object, &estimate)

@@ -28,13 +28,13 @@ fn truth(frame: u32, moving: bool) -> ObjectsTruth {
     }
 }
 
-fn track(state: State, motion_world: Transform) -> TrackReport {
+fn track(state: MotionState, motion_world: Transform) -> TrackReport {
     TrackReport {
         id: 1,
         class: Class::Car,
         state,
         score: 1.0,
-        seen: true,
+        detected: true,
         first_frame: 0,
         last_frame: 0,
         sightings: 1,
@@ -51,7 +51,7 @@ fn track(state: State, motion_world: Transform) -> TrackReport {
 }
 
 /// Feeds a drive in which the estimated world is the true one moved by `drift`, and each motion is off by `error` in the car's frame.
-fn drive(states: &[State], moving: &[bool], drift: &Transform, error: &Transform) -> ObjectErrors {
+fn drive(states: &[MotionState], moving: &[bool], drift: &Transform, error: &Transform) -> ObjectErrors {
     let mut errors = ObjectErrors::default();
     for (at, (&state, &moving)) in states.iter().zip(moving).enumerate() {
         let frame = at as u32;
@@ -67,7 +67,7 @@ fn drive(states: &[State], moving: &[bool], drift: &Transform, error: &Transform
 fn a_motion_off_by_two_centimetres_has_that_error_wherever_the_camera_believes_to_be() {
     let drift = Transform::new(Vector3::new(0.1, -0.4, 0.05), Vector3::new(30.0, -2.0, 11.0));
     let off = Transform::new(Vector3::new(0.0, 0.001, 0.0), Vector3::new(0.02, 0.0, 0.0));
-    let errors = drive(&[State::Dynamic; 8], &[true; 8], &drift, &off).tracks()[&1].clone();
+    let errors = drive(&[MotionState::Dynamic; 8], &[true; 8], &drift, &off).tracks()[&1].clone();
     assert!((errors.me_t_m.unwrap() - 0.02).abs() < 1e-4, "{errors:?}");
     assert!((errors.me_r_deg.unwrap() - 0.001f64.to_degrees()).abs() < 1e-6);
     assert!((errors.speed_error_m_s.unwrap() - 0.5).abs() < 1e-5);
@@ -76,8 +76,9 @@ fn a_motion_off_by_two_centimetres_has_that_error_wherever_the_camera_believes_t
 
 #[test]
 fn a_state_may_take_five_frames_and_no_more() {
-    use State::{Dynamic as D, Static as S, Uncertain as U};
-    let of = |states: &[State], moving: &[bool]| drive(states, moving, &Transform::IDENTITY, &Transform::IDENTITY).tracks()[&1].clone();
+    use MotionState::{Dynamic as D, Static as S, Uncertain as U};
+    let of =
+        |states: &[MotionState], moving: &[bool]| drive(states, moving, &Transform::IDENTITY, &Transform::IDENTITY).tracks()[&1].clone();
     let (m, s) = (true, false);
     assert_eq!(of(&[U, U, U, U, U, D, D], &[m; 7]).late_frames, 0);
     assert_eq!(of(&[U, U, U, U, U, U, D], &[m; 7]).late_frames, 1);
@@ -90,8 +91,11 @@ fn a_state_may_take_five_frames_and_no_more() {
 #[test]
 fn what_overlaps_nothing_true_is_not_compared() {
     let mut errors = ObjectErrors::default();
-    let elsewhere = TrackReport { pixels: PIXELS.moved([70, 0]), ..track(State::Dynamic, Transform::IDENTITY) };
-    let unseen = TrackReport { seen: false, ..track(State::Dynamic, Transform::IDENTITY) };
+    let elsewhere = TrackReport {
+        pixels: PIXELS.moved([70, 0]),
+        ..track(MotionState::Dynamic, Transform::IDENTITY)
+    };
+    let unseen = TrackReport { detected: false, ..track(MotionState::Dynamic, Transform::IDENTITY) };
     errors.add(&[elsewhere, unseen], &Transform::IDENTITY, &truth(0, true), SIZE, |_| true);
     assert!(errors.tracks().is_empty() && errors.figures().is_none());
 }
@@ -113,7 +117,12 @@ fn a_turning_car_is_judged_as_a_rigid_body() {
 
 #[test]
 fn every_comparison_is_a_row_in_the_order_of_frames() {
-    let errors = drive(&[State::Uncertain, State::Dynamic, State::Dynamic], &[true; 3], &Transform::IDENTITY, &Transform::IDENTITY);
+    let errors = drive(
+        &[MotionState::Uncertain, MotionState::Dynamic, MotionState::Dynamic],
+        &[true; 3],
+        &Transform::IDENTITY,
+        &Transform::IDENTITY,
+    );
     let rows = errors.comparisons();
     assert_eq!(
         rows.iter().map(|(id, one)| (*id, one.at, one.error.is_some())).collect::<Vec<_>>(),
@@ -126,8 +135,8 @@ fn every_comparison_is_a_row_in_the_order_of_frames() {
 
 #[test]
 fn late_tracks_are_counted_by_distance_and_by_what_could_be_seen_of_them() {
-    use State::{Static as S, Uncertain as U};
-    let one = |settled: u32, distance_m: f64, state: State, view: Visibility| TrackComparison {
+    use MotionState::{Static as S, Uncertain as U};
+    let one = |settled: u32, distance_m: f64, state: MotionState, view: Visibility| TrackComparison {
         at: settled as usize,
         truth: 7,
         moving: false,

@@ -2,7 +2,7 @@
 
 use super::{FAR_M, TrackComparison, rms};
 use crate::evaluate::quantile::median;
-use dynvox_core::tracking::State;
+use dynvox_core::tracking::MotionState;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -53,20 +53,20 @@ impl TrackErrors {
         let mut last: Option<&TrackComparison> = None;
         for one in comparisons {
             let state = match one.state {
-                State::Uncertain => 0,
-                State::Static => 1,
-                State::Dynamic => 2,
+                MotionState::Uncertain => 0,
+                MotionState::Static => 1,
+                MotionState::Dynamic => 2,
             };
             confusion[usize::from(one.moving)][state] += 1;
             *votes.entry(one.truth).or_default() += 1;
             late_frames += u32::from(one.is_late() && one.distance_m < FAR_M);
-            if one.state != State::Uncertain {
+            if one.state != MotionState::Uncertain {
                 let same = |before: &&TrackComparison| before.truth == one.truth && before.moving == one.moving && one.is_due();
                 flips += u32::from(last.filter(same).is_some_and(|before| before.state != one.state));
                 last = Some(one);
             }
         }
-        let dynamic = comparisons.iter().filter(|one| one.state == State::Dynamic);
+        let dynamic = comparisons.iter().filter(|one| one.state == MotionState::Dynamic);
         let errors = |at: usize| comparisons.iter().filter_map(move |one| Some(one.error?[at]));
         Self {
             truth: votes.into_iter().max_by_key(|&(_, count)| count).map_or(0, |(truth, _)| truth),

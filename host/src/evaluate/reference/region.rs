@@ -1,6 +1,6 @@
 //! The part of the scene a point belongs to.
 
-use dynvox_core::tracking::{State, ThingAt, Treatment};
+use dynvox_core::tracking::{InstanceAt, MotionState, Treatment};
 
 /// The part of the scene a point belongs to, by its pixel in its own frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,11 +18,11 @@ impl Region {
     pub const ALL: [Self; 3] = [Self::Static, Self::Dynamic, Self::Ignored];
 
     /// By what a pixel shows.
-    pub fn of(object: Option<&ThingAt>) -> Self {
+    pub fn of(object: Option<&InstanceAt>) -> Self {
         let Some(object) = object else { return Self::Static };
         match object.class.treatment() {
             Treatment::Ignore => Self::Static,
-            Treatment::Reconstruct if object.state != State::Uncertain => Self::Dynamic,
+            Treatment::Reconstruct if object.state != MotionState::Uncertain => Self::Dynamic,
             Treatment::Reconstruct | Treatment::KeepOut => Self::Ignored,
         }
     }

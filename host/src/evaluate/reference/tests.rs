@@ -3,7 +3,7 @@ use crate::input::LidarScan;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
 use dynvox_core::masks::PixelBox;
-use dynvox_core::tracking::{Class, State, ThingAt};
+use dynvox_core::tracking::{Class, InstanceAt, MotionState};
 
 const FOCAL_PX: f64 = 700.0;
 const BASELINE_M: f64 = 0.55;
@@ -27,7 +27,7 @@ fn scan(hits: &[(i32, i32, f64)]) -> LidarScan {
 }
 
 /// A frame's masks, each with what is behind it.
-struct Masks(Vec<(PixelBox, ThingAt)>);
+struct Masks(Vec<(PixelBox, InstanceAt)>);
 
 impl Masks {
     fn region(&self, u: i32, v: i32) -> Region {
@@ -38,13 +38,13 @@ impl Masks {
 fn masks(shift: i32) -> Masks {
     let of = |left: i32, class, state| {
         let pixels = PixelBox { left: left + shift, top: 200, width: 40, height: 40 };
-        (pixels, ThingAt { class, track: Some(1), state })
+        (pixels, InstanceAt { class, track: Some(1), state })
     };
     Masks(vec![
-        of(700, Class::Car, State::Static),
-        of(800, Class::Car, State::Uncertain),
-        of(900, Class::Person, State::Dynamic),
-        of(1000, Class::Other, State::Uncertain),
+        of(700, Class::Car, MotionState::Static),
+        of(800, Class::Car, MotionState::Uncertain),
+        of(900, Class::Person, MotionState::Dynamic),
+        of(1000, Class::Other, MotionState::Uncertain),
     ])
 }
 
@@ -131,7 +131,7 @@ fn a_delayed_evaluation_splits_the_points_by_the_masks_of_their_own_frame() {
     // Two frames later the masks have moved on: over points that were street.
     let later = Masks(vec![(
         PixelBox { left: 320, top: 160, width: 60, height: 40 },
-        ThingAt { class: Class::Car, track: Some(1), state: State::Dynamic },
+        InstanceAt { class: Class::Car, track: Some(1), state: MotionState::Dynamic },
     )]);
     let (second, mut map) = pending(9, &HITS, &later);
     let past = delay.step(2, Some(second)).unwrap();

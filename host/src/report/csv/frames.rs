@@ -192,7 +192,7 @@ fn object_columns(row: &FrameRow) -> ObjectColumns {
     let [uncertain, still, dynamic] = row.track_states;
     ObjectColumns {
         detections_given: instances.detections.given,
-        detections_taken: instances.detections.taken,
+        detections_taken: instances.detections.accepted,
         detections_refused: instances.detections.refused(),
         tracks: instances.tracks.tracks,
         uncertain,
@@ -200,7 +200,7 @@ fn object_columns(row: &FrameRow) -> ObjectColumns {
         dynamic,
         objects: instances.objects.objects,
         object_blocks: instances.objects.blocks,
-        matches_withheld: instances.matches_withheld,
+        matches_withheld: instances.matches_excluded,
     }
 }
 

@@ -8,7 +8,7 @@ use crate::observe::{ReconstructedObject, TrackRecord, TracksSection, state_name
 use crate::report::chart::{Bar, Lane, lanes};
 use crate::report::text::{grouped, motion_error, states_in_time};
 use crate::run::RunRecord;
-use dynvox_core::tracking::State;
+use dynvox_core::tracking::MotionState;
 use maud::{Markup, html};
 
 /// Tracks drawn and listed at most: those seen in most frames.
@@ -28,7 +28,7 @@ pub fn section(run: &RunRecord) -> Markup {
         section {
             h2 { "Objects and tracks" }
             p.soft.small {
-                (grouped(u64::from(detections.given))) " detections: " (grouped(u64::from(detections.taken))) " accepted, "
+                (grouped(u64::from(detections.given))) " detections: " (grouped(u64::from(detections.accepted))) " accepted, "
                 (grouped(u64::from(detections.too_small))) " too small, " (grouped(u64::from(detections.ignored)))
                 " of static classes, " (grouped(u64::from(detections.refused()))) " refused; " (tracks.tracks.len()) " tracks"
                 @if tracks.tracks.len() > shown.len() { ", the " (shown.len()) " longest are shown" }
@@ -40,7 +40,7 @@ pub fn section(run: &RunRecord) -> Markup {
             @if let Some(count) = run.sections.objects.swept_triangles {
                 p.small { "Triangles of the static map in the volume that moving objects swept: " b { (grouped(count)) } "." }
             }
-            (lanes(&frames(run), &lanes_of(tracks, &shown), "tracks over frames", &[State::Uncertain, State::Static, State::Dynamic].map(state_name)))
+            (lanes(&frames(run), &lanes_of(tracks, &shown), "tracks over frames", &[MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(state_name)))
             (track_table(&shown))
             (gallery(&run.sections.objects.objects))
         }
@@ -111,7 +111,7 @@ fn lanes_of(tracks: &TracksSection, shown: &[&TrackRecord]) -> Vec<Lane> {
         for (at, frame) in tracks.frames.iter().enumerate() {
             let Some(track) = frame.tracks.iter().find(|track| track.id == record.id) else { continue };
             let (style, pale) = (state_name(track.state), !track.measured);
-            let speed = track.speed_m_s.filter(|_| track.state != State::Static);
+            let speed = track.speed_m_s.filter(|_| track.state != MotionState::Static);
             let text = speed.map(|[speed, _]| format!("{speed:.1} m/s"));
             match bars.last_mut().filter(|last| last.to == at && last.style == style && last.pale == pale) {
                 Some(last) => (last.to, last.text) = (at + 1, text),
@@ -121,7 +121,7 @@ fn lanes_of(tracks: &TracksSection, shown: &[&TrackRecord]) -> Vec<Lane> {
         let truth = record.errors.iter().flat_map(|errors| &errors.moving).map(|&(at, moving)| Bar {
             from: at,
             to: at + 1,
-            style: state_name(if moving { State::Dynamic } else { State::Static }),
+            style: state_name(if moving { MotionState::Dynamic } else { MotionState::Static }),
             pale: false,
             text: None,
         });

@@ -1,41 +1,41 @@
-//! Uncertain, static, dynamic: what is known about whether a thing moves.
+//! Uncertain, static, dynamic: the motion state of an object, with hysteresis.
 //!
-//! A frame's motion has a speed, an error of it (one sigma) and a bias the cameras may add. It speaks for *dynamic* when the speed less the
-//! bias and `sigmas` times the error is above `dynamic_m_s`; for *static* when that is below `static_m_s` and the speed with `static_sigmas`
-//! times the error in all directions is below `slow_m_s`, of a thing known to move below `dynamic_m_s`; otherwise for neither. So a far car that may stand and
-//! is surely slower than somebody walking counts as standing, and one of which not even that can be said stays uncertain; but what was
-//! seen moving must be seen to have stopped. With `sigmas` 0, `confirm_frames` 1 and `slow_m_s` equal to `static_m_s` this is the published
-//! rule (Section III-D).
+//! A frame's motion has a speed, an error of it (one sigma) and a bias the cameras may add. It is classified *dynamic* when the speed
+//! less the bias and `sigmas` times the error is above `dynamic_m_s`; *static* when that is below `static_m_s` and the speed plus
+//! `static_sigmas` times the error in all directions is below `slow_m_s`, for a dynamic object below `dynamic_m_s`; otherwise neither.
+//! So a far car that may be static and is certainly slower than a pedestrian is static, and one that may be faster stays uncertain; but
+//! a dynamic object must be measured to have stopped. With `sigmas` 0, `confirm_frames` 1 and `slow_m_s` equal to `static_m_s` this
+//! is the published rule (Section III-D).
 //!
 //! ```text
-//!      standing_frames or confirm_frames agree         change_frames agree
+//!      confirm_static_frames or confirm_frames agree         change_frames agree
 //! uncertain ----------------------> static or dynamic <-------------------> the other
 //!     ^                                    |
 //!     +------------------------------------+  no motion for more than static_frames or dynamic_frames frames
 //! ```
 //!
-//! A frame in which the thing is not seen is a frame without a motion. It neither confirms nor refutes: what the frames before spoke for
-//! still counts until the state is lost, or for as long with none.
+//! A frame in which the object is not detected is a frame without a motion. It neither confirms nor refutes: what the frames before
+//! were classified as still counts until the state is lost, or for as long without a state.
 
 use super::config::StateConfig;
 use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
-/// What is known about a thing's motion.
+/// What is known about an object's motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
-pub enum State {
+pub enum MotionState {
     /// It may move or not.
     #[default]
     Uncertain,
-    /// It stands.
+    /// It does not move.
     Static,
     /// It moves.
     Dynamic,
 }
 
-impl State {
+impl MotionState {
     /// Name in tables and files.
     pub const fn name(self) -> &'static str {
         match self {
@@ -50,7 +50,7 @@ impl State {
         self as u32
     }
 
-    /// The state of a code; [`State::Uncertain`] for one there is none for.
+    /// The state of a code; [`MotionState::Uncertain`] for an unknown one.
     pub(crate) fn from_code(code: u32) -> Self {
         match code {
             1 => Self::Static,
@@ -60,94 +60,98 @@ impl State {
     }
 }
 
-/// What a frame says about a thing's speed.
+/// What a frame measures of an object's speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Evidence {
+pub struct MotionEvidence {
     /// Speed over ground, m/s.
     pub speed_m_s: f32,
     /// Its error along the direction of motion, one sigma, m/s.
     pub sigma_m_s: f32,
-    /// Its error in all directions together, m/s: of what seems to stand the direction says nothing.
+    /// Its error in all directions together, m/s: of what seems static the direction means nothing.
     pub spread_m_s: f32,
-    /// By how much the cameras' own errors may make it too high, m/s: of a thing that stands they can make one that moves.
+    /// By how much the cameras' own errors may make it too high, m/s: they can make a static object seem to move.
     pub bias_m_s: f32,
 }
 
-impl Evidence {
-    /// The state it speaks for; `Uncertain` when it speaks for neither, or is not a number.
-    fn vote(&self, config: &StateConfig, state: State) -> State {
+impl MotionEvidence {
+    /// The state it is classified as; `Uncertain` when neither, or not a number.
+    fn classify(&self, config: &StateConfig, state: MotionState) -> MotionState {
         let least = self.speed_m_s - self.bias_m_s - config.sigmas * self.sigma_m_s;
         let most = self.speed_m_s + config.static_sigmas * self.spread_m_s;
-        let slow_m_s = if state == State::Dynamic { config.dynamic_m_s } else { config.slow_m_s };
+        let slow_m_s = if state == MotionState::Dynamic { config.dynamic_m_s } else { config.slow_m_s };
         if least > config.dynamic_m_s {
-            State::Dynamic
+            MotionState::Dynamic
         } else if least < config.static_m_s && most < slow_m_s {
-            State::Static
+            MotionState::Static
         } else {
-            State::Uncertain
+            MotionState::Uncertain
         }
     }
 }
 
-/// The state of one track.
+/// The motion state of one track, with its hysteresis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Judgement {
+pub(crate) struct MotionHysteresis {
     state: u32,
-    /// What the last frames spoke for, and how many in a row did.
-    vote: u32,
-    streak: u32,
-    /// Frames since there was a motion.
+    /// What the last frames were classified as, and how many in a row were.
+    classified: u32,
+    consecutive: u32,
+    /// Frames since a motion was measured.
     since_motion: u32,
 }
 
-impl Judgement {
-    pub fn state(&self) -> State {
-        State::from_code(self.state)
+impl MotionHysteresis {
+    pub fn state(&self) -> MotionState {
+        MotionState::from_code(self.state)
     }
 
     /// Visits every field.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { state, vote, streak, since_motion } = self;
-        visitor.u32s([state, vote, streak, since_motion]);
+        let Self { state, classified, consecutive, since_motion } = self;
+        visitor.u32s([state, classified, consecutive, since_motion]);
     }
 
-    /// Takes in a frame, seen or not, with a motion or without. Returns the new state.
-    pub fn advance(&mut self, config: &StateConfig, evidence: Option<Evidence>) -> State {
+    /// Updates by a frame, with a motion or without. Returns the new state.
+    pub fn update(&mut self, config: &StateConfig, evidence: Option<MotionEvidence>) -> MotionState {
         match evidence {
-            Some(evidence) => {
-                self.since_motion = 0;
-                let vote = evidence.vote(config, self.state());
-                self.streak = if vote as u32 == self.vote { self.streak.saturating_add(1) } else { 1 };
-                self.vote = vote as u32;
-                let needed = match (self.state(), vote) {
-                    (State::Uncertain, State::Static) => config.standing_frames,
-                    (State::Uncertain, _) => config.confirm_frames,
-                    _ => config.change_frames,
-                };
-                let vote = vote as u32;
-                if vote != State::Uncertain as u32 && self.streak >= u32::from(needed) {
-                    self.state = vote;
-                }
-            }
-            None => {
-                self.since_motion = self.since_motion.saturating_add(1);
-                let most = match self.state() {
-                    State::Static => config.static_frames,
-                    State::Dynamic | State::Uncertain => config.dynamic_frames,
-                };
-                if self.since_motion > u32::from(most) {
-                    (self.state, self.vote, self.streak) = (State::Uncertain as u32, 0, 0);
-                }
-            }
+            Some(evidence) => self.confirm(config, evidence.classify(config, self.state())),
+            None => self.expire(config),
         }
         self.state()
+    }
+
+    /// Counts a frame with a motion.
+    fn confirm(&mut self, config: &StateConfig, classified: MotionState) {
+        self.since_motion = 0;
+        self.consecutive = if classified.code() == self.classified { self.consecutive.saturating_add(1) } else { 1 };
+        self.classified = classified.code();
+        let required = match (self.state(), classified) {
+            (MotionState::Uncertain, MotionState::Static) => config.confirm_static_frames,
+            (MotionState::Uncertain, _) => config.confirm_frames,
+            _ => config.change_frames,
+        };
+        if classified != MotionState::Uncertain && self.consecutive >= u32::from(required) {
+            self.state = classified.code();
+        }
+    }
+
+    /// Counts a frame without a motion.
+    fn expire(&mut self, config: &StateConfig) {
+        self.since_motion = self.since_motion.saturating_add(1);
+        let most = match self.state() {
+            MotionState::Static => config.static_frames,
+            MotionState::Dynamic | MotionState::Uncertain => config.dynamic_frames,
+        };
+        if self.since_motion > u32::from(most) {
+            (self.state, self.classified, self.consecutive) = (MotionState::Uncertain.code(), 0, 0);
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{State::*, *};
+    use super::{MotionState::*, *};
 
     /// The published thresholds at 10 Hz: 0.03 m and 0.55 m a frame, no error, no confirmation.
     const PUBLISHED: StateConfig = StateConfig {
@@ -157,14 +161,14 @@ mod tests {
         sigmas: 0.0,
         static_sigmas: 0.0,
         confirm_frames: 1,
-        standing_frames: 1,
+        confirm_static_frames: 1,
         change_frames: 2,
         static_frames: 5,
         dynamic_frames: 1,
     };
 
-    fn seen(metres_per_frame: f32) -> Option<Evidence> {
-        Some(Evidence {
+    fn seen(metres_per_frame: f32) -> Option<MotionEvidence> {
+        Some(MotionEvidence {
             speed_m_s: metres_per_frame * 10.0,
             sigma_m_s: 0.0,
             spread_m_s: 0.0,
@@ -172,9 +176,9 @@ mod tests {
         })
     }
 
-    fn states(config: &StateConfig, frames: &[Option<Evidence>]) -> std::vec::Vec<State> {
-        let mut judgement = Judgement::default();
-        frames.iter().map(|evidence| judgement.advance(config, *evidence)).collect()
+    fn states(config: &StateConfig, frames: &[Option<MotionEvidence>]) -> std::vec::Vec<MotionState> {
+        let mut hysteresis = MotionHysteresis::default();
+        frames.iter().map(|evidence| hysteresis.update(config, *evidence)).collect()
     }
 
     #[test]
@@ -224,7 +228,7 @@ mod tests {
 
     #[test]
     fn standing_and_moving_are_confirmed_by_counts_of_their_own() {
-        let config = StateConfig { confirm_frames: 3, standing_frames: 2, ..PUBLISHED };
+        let config = StateConfig { confirm_frames: 3, confirm_static_frames: 2, ..PUBLISHED };
         assert_eq!(states(&config, &[seen(0.0), seen(0.0)]), [Uncertain, Static]);
         assert_eq!(states(&config, &[seen(1.0), seen(1.0), seen(1.0)]), [Uncertain, Uncertain, Dynamic]);
         assert_eq!(states(&config, &[seen(0.0), seen(0.2), seen(0.0), seen(0.0)]), [Uncertain, Uncertain, Uncertain, Static]);
@@ -233,7 +237,7 @@ mod tests {
     #[test]
     fn a_frame_without_a_motion_does_not_undo_what_those_before_spoke_for_but_two_do() {
         let config = StateConfig { confirm_frames: 3, ..PUBLISHED };
-        let last = |script: &[Option<Evidence>]| *states(&config, script).last().unwrap();
+        let last = |script: &[Option<MotionEvidence>]| *states(&config, script).last().unwrap();
         assert_eq!(last(&[seen(1.0), seen(1.0), None, seen(1.0)]), Dynamic);
         assert_eq!(last(&[seen(1.0), seen(1.0), None, None, seen(1.0)]), Uncertain);
         assert_eq!(last(&[seen(1.0), seen(1.0), None, None, seen(1.0), seen(1.0), seen(1.0)]), Dynamic);
@@ -243,11 +247,11 @@ mod tests {
     fn what_may_stand_and_is_slower_than_a_walker_stands_but_what_moved_must_be_seen_to_stop() {
         let config = StateConfig {
             confirm_frames: 1,
-            standing_frames: 1,
+            confirm_static_frames: 1,
             change_frames: 1,
             ..StateConfig::default()
         };
-        let far = |speed_m_s| Some(Evidence { speed_m_s, sigma_m_s: 0.5, spread_m_s: 0.5, bias_m_s: 0.0 });
+        let far = |speed_m_s| Some(MotionEvidence { speed_m_s, sigma_m_s: 0.5, spread_m_s: 0.5, bias_m_s: 0.0 });
         assert_eq!(states(&config, &[far(0.6)]), [Static]);
         assert_eq!(states(&config, &[far(0.8)]), [Uncertain], "it may be walking");
         assert_eq!(states(&config, &[seen(1.0), far(0.6), far(0.05)]), [Dynamic, Dynamic, Static]);
@@ -256,11 +260,13 @@ mod tests {
     #[test]
     fn a_noisy_motion_proves_nothing() {
         let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, slow_m_s: 5.5, ..PUBLISHED };
-        let vote = |speed_m_s, sigma_m_s| Evidence { speed_m_s, sigma_m_s, spread_m_s: sigma_m_s, bias_m_s: 0.0 }.vote(&config, Uncertain);
+        let vote = |speed_m_s, sigma_m_s| {
+            MotionEvidence { speed_m_s, sigma_m_s, spread_m_s: sigma_m_s, bias_m_s: 0.0 }.classify(&config, Uncertain)
+        };
         assert_eq!([vote(8.0, 1.0), vote(8.0, 1.5)], [Dynamic, Uncertain]);
         // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give or take 2 nothing can be told.
         assert_eq!([vote(2.0, 1.5), vote(2.0, 2.0), vote(2.0, 0.5)], [Static, Uncertain, Uncertain]);
-        let biased = |bias_m_s| Evidence { speed_m_s: 8.0, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s }.vote(&config, Uncertain);
+        let biased = |bias_m_s| MotionEvidence { speed_m_s: 8.0, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s }.classify(&config, Uncertain);
         assert_eq!([biased(2.0), biased(3.0)], [Dynamic, Uncertain], "nor does one the lens could make");
         assert_eq!([vote(f32::NAN, 0.0), vote(0.0, f32::INFINITY)], [Uncertain, Uncertain]);
     }

@@ -1,14 +1,14 @@
-//! How fast a thing goes and turns, held over frames: an extended information filter over six rates.
+//! An object's velocity and angular velocity over frames: an extended information filter.
 //!
-//! The state is the thing's velocity and turning over ground at its middle, in world axes. Between frames it may change by a random
-//! acceleration (constant-velocity model). A frame's matches enter by their reprojection errors, not by a motion computed from them alone:
-//! Gauss-Newton minimises `sum |error|² / noise² + |rate - predicted|²` (weighted by the inverse of the prediction's covariance), so what a
-//! frame does not determine, as the turning and the depth of a car far away, is taken from the frames before. The inverse of the matrix it
-//! solves is the covariance, from which the state machine knows how sure a speed is.
+//! The state is the velocity and angular velocity over ground at the object's centre, in world axes. Between frames it may change by a
+//! random acceleration (constant-velocity model). A frame's matches enter by their reprojection errors, not by a motion computed from
+//! them alone: Gauss-Newton minimises `sum |error|^2 / noise^2 + |rate - predicted|^2` (weighted by the inverse of the prediction's
+//! covariance), so what a frame does not determine, as the rotation and the depth of a car far away, is taken from the frames before.
+//! The inverse of the matrix it solves is the covariance, which tells the motion state how certain a speed is.
 //!
-//! A point that the camera's motion alone would put at `q` (in the current camera) is expected at `c + R(turn dt) (q - c) + velocity dt`,
-//! where c is the mean of all q. Errors of matches of one thing are not independent (one mask, one rectification): no more than
-//! `independent_matches` count.
+//! A point that the camera's motion alone would predict at `q` (in the current camera) is expected at
+//! `c + R(angular velocity dt) (q - c) + velocity dt`, where c is the mean of all q. Errors of matches of one object are not
+//! independent (one mask, one rectification): no more than `independent_matches` count.
 
 use super::config::MotionConfig;
 use crate::geometry::{StereoRig, Transform};
@@ -18,34 +18,34 @@ use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
 
 /// Gauss-Newton steps per frame; what is left after them is far below the noise.
 const STEPS: usize = 4;
-/// Square of the distance, in sigmas, from what was predicted beyond which a frame contradicts it: of six normal numbers one in 10^5 lies
-/// there.
+/// Squared Mahalanobis distance from the prediction beyond which a frame contradicts it: chi-square, 6 degrees of freedom, 1e-5.
 const CONTRADICTION: f64 = 34.0;
 /// Nearest depth at which a point can be seen, m.
 const DEPTH_MIN_M: f64 = 0.05;
 
-/// A point of a thing: where it would be in the current camera if the thing stood, and where it is seen, px from the principal point.
+/// A point of an object: where it would be in the current camera if the object were static, and where it is observed, px from the
+/// principal point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sighting {
-    pub standing: Point3<f64>,
+pub(crate) struct Observation {
+    pub static_prediction: Point3<f64>,
     pub left: [f64; 2],
     pub right: [f64; 2],
 }
 
-/// The filter. `rate` is turning (rad/s), then velocity (m/s), in world axes.
+/// The filter. `rate` is angular velocity (rad/s), then velocity (m/s), in world axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Filter {
+pub(crate) struct MotionFilter {
     rate: [f64; 6],
     covariance: [[f64; 6]; 6],
     center_world: [f64; 3],
-    /// Frames taken in; 0 before the first.
+    /// Frames that updated it; 0 before the first.
     frames: u32,
-    /// Frames in a row that contradicted what was known.
+    /// Consecutive frames that contradicted the prediction.
     contradictions: u32,
 }
 
-impl Filter {
+impl MotionFilter {
     /// Visits every field.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { rate, covariance, center_world, frames, contradictions } = self;
@@ -56,12 +56,12 @@ impl Filter {
         visitor.u32(contradictions);
     }
 
-    /// Whether a motion has ever been seen.
+    /// Whether a motion was ever measured.
     pub fn is_known(&self) -> bool {
         self.frames > 0
     }
 
-    fn turn(&self) -> Vector3<f64> {
+    fn angular_velocity(&self) -> Vector3<f64> {
         let [x, y, z, ..] = self.rate;
         Vector3::new(x, y, z)
     }
@@ -72,7 +72,7 @@ impl Filter {
         Vector3::new(x, y, z)
     }
 
-    /// Middle of the thing in the world, m.
+    /// Centre of the object in the world, m.
     pub fn center_world(&self) -> Point3<f64> {
         Point3::from(self.center_world)
     }
@@ -83,48 +83,48 @@ impl Filter {
         let speed = libm::sqrt(velocity.dot(&velocity));
         let covariance = Matrix6::from(self.covariance);
         let part: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
-        // A thing at rest has no direction: the mean of all counts.
+        // Without a velocity there is no direction: the mean over all directions counts.
         let variance = if speed > 1e-6 { velocity.dot(&(part * velocity)) / (speed * speed) } else { part.trace() / 3.0 };
         [speed, libm::sqrt(variance), libm::sqrt(part.trace())]
     }
 
-    /// The motion over ground within a frame: maps points of the thing in the world from where they were to where they are.
+    /// The motion over ground within a frame: maps points of the object in the world from where they were to where they are.
     pub fn motion(&self, interval_s: f64) -> Transform {
-        let turn = Transform::new(self.turn() * interval_s, Vector3::zeros());
+        let turn = Transform::new(self.angular_velocity() * interval_s, Vector3::zeros());
         let center = self.center_world().coords;
         let shift = center + self.velocity() * interval_s - turn.rotate(center);
         Transform { translation_m: shift.into(), ..turn }
     }
 
-    /// Lets a frame pass: the rates may have changed. The velocity turns with the thing.
+    /// Predicts the next frame: the rates may have changed. The velocity rotates with the object.
     pub fn predict(&mut self, config: &MotionConfig, interval_s: f64) {
         let square = |x: f32| f64::from(x) * f64::from(x);
         if self.frames == 0 {
-            let [tilt, turn, speed] = [config.tilt_rad_s, config.turn_rad_s, config.speed_m_s].map(square);
+            let [tilt, yaw, speed] = [config.tilt_rad_s, config.yaw_rad_s, config.speed_m_s].map(square);
             self.rate = [0.0; 6];
-            self.covariance = Matrix6::from_diagonal(&Vector6::new(tilt, turn, tilt, speed, speed, speed)).into();
+            self.covariance = Matrix6::from_diagonal(&Vector6::new(tilt, yaw, tilt, speed, speed, speed)).into();
             return;
         }
-        let turned = Transform::new(self.turn() * interval_s, Vector3::zeros()).rotate(self.velocity());
+        let turned = Transform::new(self.angular_velocity() * interval_s, Vector3::zeros()).rotate(self.velocity());
         let [.., x, y, z] = &mut self.rate;
         (*x, *y, *z) = (turned.x, turned.y, turned.z);
-        let [tilt, turn, speed] = [config.tilt_acceleration_rad_s2, config.turn_acceleration_rad_s2, config.acceleration_m_s2]
+        let [tilt, yaw, speed] = [config.tilt_acceleration_rad_s2, config.yaw_acceleration_rad_s2, config.acceleration_m_s2]
             .map(|change| square(change) * interval_s * interval_s);
-        for (i, (row, growth)) in self.covariance.iter_mut().zip([tilt, turn, tilt, speed, speed, speed]).enumerate() {
+        for (i, (row, growth)) in self.covariance.iter_mut().zip([tilt, yaw, tilt, speed, speed, speed]).enumerate() {
             if let Some(entry) = row.get_mut(i) {
                 *entry += growth;
             }
         }
     }
 
-    /// Carries the middle along, for a frame that brought no motion.
+    /// Advances the centre in a frame without a measured motion.
     pub fn coast(&mut self, interval_s: f64) {
         self.center_world = (self.center_world() + self.velocity() * interval_s).coords.into();
     }
 
-    /// Takes a frame in, after [`Filter::predict`]. `noise_px` is the error of one coordinate. Afterwards `center_world` is where the middle
-    /// was before the frame's motion. `false`, and the rates unchanged, when the sightings make no sense or contradict what is known: that is
-    /// believed only when the next frame contradicts it as well, and then all before is forgotten.
+    /// Updates by a frame's observations, after [`MotionFilter::predict`]. `noise_px` is the error of one coordinate. Afterwards
+    /// `center_world` is where the centre was before the frame's motion. `false`, and the rates unchanged, when the observations cannot
+    /// be used or contradict the prediction: if the next frame contradicts it as well, the filter starts anew from that one.
     pub fn update(
         &mut self,
         config: &MotionConfig,
@@ -132,39 +132,35 @@ impl Filter {
         t_world_camera: &Transform,
         interval_s: f64,
         noise_px: f64,
-        sightings: impl Iterator<Item = Sighting> + Clone,
+        observations: impl Iterator<Item = Observation> + Clone,
     ) -> bool {
         if self.contradictions == 0 || self.frames == 0 {
-            return self.take(config, rig, t_world_camera, interval_s, noise_px, sightings);
+            return self.correct(config, rig, t_world_camera, interval_s, noise_px, observations);
         }
-        let mut kept = Self { contradictions: 0, ..*self };
-        let mut anew = Self { contradictions: 0, frames: 0, ..*self };
-        anew.predict(config, interval_s);
-        let fits = kept.take(config, rig, t_world_camera, interval_s, noise_px, sightings.clone());
-        let taken = fits || anew.take(config, rig, t_world_camera, interval_s, noise_px, sightings);
-        *self = if fits {
-            kept
-        } else if taken {
-            anew
-        } else {
-            *self
-        };
-        taken
+        let mut corrected = Self { contradictions: 0, ..*self };
+        let mut restarted = Self { contradictions: 0, frames: 0, ..*self };
+        restarted.predict(config, interval_s);
+        let fits = corrected.correct(config, rig, t_world_camera, interval_s, noise_px, observations.clone());
+        let updated = fits || restarted.correct(config, rig, t_world_camera, interval_s, noise_px, observations);
+        if updated {
+            *self = if fits { corrected } else { restarted };
+        }
+        updated
     }
 
-    /// As [`Filter::update`], where nothing contradicted before.
-    fn take(
+    /// As [`MotionFilter::update`], without a contradiction in the frame before.
+    fn correct(
         &mut self,
         config: &MotionConfig,
         rig: &StereoRig,
         t_world_camera: &Transform,
         interval_s: f64,
         noise_px: f64,
-        sightings: impl Iterator<Item = Sighting> + Clone,
+        observations: impl Iterator<Item = Observation> + Clone,
     ) -> bool {
         let (mut sum, mut count) = (Vector3::zeros(), 0.0);
-        for sighting in sightings.clone() {
-            sum += sighting.standing.coords;
+        for observation in observations.clone() {
+            sum += observation.static_prediction.coords;
             count += 1.0;
         }
         let Some(information) = Cholesky::new(Matrix6::from(self.covariance)).map(|factor| factor.inverse()) else { return false };
@@ -179,8 +175,8 @@ impl Filter {
         let predicted = Vector6::from(self.rate);
         let mut rate = predicted;
         for step in 0..=STEPS {
-            let sums = Sums::over(sightings.clone(), rig, &center, &world_camera, interval_s, &rate);
-            let (matrix, vector) = sums.in_world(&world_camera, interval_s);
+            let equations = NormalEquations::over(observations.clone(), rig, &center, &world_camera, interval_s, &rate);
+            let (matrix, vector) = equations.in_world(&world_camera, interval_s);
             let Some(factor) = Cholesky::new(information + matrix * weight) else { return false };
             if step == STEPS {
                 let covariance = factor.inverse();
@@ -208,15 +204,15 @@ fn symmetric(matrix: &Matrix6<f64>) -> Matrix6<f64> {
     (matrix + matrix.transpose()) * 0.5
 }
 
-/// Weighted J'J and J'r of the reprojection errors, by a small turning and shift in camera axes.
-struct Sums {
+/// J'J and J'r of the reprojection errors, by a small rotation and translation in camera axes.
+struct NormalEquations {
     matrix: [[f64; 6]; 6],
     vector: [f64; 6],
 }
 
-impl Sums {
+impl NormalEquations {
     fn over(
-        sightings: impl Iterator<Item = Sighting>,
+        observations: impl Iterator<Item = Observation>,
         rig: &StereoRig,
         center: &Vector3<f64>,
         world_camera: &Rotation3<f64>,
@@ -226,16 +222,16 @@ impl Sums {
         let turn = world_camera.inverse() * Vector3::new(rate.x, rate.y, rate.z) * interval_s;
         let shift = world_camera.inverse() * Vector3::new(rate.w, rate.a, rate.b) * interval_s;
         let turned = Transform::new(turn, Vector3::zeros()).quaternion().to_rotation_matrix();
-        let mut sums = Self { matrix: [[0.0; 6]; 6], vector: [0.0; 6] };
-        for sighting in sightings {
-            let arm = turned * (sighting.standing.coords - center);
-            sums.add(rig, &arm, &(center + arm + shift), &sighting);
+        let mut equations = Self { matrix: [[0.0; 6]; 6], vector: [0.0; 6] };
+        for observation in observations {
+            let arm = turned * (observation.static_prediction.coords - center);
+            equations.add(rig, &arm, &(center + arm + shift), &observation);
         }
-        sums
+        equations
     }
 
-    /// Adds a point at `at` in the camera, `arm` from the middle. One behind the camera adds nothing.
-    fn add(&mut self, rig: &StereoRig, arm: &Vector3<f64>, at: &Vector3<f64>, seen: &Sighting) {
+    /// Adds a point at `at` in the camera, `arm` from the centre. One behind the camera adds nothing.
+    fn add(&mut self, rig: &StereoRig, arm: &Vector3<f64>, at: &Vector3<f64>, observed: &Observation) {
         let before_camera = at.z > DEPTH_MIN_M;
         if !before_camera {
             return;
@@ -243,17 +239,17 @@ impl Sums {
         let per_m = rig.focal_px / at.z;
         let (u, v) = (per_m * at.x, per_m * at.y);
         let right = u - rig.focal_baseline_px_m() / at.z;
-        // Slopes of a coordinate by the point (gx, gy, gz), and by the turning: arm x g.
+        // Derivatives of a coordinate by the point (gx, gy, gz), and by the rotation: arm x g.
         let row = |g: [f64; 3]| {
             let turn = arm.cross(&Vector3::from(g));
             [turn.x, turn.y, turn.z, g[0], g[1], g[2]]
         };
         let down = row([0.0, per_m, -v / at.z]);
         let rows = [
-            (row([per_m, 0.0, -u / at.z]), u - seen.left[0]),
-            (row([per_m, 0.0, -right / at.z]), right - seen.right[0]),
-            (down, v - seen.left[1]),
-            (down, v - seen.right[1]),
+            (row([per_m, 0.0, -u / at.z]), u - observed.left[0]),
+            (row([per_m, 0.0, -right / at.z]), right - observed.right[0]),
+            (down, v - observed.left[1]),
+            (down, v - observed.right[1]),
         ];
         for (row, error) in rows {
             for ((line, sum), a) in self.matrix.iter_mut().zip(&mut self.vector).zip(row) {
@@ -288,7 +284,7 @@ mod tests {
     }
 
     /// Points on a car's back, `depth_m` before the camera, that moved by `rate` and are seen with an error; those before as well.
-    fn frame(random: &mut Random, depth_m: f64, rate: [f64; 6], noise_px: f64) -> Vec<Sighting> {
+    fn frame(random: &mut Random, depth_m: f64, rate: [f64; 6], noise_px: f64) -> Vec<Observation> {
         let center = Vector3::new(1.0, 0.5, depth_m);
         let turn = Transform::new(Vector3::new(rate[0], rate[1], rate[2]) * INTERVAL_S, Vector3::zeros());
         let project = |p: Vector3<f64>| {
@@ -303,11 +299,11 @@ mod tests {
                 let mut noise = || normal(random) * noise_px;
                 let disparity = before[0] + noise() - before_right[0] - noise();
                 let per_px = RIG.baseline_m / disparity;
-                let standing = Point3::new((before[0] + noise()) * per_px, (before[1] + noise()) * per_px, RIG.focal_px * per_px);
+                let static_prediction = Point3::new((before[0] + noise()) * per_px, (before[1] + noise()) * per_px, RIG.focal_px * per_px);
                 let moved = center + turn.rotate(point - center) + Vector3::new(rate[3], rate[4], rate[5]) * INTERVAL_S;
                 let (left, right) = project(moved);
-                Sighting {
-                    standing,
+                Observation {
+                    static_prediction,
                     left: [left[0] + noise(), left[1] + noise()],
                     right: [right[0] + noise(), right[1] + noise()],
                 }
@@ -315,9 +311,9 @@ mod tests {
             .collect()
     }
 
-    fn track(depth_m: f64, noise_px: f64, frames: usize, rate: impl Fn(usize) -> [f64; 6]) -> Vec<Filter> {
+    fn track(depth_m: f64, noise_px: f64, frames: usize, rate: impl Fn(usize) -> [f64; 6]) -> Vec<MotionFilter> {
         let mut random = Random::new(7);
-        let mut filter = Filter::default();
+        let mut filter = MotionFilter::default();
         let config = MotionConfig::default();
         (0..frames)
             .map(|n| {
@@ -331,18 +327,18 @@ mod tests {
     }
 
     #[test]
-    fn exact_sightings_give_the_motion_at_once() {
+    fn exact_observations_give_the_motion_at_once() {
         let rate = [0.0, 0.3, 0.0, 2.0, 0.0, 9.0];
         let filter = track(12.0, 0.0, 1, |_| rate)[0];
         let error = (filter.velocity() - Vector3::new(2.0, 0.0, 9.0)).norm();
         assert!(error < 0.1, "{error} m/s");
-        assert!((filter.turn() - Vector3::new(0.0, 0.3, 0.0)).norm() < 0.05, "{}", filter.turn());
+        assert!((filter.angular_velocity() - Vector3::new(0.0, 0.3, 0.0)).norm() < 0.05, "{}", filter.angular_velocity());
     }
 
     #[test]
     fn a_far_car_is_known_better_after_ten_frames_than_after_one_and_says_so() {
         let filters = track(30.0, 0.3, 40, |_| [0.0, 0.0, 0.0, 0.0, 0.0, 8.0]);
-        let error = |filter: &Filter| (filter.velocity() - Vector3::new(0.0, 0.0, 8.0)).norm();
+        let error = |filter: &MotionFilter| (filter.velocity() - Vector3::new(0.0, 0.0, 8.0)).norm();
         let late: f64 = filters[10..].iter().map(error).sum::<f64>() / 30.0;
         assert!(late * INTERVAL_S < 0.05, "{late} m/s");
         assert!(filters[20].speed()[1] < 0.7 * filters[0].speed()[1], "{:?} {:?}", filters[20].speed(), filters[0].speed());
@@ -363,7 +359,7 @@ mod tests {
         let fast = [0.0, 0.0, 0.0, 0.0, 0.0, 9.0];
         let mut random = Random::new(3);
         let config = MotionConfig::default();
-        let mut filter = Filter::default();
+        let mut filter = MotionFilter::default();
         let mut take = |rate: [f64; 6]| {
             filter.predict(&config, INTERVAL_S);
             let seen = frame(&mut random, 12.0, rate, 0.3);
@@ -391,10 +387,14 @@ mod tests {
     #[test]
     fn nonsense_is_refused_and_changes_nothing() {
         let config = MotionConfig::default();
-        let mut filter = Filter::default();
+        let mut filter = MotionFilter::default();
         filter.predict(&config, INTERVAL_S);
         let before = filter;
-        let bad = [Sighting { standing: Point3::new(f64::NAN, 0.0, 10.0), left: [0.0; 2], right: [0.0; 2] }; 4];
+        let bad = [Observation {
+            static_prediction: Point3::new(f64::NAN, 0.0, 10.0),
+            left: [0.0; 2],
+            right: [0.0; 2],
+        }; 4];
         assert!(!filter.update(&config, &RIG, &Transform::IDENTITY, INTERVAL_S, 0.3, bad.iter().copied()));
         assert_eq!(filter, before);
     }

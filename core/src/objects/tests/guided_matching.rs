@@ -31,7 +31,7 @@ fn drive(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
         height: PIECE.height as u32,
         mask: &mask,
     };
-    with(&capacity, &InstancesConfig { area_min_px: 0, track_area_min_px: 0, ..InstancesConfig::default() }, |instances, estimator| {
+    with(&capacity, &TrackingConfig { area_min_px: 0, track_area_min_px: 0, ..TrackingConfig::default() }, |instances, estimator| {
         (0..6)
             .map(|frame| {
                 let at_m = 0.3 * f64::from(frame);
@@ -41,14 +41,15 @@ fn drive(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
                 let q8 = (room::RIG.focal_px * room::RIG.baseline_m / (WALL_M - at_m) * 256.0) as u16;
                 let disparity = vec![q8; room::WIDTH * room::HEIGHT];
                 let disparity = View::new(&disparity, room::WIDTH, room::HEIGHT).unwrap();
-                instances.admit(frame, &[detection], SIZE);
-                instances.claim(&[], &[]);
+                instances.ingest(frame, &[detection], SIZE);
+                instances.assign_matches(&[], &[]);
                 let camera = CameraMotion {
                     t_world_camera: shift(0.0, 0.0, 0.1 * camera_m_s * f64::from(frame)),
                     t_current_previous: (frame > 0).then(|| shift(0.0, 0.0, -0.1 * camera_m_s)),
                 };
-                let seen = Seen { refined: &[], sparse: &[], images: with_images.then_some((&matcher, disparity)) };
-                instances.follow(&room::RIG, &seen, &camera, estimator);
+                let search = with_images.then_some(GuidedMatching { matcher: &matcher, disparity_q8: disparity });
+                let none = FrameMatches { refined: &[], sparse: &[] };
+                instances.tracker.test_estimate_motions(&room::RIG, &camera, none, search, estimator);
                 instances.reconstruct(None, &mut NoSink);
                 instances.tracks().next().unwrap()
             })
@@ -63,7 +64,7 @@ fn a_thing_without_a_match_of_the_scene_flow_is_looked_at_until_it_is_known_to_s
         assert!(track.measured && track.matches > 40 && track.inliers > 40, "{track:?}");
         assert!(track.speed_m_s.unwrap()[0] < 0.5, "{track:?}");
     }
-    assert_eq!(tracks[5].state, State::Static);
+    assert_eq!(tracks[5].state, MotionState::Static);
     assert!(drive(3.0, false).iter().all(|track| !track.measured), "there is nothing else to go by");
 }
 
@@ -73,7 +74,7 @@ fn what_moves_is_found_where_it_went_and_not_where_it_was_sought() {
     let tracks = drive(0.0, true);
     let [speed, _] = tracks[5].speed_m_s.unwrap();
     assert!((speed - 3.0).abs() < 0.3, "{speed} m/s");
-    assert_eq!(tracks[5].state, State::Dynamic);
+    assert_eq!(tracks[5].state, MotionState::Dynamic);
 }
 
 #[test]
@@ -81,7 +82,7 @@ fn the_grid_is_no_finer_than_three_pixels_and_holds_no_more_points_than_there_is
     for [width, height] in [[20, 30], [48, 48], [120, 90], [1242, 375]] {
         let step = step_px(width, height);
         let points = (width / step) * (height / step);
-        assert!(step >= 3 && points <= LOOKS as i32, "{width} x {height}: {step}, {points}");
-        assert!(step == 3 || points * 3 > LOOKS as i32, "{width} x {height}: {step}, {points}");
+        assert!(step >= 3 && points <= GUIDED_MATCHES_MAX as i32, "{width} x {height}: {step}, {points}");
+        assert!(step == 3 || points * 3 > GUIDED_MATCHES_MAX as i32, "{width} x {height}: {step}, {points}");
     }
 }

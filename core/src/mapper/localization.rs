@@ -1,0 +1,102 @@
+//! The camera's pose in a frame: given, or estimated from matches or from depth.
+
+use super::{Config, MotionSource, PoseOrigin, StereoFrame};
+use crate::{
+    egomotion::{
+        Egomotion, Estimator, MotionEstimate,
+        icp::{self, IcpReport, IcpStatus, MapPicture},
+    },
+    geometry::Transform,
+    image::View,
+    parallel::Executor,
+    scene_flow::{FlowMatcher, FlowStatus},
+    tracking::{CameraMotion, EgomotionMask},
+    view::Raycaster,
+    volume::{Viewpoint, Volume},
+};
+
+/// The parts of a mapper that localize the camera.
+pub(super) struct Localization<'m, 's> {
+    pub config: &'m Config,
+    pub frame: u32,
+    pub disparity_q8: View<'m, u16>,
+    pub scene_flow: &'m FlowMatcher<'s>,
+    pub background: &'m Volume<'s>,
+    pub camera: &'m mut Egomotion,
+    pub estimator: &'m mut Estimator<'s>,
+    pub raycaster: &'m mut Raycaster<'s>,
+    /// The depth image is computed anew when the frame is fused: until then it is scratch for ICP's pyramid.
+    pub depth_m: &'m mut [f32],
+}
+
+/// The camera's pose in a frame.
+pub(super) struct Located {
+    pub origin: PoseOrigin,
+    pub camera: CameraMotion,
+    pub egomotion: Option<MotionEstimate>,
+    pub icp: Option<IcpReport>,
+    /// Matches that were excluded because they may move.
+    pub matches_excluded: u32,
+}
+
+impl Localization<'_, '_> {
+    /// Sets the pose the frame brings, or estimates it.
+    pub fn locate<E: Executor>(&mut self, frame: &StereoFrame<'_>, status: FlowStatus, mask: &EgomotionMask<'_>, executor: &E) -> Located {
+        let (origin, egomotion, icp, matches_excluded) = if let Some(t_world_camera) = &frame.t_world_camera {
+            self.camera.place(t_world_camera);
+            // There is no motion to the first pose.
+            (if self.frame == 0 { PoseOrigin::First } else { PoseOrigin::Given }, None, None, 0)
+        } else if self.config.mapper.egomotion == MotionSource::Icp {
+            let report = (self.frame > 0).then(|| self.register_depth([frame.left.width(), frame.left.height()], executor));
+            (self.origin(report.is_some()), None, report, 0)
+        } else if status == FlowStatus::Matched {
+            let (estimate, excluded) = self.estimate_from_matches(mask);
+            (self.origin(true), Some(estimate), None, excluded)
+        } else {
+            (PoseOrigin::First, None, None, 0)
+        };
+        let is_measured = matches!(origin, PoseOrigin::Estimated | PoseOrigin::Given);
+        let t_current_previous: Option<Transform> = is_measured.then(|| *self.camera.t_current_previous());
+        let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
+        Located { origin, camera, egomotion, icp, matches_excluded }
+    }
+
+    /// The origin of a pose that was estimated, if it was.
+    fn origin(&self, is_estimated: bool) -> PoseOrigin {
+        match (is_estimated, self.camera.held_frames()) {
+            (false, _) => PoseOrigin::First,
+            (true, 0) => PoseOrigin::Estimated,
+            (true, _) => PoseOrigin::Held,
+        }
+    }
+
+    /// Estimates the motion from the matches the mask includes; and how many it excludes.
+    fn estimate_from_matches(&mut self, mask: &EgomotionMask<'_>) -> (MotionEstimate, u32) {
+        let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
+        let included = selection.iter().filter(|&&index| mask.includes(index));
+        let excluded = selection.len() - included.clone().count();
+        let matches = included.filter_map(|&index| refined.get(index as usize));
+        (self.camera.step(&self.config.egomotion, &self.config.rig, matches, self.estimator), excluded as u32)
+    }
+
+    /// Registers the depth with the map as it appears from the last pose. All of the picture counts, what moves as well: the baseline knows
+    /// no objects.
+    fn register_depth<E: Executor>(&mut self, [width, height]: [usize; 2], executor: &E) -> IcpReport {
+        let (rig, limits_m) = (self.config.rig, [self.config.volume.near_m, self.config.volume.far_m]);
+        let view = Viewpoint { rig, width, height, t_world_camera: *self.camera.t_world_camera() };
+        let cast = self.raycaster.cast(self.background, &view, executor);
+        let picture = match (cast, self.raycaster.depth_m(), self.raycaster.normal()) {
+            (Ok(_), Some(depth_m), Some(normal)) => Some(MapPicture { depth_m, normal }),
+            _ => None,
+        };
+        let mut report = picture.map_or(IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() }, |picture| {
+            icp::track(&self.config.icp, &rig, limits_m, self.disparity_q8, &picture, self.depth_m)
+        });
+        let refined = self.scene_flow.refined();
+        let matches = self.scene_flow.selection().iter().filter_map(|&index| refined.get(index as usize));
+        report.matches = self.estimator.explained(&rig, matches, &report.t_current_previous, self.config.icp.explained_px);
+        report.ask_matches(&self.config.icp);
+        self.camera.advance(report.motion());
+        report
+    }
+}

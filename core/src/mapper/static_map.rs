@@ -1,0 +1,49 @@
+//! Fusion of a frame into the static map.
+
+use super::{Config, StereoFrame};
+use crate::{
+    Executor, Stage,
+    geometry::depth_from_disparity,
+    image::{View, ViewMut},
+    tracking::{CameraMotion, Tracked},
+    volume::{AllocationReport, BlockStore, Observation, Viewpoint, Volume},
+};
+
+/// The parts of a mapper that fuse a frame into the static map.
+pub(super) struct StaticMap<'m, 's> {
+    pub config: &'m Config,
+    pub disparity_q8: View<'m, u16>,
+    pub background: &'m mut Volume<'s>,
+    pub depth_m: &'m mut [f32],
+}
+
+impl StaticMap<'_, '_> {
+    /// Turns the disparity into depth, removes what moves or may move, allocates blocks around the rest and averages it in.
+    pub fn fuse<E: Executor, S: BlockStore>(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        camera: &CameraMotion,
+        tracked: &mut Tracked<'_, '_>,
+        executor: &E,
+        store: &mut S,
+    ) -> AllocationReport {
+        let (width, height) = (frame.left.width(), frame.left.height());
+        let view = Viewpoint { rig: self.config.rig, width, height, t_world_camera: camera.t_world_camera };
+        let Some(mut depth_m) = ViewMut::new(self.depth_m, width, height) else {
+            debug_assert!(false, "the depth image has the capacity's size");
+            return AllocationReport::default();
+        };
+        let volume = &self.config.volume;
+        depth_from_disparity(&view.rig, volume.near_m, volume.far_m, self.disparity_q8, &mut depth_m);
+        tracked.mask_dynamic_depth(&mut depth_m);
+        let observation = Observation {
+            depth_m: depth_m.as_view(),
+            grey: frame.left,
+            colour: frame.colour,
+            class: frame.class,
+        };
+        let allocation = executor.stage(Stage::Allocate, || self.background.allocate(&view, observation.depth_m, store));
+        executor.stage(Stage::Fuse, || self.background.fuse(&view, observation, executor));
+        allocation
+    }
+}

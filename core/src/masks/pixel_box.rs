@@ -1,0 +1,75 @@
+//! Boxes of pixels.
+
+use crate::state::Visitor;
+use bytemuck::{Pod, Zeroable};
+
+/// A box of pixels: it holds columns `left .. left + width` and rows `top .. top + height`. It may lie partly or wholly beside the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(C)]
+pub struct PixelBox {
+    /// First column, px.
+    pub left: i32,
+    /// First row, px.
+    pub top: i32,
+    /// Columns, px.
+    pub width: i32,
+    /// Rows, px.
+    pub height: i32,
+}
+
+impl PixelBox {
+    /// Visits every field.
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { left, top, width, height } = self;
+        visitor.i32s([left, top, width, height]);
+    }
+
+    /// Pixels in the box.
+    pub fn area(&self) -> i64 {
+        i64::from(self.width.max(0)) * i64::from(self.height.max(0))
+    }
+
+    /// Whether it holds a pixel.
+    pub fn contains(&self, u: i32, v: i32) -> bool {
+        u >= self.left && v >= self.top && u - self.left < self.width && v - self.top < self.height
+    }
+
+    /// What both hold; of width or height 0 where that is nothing.
+    pub fn intersection(&self, other: &Self) -> Self {
+        let (left, top) = (self.left.max(other.left), self.top.max(other.top));
+        let right = (self.left + self.width).min(other.left + other.width);
+        let bottom = (self.top + self.height).min(other.top + other.height);
+        Self { left, top, width: (right - left).max(0), height: (bottom - top).max(0) }
+    }
+
+    /// Intersection over union.
+    pub fn overlap(&self, other: &Self) -> f32 {
+        share(self.intersection(other).area(), self.area(), other.area())
+    }
+
+    /// The box moved.
+    pub fn moved(&self, [u, v]: [i32; 2]) -> Self {
+        Self { left: self.left + u, top: self.top + v, ..*self }
+    }
+
+    /// The box scaled about its centre: the new width is `width * permille / 1000` cut to whole pixels, half the excess on either side, the
+    /// odd pixel right and below (as in the published code).
+    pub fn scaled(&self, permille: u32) -> Self {
+        let of = |side: i32| (i64::from(side) * i64::from(permille) / 1000) as i32;
+        let (width, height) = (of(self.width), of(self.height));
+        let half = |excess: i32| excess.div_euclid(2);
+        Self {
+            left: self.left - half(width - self.width),
+            top: self.top - half(height - self.height),
+            width,
+            height,
+        }
+    }
+}
+
+/// What two areas have in common, as a share of their union; 0 where that is empty.
+pub(super) fn share(common: i64, a: i64, b: i64) -> f32 {
+    let union = a + b - common;
+    if union > 0 { common as f32 / union as f32 } else { 0.0 }
+}

@@ -1,0 +1,199 @@
+//! A bounded buffer of masks: a box each and, for each of its rows, words of 64 pixels that begin at multiples of 64 columns of
+//! the image, so that two masks meet word by word.
+
+use super::{PixelBox, pixel_box::share};
+use crate::state::Visitor;
+use bytemuck::{Pod, Zeroable};
+
+/// Pixels in a word.
+const WORD: i32 = 64;
+
+/// Names a mask of a [`MaskStore`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct MaskHandle {
+    /// The box its pixels lie in.
+    pub pixels: PixelBox,
+    /// First word.
+    start: u32,
+    /// Words in a row; 0 when there is no mask and the box stands for it.
+    stride: u32,
+}
+
+impl MaskHandle {
+    /// A box all of whose pixels count, without a word stored.
+    pub fn full(pixels: PixelBox) -> Self {
+        Self { pixels, start: 0, stride: 0 }
+    }
+
+    /// Visits every field.
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { pixels, start, stride } = self;
+        pixels.visit(visitor);
+        visitor.u32(start);
+        visitor.u32(stride);
+    }
+
+    /// Whether the box stands for the mask.
+    pub(super) fn is_box(&self) -> bool {
+        self.stride == 0
+    }
+
+    /// Column at which the words begin.
+    pub(super) fn origin(&self) -> i32 {
+        self.pixels.left.div_euclid(WORD) * WORD
+    }
+}
+
+/// A bounded buffer of masks, filled front to back and emptied as a whole.
+#[derive(Debug)]
+pub struct MaskStore<'s> {
+    words: &'s mut [u64],
+    used: usize,
+}
+
+impl<'s> MaskStore<'s> {
+    /// A store in `words`.
+    pub fn new(words: &'s mut [u64]) -> Self {
+        Self { words, used: 0 }
+    }
+
+    /// Visits all masks.
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { words, used } = self;
+        visitor.count(used, words.len());
+        visitor.u64s(words.get_mut(..*used).unwrap_or(&mut []));
+    }
+
+    /// Forgets all masks.
+    pub fn clear(&mut self) {
+        self.used = 0;
+    }
+
+    /// Words in use.
+    pub fn used(&self) -> usize {
+        self.used
+    }
+
+    /// Space for a mask in a box within the image, all its bits 0; `None` when the store is full.
+    pub fn alloc(&mut self, pixels: PixelBox) -> Option<MaskHandle> {
+        let mut mask = MaskHandle { pixels, start: self.used as u32, stride: 0 };
+        mask.stride = ((pixels.left + pixels.width - mask.origin() + WORD - 1) / WORD) as u32;
+        let end = self.used.checked_add(mask.stride as usize * usize::try_from(pixels.height).ok()?)?;
+        self.words.get_mut(self.used..end)?.fill(0);
+        self.used = end;
+        Some(mask)
+    }
+
+    /// Gives back the space allocated last.
+    pub fn free_last(&mut self, mask: MaskHandle) {
+        self.used = mask.start as usize;
+    }
+
+    /// Copies a mask from another store; the box alone is kept where this one is full. Whether it was kept whole.
+    pub fn copy(&mut self, mask: MaskHandle, from: &MaskStore<'_>) -> (MaskHandle, bool) {
+        if mask.stride == 0 {
+            return (mask, true);
+        }
+        let Some(to) = self.alloc(mask.pixels) else { return (MaskHandle::full(mask.pixels), false) };
+        let words = from.words.get(mask.start as usize..).unwrap_or(&[]);
+        let copy = self.words.get_mut(to.start as usize..self.used).unwrap_or(&mut []);
+        copy.iter_mut().zip(words).for_each(|(to, from)| *to = *from);
+        (to, true)
+    }
+
+    /// The words of a row of the image; empty outside the mask.
+    pub(super) fn row(&self, mask: &MaskHandle, v: i32) -> &[u64] {
+        let row = v.wrapping_sub(mask.pixels.top);
+        if row < 0 || row >= mask.pixels.height {
+            return &[];
+        }
+        let start = mask.start as usize + row as usize * mask.stride as usize;
+        self.words.get(start..start + mask.stride as usize).unwrap_or(&[])
+    }
+
+    fn row_mut(&mut self, mask: &MaskHandle, v: i32) -> &mut [u64] {
+        let row = v.wrapping_sub(mask.pixels.top);
+        if row < 0 || row >= mask.pixels.height {
+            return &mut [];
+        }
+        let start = mask.start as usize + row as usize * mask.stride as usize;
+        self.words.get_mut(start..start + mask.stride as usize).unwrap_or(&mut [])
+    }
+
+    /// Whether a pixel of the image belongs to the mask.
+    pub fn contains(&self, mask: &MaskHandle, u: i32, v: i32) -> bool {
+        if !mask.pixels.contains(u, v) {
+            return false;
+        }
+        if mask.stride == 0 {
+            return true;
+        }
+        let column = (u - mask.origin()) as usize;
+        self.row(mask, v).get(column / 64).is_some_and(|word| word >> (column % 64) & 1 == 1)
+    }
+
+    /// Adds a row of a caller's mask, whose first pixel is at column `left`; pixels outside the box are left out.
+    pub fn set_row(&mut self, mask: &MaskHandle, v: i32, left: i32, pixels: &[u8]) {
+        let (origin, columns) = (mask.origin(), mask.pixels);
+        let words = self.row_mut(mask, v);
+        for (u, _) in (left..).zip(pixels).filter(|&(u, &pixel)| pixel != 0 && columns.contains(u, columns.top)) {
+            let column = (u - origin) as usize;
+            if let Some(word) = words.get_mut(column / 64) {
+                *word |= 1 << (column % 64);
+            }
+        }
+    }
+
+    /// 64 pixels of a row from column `u` on, the first in the lowest bit.
+    fn bits(&self, mask: &MaskHandle, u: i32, v: i32) -> u64 {
+        if mask.stride == 0 {
+            let inside = |i: i32| u64::from(mask.pixels.contains(u + i, v)) << i;
+            return (0..WORD).map(inside).fold(0, |bits, bit| bits | bit);
+        }
+        let row = self.row(mask, v);
+        let from = u - mask.origin();
+        let (word, shift) = (from.div_euclid(WORD), from.rem_euclid(WORD) as u32);
+        let at = |word: i32| usize::try_from(word).ok().and_then(|word| row.get(word)).copied().unwrap_or(0);
+        if shift == 0 { at(word) } else { at(word) >> shift | at(word + 1) << (64 - shift) }
+    }
+
+    /// Pixels in the mask.
+    pub fn area(&self, mask: &MaskHandle) -> i64 {
+        if mask.stride == 0 {
+            return mask.pixels.area();
+        }
+        let end = mask.start as usize + mask.stride as usize * mask.pixels.height.max(0) as usize;
+        let words = self.words.get(mask.start as usize..end).unwrap_or(&[]);
+        words.iter().map(|word| i64::from(word.count_ones())).sum()
+    }
+
+    /// Intersection over union of a mask of this store with one of another, the other one moved by `shift` px.
+    pub fn overlap(&self, mask: &MaskHandle, other: &MaskStore<'_>, other_mask: &MaskHandle, shift: [i32; 2]) -> f32 {
+        let common = mask.pixels.intersection(&other_mask.pixels.moved(shift));
+        let mut both = 0;
+        for v in common.top..common.top + common.height {
+            let mut u = common.left;
+            while u < common.left + common.width {
+                let bits = self.bits(mask, u, v) & other.bits(other_mask, u - shift[0], v - shift[1]);
+                both += i64::from(bits.count_ones());
+                u += WORD;
+            }
+        }
+        share(both, self.area(mask), other.area(other_mask))
+    }
+
+    /// Removes from a mask the pixels that another mask of the same store has.
+    pub fn subtract(&mut self, mask: &MaskHandle, other: &MaskHandle) {
+        let common = mask.pixels.intersection(&other.pixels);
+        let origin = mask.origin();
+        for v in common.top..common.top + common.height {
+            for word in 0..mask.stride {
+                let bits = self.bits(other, origin + word as i32 * WORD, v);
+                if let Some(mine) = self.row_mut(mask, v).get_mut(word as usize) {
+                    *mine &= !bits;
+                }
+            }
+        }
+    }
+}

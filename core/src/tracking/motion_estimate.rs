@@ -1,0 +1,180 @@
+//! One object's motion in one frame: an estimate that removes the outliers, then the filter.
+//!
+//! An object's points lie close together: a match much nearer or farther than the median (by disparity) is not on the object but on
+//! what occludes it, or behind it. A nearer one would outweigh all of the object's own.
+
+use super::{
+    config::MotionConfig,
+    motion_filter::{MotionFilter, Observation},
+};
+use crate::{
+    egomotion::Estimator,
+    geometry::{StereoRig, Transform},
+    random::Random,
+    scene_flow::Match,
+};
+use nalgebra::Point3;
+
+/// Smallest disparity a point is triangulated from, px.
+const DISPARITY_MIN_PX: f64 = 0.1;
+
+/// What a frame's motions are measured by.
+pub(super) struct MotionFrame<'a> {
+    pub rig: &'a StereoRig,
+    pub t_world_camera: &'a Transform,
+    pub t_current_previous: &'a Transform,
+    pub interval_s: f64,
+    /// Of the random samples.
+    pub seed: u64,
+}
+
+/// How more matches are found where there are few.
+pub(super) struct GuidedSearch<'m, F> {
+    /// Searches where a motion from the previous camera to the current one projects them; returns how many it wrote.
+    pub find: F,
+    /// Where it writes them.
+    pub found: &'m mut [Match],
+}
+
+/// The outcome of an estimate.
+pub(super) struct ObjectMotion {
+    pub matches: u32,
+    pub inliers: u32,
+    pub measured: bool,
+}
+
+/// Half pixels of disparity the median is searched among: up to 256 px.
+const BINS: usize = 512;
+
+/// The disparities matches of one object can have.
+#[derive(Clone, Copy)]
+struct DisparityRange {
+    least_px: f64,
+    most_px: f64,
+}
+
+impl DisparityRange {
+    /// Those no more than `config.extent_m` and three sigmas nearer or farther than the median.
+    fn of<'m>(config: &MotionConfig, rig: &StereoRig, matches: impl Iterator<Item = &'m Match> + Clone) -> Self {
+        let mut counts = [0u32; BINS];
+        let mut total = 0;
+        for m in matches {
+            // What is not a number counts as 0.
+            if let Some(count) = counts.get_mut((2.0 * disparity(m)) as usize) {
+                *count += 1;
+                total += 1;
+            }
+        }
+        let mut below = 0;
+        let median = counts.iter().position(|&count| {
+            below += count;
+            2 * below > total
+        });
+        let median_px = (median.unwrap_or(0) as f64 + 0.5) * 0.5;
+        let slack_px = 3.0 * core::f64::consts::SQRT_2 * f64::from(config.noise_px) + 0.5;
+        let depth_m = rig.focal_baseline_px_m() / median_px;
+        let nearest_m = depth_m - f64::from(config.extent_m);
+        let most_px = if nearest_m > 0.0 { rig.focal_baseline_px_m() / nearest_m } else { f64::MAX };
+        Self {
+            least_px: rig.focal_baseline_px_m() / (depth_m + f64::from(config.extent_m)) - slack_px,
+            most_px: most_px + slack_px,
+        }
+    }
+
+    fn contains(&self, m: &Match) -> bool {
+        let disparity = disparity(m);
+        disparity >= self.least_px && disparity <= self.most_px
+    }
+}
+
+/// Disparity in the previous frame, px.
+fn disparity(m: &Match) -> f64 {
+    f64::from(m.previous_left[0]) - f64::from(m.previous_right[0])
+}
+
+/// Estimates a motion from an object's matches and updates the filter, already predicted, by its inliers.
+///
+/// `search`, given where matches are few, finds more: by the motion so far or, of an object without one, by that of the few matches;
+/// where they have none, by that of a static object.
+pub(super) fn estimate_motion<'m>(
+    config: &MotionConfig,
+    frame: &MotionFrame<'_>,
+    matches: impl Iterator<Item = &'m Match> + Clone,
+    search: Option<GuidedSearch<'m, impl FnOnce(&Transform, &mut [Match]) -> usize>>,
+    filter: &mut MotionFilter,
+    estimator: &mut Estimator<'_>,
+) -> ObjectMotion {
+    let settings = config.estimator();
+    // Where the motion so far would take the object, seen from the camera.
+    let camera_world = frame.t_world_camera.inverse();
+    let motion_camera = camera_world * filter.motion(frame.interval_s) * frame.t_world_camera;
+    let mut expected = (motion_camera * frame.t_current_previous).normalized();
+    let mut found: &'m [Match] = &[];
+    if let Some(GuidedSearch { find, found: buffer }) = search {
+        if !filter.is_known() {
+            let range = DisparityRange::of(config, frame.rig, matches.clone());
+            let matches = matches.clone().filter(|m| range.contains(m));
+            let guess = estimator.estimate(&settings, frame.rig, matches, &mut Random::new(frame.seed), Some(&expected));
+            expected = guess.t_current_previous.unwrap_or(expected);
+        }
+        let count = find(&expected, buffer);
+        debug_assert!(count <= buffer.len());
+        found = buffer.get(..count).unwrap_or(&[]);
+    }
+    let matches = matches.chain(found);
+    let range = DisparityRange::of(config, frame.rig, matches.clone());
+    let matches = matches.filter(move |m| range.contains(m));
+    let points = matches.clone().count() as u32;
+    let mut outcome = ObjectMotion { matches: points, inliers: 0, measured: false };
+    let needed = if filter.is_known() { config.matches_again } else { config.matches_min };
+    if points < u32::from(needed) {
+        return outcome;
+    }
+    let estimate = estimator.estimate(&settings, frame.rig, matches.clone(), &mut Random::new(frame.seed), Some(&expected));
+    if estimate.t_current_previous.is_none() {
+        return outcome;
+    }
+    outcome.inliers = estimate.inliers;
+    let inliers = Inliers { indexed: (0u32..).zip(matches), inliers: estimator.inliers() };
+    let noise_px =
+        if estimate.residual_rms_px > f64::from(config.noise_px) { estimate.residual_rms_px } else { f64::from(config.noise_px) };
+    let observations = inliers.filter_map(|m| observation(m, frame));
+    outcome.measured = filter.update(config, frame.rig, frame.t_world_camera, frame.interval_s, noise_px, observations);
+    outcome
+}
+
+/// The matches at the positions `inliers` names, in ascending order both.
+#[derive(Clone)]
+struct Inliers<M, I> {
+    indexed: M,
+    inliers: I,
+}
+
+impl<'m, M: Iterator<Item = (u32, &'m Match)>, I: Iterator<Item = u32>> Iterator for Inliers<M, I> {
+    type Item = &'m Match;
+
+    fn next(&mut self) -> Option<&'m Match> {
+        let inlier = self.inliers.next()?;
+        self.indexed.find(|(index, _)| *index == inlier).map(|(_, m)| m)
+    }
+}
+
+/// A match as the filter takes it: its point is triangulated in the previous camera and predicted as a static one.
+fn observation(m: &Match, frame: &MotionFrame<'_>) -> Option<Observation> {
+    let rig = frame.rig;
+    let centered = |[u, v]: [f32; 2]| [f64::from(u) - rig.center_u_px, f64::from(v) - rig.center_v_px];
+    let ([u, v], [u_right, v_right]) = (centered(m.previous_left), centered(m.previous_right));
+    let disparity = u - u_right;
+    // Not so for NaN.
+    let triangulates = disparity >= DISPARITY_MIN_PX;
+    if !triangulates {
+        return None;
+    }
+    let per_px = rig.baseline_m / disparity;
+    let previous = Point3::new(u * per_px, 0.5 * (v + v_right) * per_px, rig.focal_px * per_px);
+    Some(Observation {
+        static_prediction: frame.t_current_previous.transform_point(previous),
+        left: centered(m.current_left),
+        right: centered(m.current_right),
+    })
+}

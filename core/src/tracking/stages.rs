@@ -1,0 +1,80 @@
+//! The stages of tracking in a frame, each a value that the next one takes.
+
+use super::{CameraMotion, Detection, EgomotionMask, FrameMatches, GuidedMatching, MotionInput, Tracker, TrackingReport};
+use crate::{egomotion::Estimator, geometry::StereoRig, image::ViewMut};
+
+impl<'s> Tracker<'s> {
+    /// Begins frame `frame` of images of that size: validates its detections and associates them with tracks.
+    pub fn detect(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) -> Detected<'_, 's> {
+        self.ingest(frame, detections, size);
+        Detected { tracker: self }
+    }
+}
+
+/// A frame's detections are associated with tracks.
+#[derive(Debug)]
+#[must_use]
+pub struct Detected<'t, 's> {
+    tracker: &'t mut Tracker<'s>,
+}
+
+impl<'t, 's> Detected<'t, 's> {
+    /// Assigns the matches of the scene flow to instances.
+    pub fn assign_matches<'m>(self, matches: FrameMatches<'m>) -> Assigned<'t, 'm, 's> {
+        self.tracker.assign_matches(&matches);
+        Assigned { tracker: self.tracker, matches }
+    }
+}
+
+/// Its matches are assigned to instances as well.
+#[derive(Debug)]
+#[must_use]
+pub struct Assigned<'t, 'm, 's> {
+    tracker: &'t mut Tracker<'s>,
+    matches: FrameMatches<'m>,
+}
+
+impl<'t, 's> Assigned<'t, '_, 's> {
+    /// Which matches the camera's own motion may be estimated from.
+    pub fn egomotion_mask(&self) -> EgomotionMask<'_> {
+        self.tracker.egomotion_mask()
+    }
+
+    /// Estimates each track's motion, state and pose. `search` is where more matches are searched for on objects that have few.
+    pub fn estimate_motions(
+        self,
+        rig: &StereoRig,
+        camera: &CameraMotion,
+        search: Option<GuidedMatching<'_, '_>>,
+        estimator: &mut Estimator<'_>,
+    ) -> Tracked<'t, 's> {
+        let input = MotionInput { rig, camera: *camera, matches: self.matches, search };
+        self.tracker.estimate_motions(&input, estimator);
+        Tracked { tracker: self.tracker }
+    }
+}
+
+/// Its tracks have their motions, states and poses.
+#[derive(Debug)]
+#[must_use]
+pub struct Tracked<'t, 's> {
+    pub(super) tracker: &'t mut Tracker<'s>,
+}
+
+impl<'s> Tracked<'_, 's> {
+    /// Sets the depth of what moves or may move to 0, so that the static map does not get it.
+    pub fn mask_dynamic_depth(&mut self, depth_m: &mut ViewMut<'_, f32>) {
+        self.tracker.report.pixels_masked = self.tracker.mask_dynamic_depth(depth_m);
+    }
+
+    /// The tracks with their instances and masks.
+    pub(crate) fn tracker(&self) -> &Tracker<'s> {
+        self.tracker
+    }
+
+    /// Ends the frame: masks are kept for the next one.
+    pub fn commit(self) -> TrackingReport {
+        self.tracker.commit();
+        self.tracker.report
+    }
+}
