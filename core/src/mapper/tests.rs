@@ -1,5 +1,6 @@
 //! The mapper as a whole, in a room of which everything is known.
 
+mod drives;
 mod mutations;
 mod raw;
 mod resume;
