@@ -6,8 +6,8 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
-    memory::{Carver, Slot},
-    volume::{BlockCoord, BlockIndex},
+    memory::Carver,
+    volume::{BlockCoord, BlockIndex, Slot},
 };
 use std::hint::black_box;
 use std::time::{Duration, Instant};

@@ -6,11 +6,9 @@
 mod capacity;
 mod footprint;
 mod one_shot;
-mod pool;
 mod slab;
 
 pub use capacity::Capacity;
 pub use footprint::{Footprint, Region};
 pub use one_shot::OneShot;
-pub use pool::{Full, Slot, SlotPool};
 pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, region_bytes};

@@ -7,11 +7,11 @@
 //! Memory: 128 KiB for the blocks seen in this frame, a direct-mapped cache that spares the index most look-ups. Time: linear in pixels
 //! times blocks per ray, at most [`MAX_BLOCKS_PER_RAY`].
 
-use super::{BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Viewpoint, Volume};
+use super::{BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Slot, Viewpoint, Volume};
 use crate::{
     geometry::scalar::{floor_i32, max_f32},
     image::View,
-    memory::{Carver, Slot, region_bytes},
+    memory::{Carver, region_bytes},
 };
 use nalgebra::Vector3;
 

@@ -3,7 +3,8 @@
 //!
 //! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and a header of 16.
 
-use crate::memory::{Capacity, Carver, Slot, region_bytes};
+use super::Slot;
+use crate::memory::{Capacity, Carver, region_bytes};
 use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 

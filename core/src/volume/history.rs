@@ -7,7 +7,8 @@
 //! frames of 70,000 blocks, where lists of coordinates would take 13.7 MiB (docs/decisions/0005-history-of-bit-sets.md). Time: one bit
 //! per visible block to enter a frame; a pass over one set to take one out.
 
-use crate::memory::{Capacity, Carver, Slot, region_bytes};
+use super::Slot;
+use crate::memory::{Capacity, Carver, region_bytes};
 use crate::state::Visitor;
 
 /// Frames, as bit sets over slots, oldest first out.

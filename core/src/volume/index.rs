@@ -6,8 +6,8 @@
 //!
 //! Memory: 5 bytes a bucket; buckets are the power of two at or above 16/7 of the blocks.
 
-use super::BlockCoord;
-use crate::memory::{Carver, Full, OneShot, Slot, region_bytes};
+use super::{BlockCoord, Full, Slot};
+use crate::memory::{Carver, OneShot, region_bytes};
 use hashbrown::HashTable;
 
 /// Room for the control group that hashbrown appends, and for aligning the control bytes.

@@ -13,6 +13,7 @@ mod config;
 mod fuse;
 mod history;
 mod index;
+mod pool;
 mod prune;
 mod recency;
 mod sampler;
@@ -29,6 +30,7 @@ pub use config::{CLASS_COUNT, ObservationWeight, VolumeConfig, WhenFull};
 pub use fuse::Observation;
 pub use history::VisibleHistory;
 pub use index::BlockIndex;
+pub use pool::{Full, Slot, SlotPool};
 pub use prune::PruneReport;
 pub use recency::Recency;
 pub use sampler::{Sampler, VoxelSample};
@@ -36,7 +38,7 @@ pub use store::{BlockStore, EvictionReport, LeavingBlock, NoStore, ReturningBloc
 pub use viewpoint::Viewpoint;
 pub use visible::VisibleList;
 
-use crate::memory::{Capacity, Carver, Footprint, Slot, SlotPool};
+use crate::memory::{Capacity, Carver, Footprint};
 
 /// A map of blocks.
 #[derive(Debug)]

@@ -6,8 +6,7 @@
 //!
 //! Weight 0 is off, bit for bit.
 
-use super::{BLOCK_VOXELS, Volume, block::Voxels};
-use crate::memory::Slot;
+use super::{BLOCK_VOXELS, Slot, Volume, block::Voxels};
 
 /// What pruning did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -2,7 +2,8 @@
 //!
 //! Memory: 8 bytes a block.
 
-use crate::memory::{Carver, Slot, region_bytes};
+use super::Slot;
+use crate::memory::{Carver, region_bytes};
 use crate::state::Visitor;
 
 /// The list. Links are slot + 1; 0 is none.

@@ -1,7 +1,6 @@
 //! Reading voxels one lattice point after the other, along a ray or around a cell: most reads fall into the block of the last one.
 
-use super::{BlockCoord, BlockIndex, Blocks};
-use crate::memory::Slot;
+use super::{BlockCoord, BlockIndex, Blocks, Slot};
 
 /// A voxel as it stands in the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

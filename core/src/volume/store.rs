@@ -4,8 +4,7 @@
 //! then the pool is too small for what is in view, and the new block is refused. What is still within the pruning window when it leaves is
 //! pruned first, as it would have been had it stayed. Constant work per block made, whatever the size of the map.
 
-use super::{BLOCK_VOXELS, BlockCoord, Volume, block::Voxels, config::WhenFull};
-use crate::memory::Slot;
+use super::{BLOCK_VOXELS, BlockCoord, Slot, Volume, block::Voxels, config::WhenFull};
 
 /// A block as it leaves the map.
 #[derive(Clone, Copy, Debug)]

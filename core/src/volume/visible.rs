@@ -5,7 +5,8 @@
 //!
 //! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
 
-use crate::memory::{Capacity, Carver, Full, Slot, region_bytes};
+use super::{Full, Slot};
+use crate::memory::{Capacity, Carver, region_bytes};
 use crate::state::Visitor;
 
 /// This frame's visible slots, each once.

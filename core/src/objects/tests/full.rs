@@ -1,7 +1,7 @@
 //! What happens at each bound: who goes, who stays, and what is counted.
 
 use super::*;
-use crate::memory::Slot;
+use crate::volume::Slot;
 
 const MASK: [u8; 3600] = [1; 3600];
 

@@ -16,10 +16,7 @@ mod tests;
 
 pub use config::MeshConfig;
 
-use crate::{
-    memory::Slot,
-    volume::{BLOCK_SIDE, BlockCoord, Blocks, Volume},
-};
+use crate::volume::{BLOCK_SIDE, BlockCoord, Blocks, Slot, Volume};
 use cases::{CASES, EDGE_START, edge_axis};
 
 /// Lattice points along a block's side, with those of the next block that its last cells need.

@@ -6,10 +6,7 @@ use super::{
     spot::{CORNER_STRIDES, Spot, WALLS, Wall},
     surface::Surface,
 };
-use crate::{
-    memory::Slot,
-    volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks},
-};
+use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks, Slot};
 
 /// Most blocks one ray visits.
 const MAX_BLOCKS: usize = 6 * super::eye::MAX_REACH_BLOCKS as usize;

@@ -34,9 +34,9 @@ pub use config::RaycastConfig;
 use crate::{
     geometry::scalar::min_f32,
     image::View,
-    memory::{Capacity, Carver, Footprint, Slot, region_bytes},
+    memory::{Capacity, Carver, Footprint, region_bytes},
     parallel::{Executor, each},
-    volume::{Viewpoint, Volume},
+    volume::{Slot, Viewpoint, Volume},
 };
 use eye::Eye;
 use march::Marcher;

@@ -8,9 +8,9 @@ use super::{
     signs::{self, Cells},
 };
 use crate::{
-    memory::{Capacity, Carver, Slot, region_bytes},
+    memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, each, zip2},
-    volume::{BLOCK_SIDE, Volume},
+    volume::{BLOCK_SIDE, Slot, Volume},
 };
 
 /// No block.

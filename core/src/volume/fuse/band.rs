@@ -1,11 +1,8 @@
 //! Blocks split among workers.
 
-use crate::{
-    memory::Slot,
-    volume::{
-        Blocks,
-        block::{Colour, Header, Voxels},
-    },
+use crate::volume::{
+    Blocks, Slot,
+    block::{Colour, Header, Voxels},
 };
 
 /// A run of blocks that one worker owns: those in slots `first..`, and which of them to visit.

@@ -5,8 +5,10 @@
 //! Memory: 4 bytes and 1 bit per slot (a free-list entry, whether the slot is taken). Time: constant; a walk over the slots taken visits
 //! 64 of them a step where none is. Order: a new pool gives out 0, 1, 2, …; a freed slot is the next one given out.
 
-use super::{Carver, region_bytes};
-use crate::state::Visitor;
+use crate::{
+    memory::{Carver, region_bytes},
+    state::Visitor,
+};
 use bytemuck::{Pod, Zeroable};
 use core::fmt;
 
