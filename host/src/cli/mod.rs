@@ -28,7 +28,7 @@ Examples:
   dynvox run ~/kitti --sequence 06 --snapshot-every 100 --out out/long
   dynvox run --resume out/long                  what stopped goes on from its last snapshot
   dynvox budget --profile small                 where the bytes of a profile go
-  dynvox budget --memory 48MiB --image 752x480  bounds that fit a number of bytes
+  dynvox budget --memory 48MiB --image 752x480   bounds that fit a number of bytes
   dynvox run ~/my-rig --memory 48MiB            the same, for the images that come
   dynvox run ~/kitti --sequence 06 --evaluate lidar     accuracy and completeness of input and map
   dynvox evaluate trajectory out/kitti-odometry-06-001 ~/kitti/poses/06.txt

@@ -119,7 +119,7 @@ fn a_plain_folder_takes_key_value_lines_or_kittis() {
         grey(root.path().join(side).join("b.png"), 40, 0);
     }
     let calib = root.path().join("calib.txt");
-    assert!(refusal(root.path(), None).contains("calib.txt is missing. A stereo folder has left/"));
+    assert!(refusal(root.path(), None).contains("calib.txt is missing. A stereo folder has the images of both cameras"));
     fs::write(&calib, "# my rig\nfocal_px 50\ncenter_u_px = 20\ncenter_v_px: 16\nbaseline_m 0.5 # metres\n").unwrap();
     let dataset = open(root.path(), &OpenOptions::default()).unwrap();
     assert_eq!((dataset.rig().focal_px, dataset.rig().baseline_m, dataset.len()), (50.0, 0.5, 2));
