@@ -59,6 +59,7 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
             class: None,
             disparity_q8: View::new(&exact_q8, 640, 192),
             t_world_camera: Some(frame.t_world_camera),
+            time_ns: None,
             detections: &[],
         };
         mapper.step(&stereo, &Serial).unwrap();

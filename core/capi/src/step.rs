@@ -41,6 +41,7 @@ pub unsafe extern "C" fn dynvox_step(
                 class: None,
                 detections: detections(&frame, &mut buffered, buffer)?,
                 disparity_q8: None,
+                time_ns: None,
                 t_world_camera: if frame.t_world_camera.is_null() { None } else { Some(read(frame.t_world_camera)?.transform()?) },
             };
             let done = mapper.step_with(&frame_in_core, &Serial, &mut store, &mut NoSink)?;

@@ -73,6 +73,8 @@ pub enum StepError {
     PoseNotFinite,
     /// The quaternion of the frame's pose does not have length 1.
     PoseNotRotation,
+    /// The frame's time is not after that of the frame before.
+    TimeNotLater,
 }
 
 impl fmt::Display for StepError {
@@ -90,6 +92,7 @@ impl fmt::Display for StepError {
                 write!(f, "the frame is not of {width} x {height} px, the size the calibration is for")
             }
             Self::PoseNotFinite => f.write_str("the pose of the frame is not made of finite numbers"),
+            Self::TimeNotLater => f.write_str("the time of the frame is not after that of the frame before"),
             Self::PoseNotRotation => f.write_str("the quaternion of the frame's pose does not have length 1"),
         }
     }

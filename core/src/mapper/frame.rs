@@ -25,6 +25,9 @@ pub struct StereoFrame<'a> {
     /// Where the left camera is, camera to world, from elsewhere: it takes the place of the camera's own egomotion. Give it with every frame,
     /// in one world.
     pub t_world_camera: Option<Transform>,
+    /// When the pair was taken, ns since any moment that stays the same: later than that of the frame before. Where two frames in a row have
+    /// it, objects move by the true time between them; else by `frame_interval_s` of the configuration.
+    pub time_ns: Option<u64>,
     /// What a detector saw in the left image, in any order; empty where there is none.
     pub detections: &'a [Detection<'a>],
 }
@@ -39,11 +42,12 @@ impl<'a> StereoFrame<'a> {
             class: None,
             disparity_q8: None,
             t_world_camera: None,
+            time_ns: None,
             detections: &[],
         }
     }
 
-    /// Digest of the images, row by row, of given disparities and pose, and of the detections, whatever their order.
+    /// Digest of the images, row by row, of given disparities, pose and time, and of the detections in any order.
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::default();
         self.left.rows().chain(self.right.rows()).for_each(|row| digest.bytes(row));
@@ -56,6 +60,9 @@ impl<'a> StereoFrame<'a> {
         }
         if let Some(pose) = &self.t_world_camera {
             pose.rotation.iter().chain(&pose.translation_m).for_each(|&value| digest.f64(value));
+        }
+        if let Some(time_ns) = self.time_ns {
+            digest.u64(time_ns);
         }
         digest.u64(self.detections.iter().map(Detection::digest).fold(0, u64::wrapping_add));
         digest.finish()

@@ -1,6 +1,7 @@
 //! The loop of the paper (Section III), one line per stage.
 
 mod budget;
+mod clock;
 mod config;
 mod digests;
 mod error;
@@ -23,6 +24,8 @@ pub use frame::StereoFrame;
 pub use report::{BlockCount, PoseOrigin, Report, Severity};
 pub use settings::{MapperConfig, MotionSource};
 pub use snapshot::RestoreError;
+
+use clock::Clock;
 
 use crate::{
     Capacity, Footprint,
@@ -58,6 +61,7 @@ pub struct Mapper<'s> {
     /// Width and height of the frames, known from the first one on.
     size: Option<[usize; 2]>,
     frame: u32,
+    clock: Clock,
 }
 
 impl Capacity {
@@ -131,6 +135,7 @@ impl<'s> Mapper<'s> {
             rectified: RectifiedImages::new_in(capacity, carver),
             size: None,
             frame: 0,
+            clock: Clock::new(config.tracking.frame_interval_s),
         }
     }
 
@@ -167,6 +172,9 @@ impl<'s> Mapper<'s> {
         }
         if !frame.t_world_camera.is_none_or(|pose| pose.is_rotation()) {
             return Err(StepError::PoseNotRotation);
+        }
+        if !self.clock.may_follow(frame.time_ns) {
+            return Err(StepError::TimeNotLater);
         }
         if self.size.is_some_and(|known| known != size) {
             return Err(StepError::SizeChanged);

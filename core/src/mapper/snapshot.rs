@@ -10,7 +10,9 @@
 //! | 8 | `DVXSTATE` |
 //! | 4 | [`VERSION`] |
 //! | 8, 8 | fingerprint of the capacity, of the configuration: a digest of their `Debug` text |
-//! | 4, 4, 4 | frames taken, image width and height, px (0 before the first frame) |
+//! | 4 | frames taken |
+//! | 4, 8, 4 | whether the last frame had a time, that time, ns, and the time since the frame before, s |
+//! | 4, 4 | image width and height, px (0 before the first frame) |
 //! | | the last pair, the camera, tracks, masks and objects, the static map |
 //! | 8 | checksum of everything before: a flipped bit anywhere is found |
 //!
@@ -28,7 +30,7 @@ use core::fmt::{self, Write};
 /// What a snapshot begins with.
 pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 /// Version of the layout. Another one is refused: there is no conversion.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// Why a mapper cannot be restored. There is no mapper then; the slab may be used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,6 +146,7 @@ impl<'s> Mapper<'s> {
             background,
             size,
             frame,
+            clock,
             // Told by the caller; a fingerprint stands for them.
             config: _,
             capacity,
@@ -157,6 +160,7 @@ impl<'s> Mapper<'s> {
         } = self;
         let [mut width, mut height] = size.unwrap_or_default();
         visitor.u32(frame);
+        clock.visit(visitor);
         visitor.count(&mut width, capacity.image_width);
         visitor.count(&mut height, capacity.image_height);
         *size = (width * height > 0).then_some([width, height]);
@@ -169,6 +173,7 @@ impl<'s> Mapper<'s> {
 
     /// Rebuilds what is not in a snapshot. Whether what was read can be.
     fn rebuild(&mut self) -> bool {
+        self.tracker.set_frame_interval_s(self.clock.interval_s());
         self.scene_flow.rebuild(&self.config.scene_flow, self.rectifier.invalid().as_ref());
         self.objects.rebuild() && self.background.rebuild()
     }

@@ -77,6 +77,7 @@ impl Mapper<'_> {
         let disparity_q8 = self.stereo.disparity_q8();
         let matches = FrameMatches { refined: self.scene_flow.refined(), sparse: self.scene_flow.sparse() };
         // (B) Detections, associated with tracks, and the matches assigned to them.
+        self.tracker.set_frame_interval_s(self.clock.advance(frame.time_ns, config.tracking.frame_interval_s));
         let assigned = executor.stage(Stage::Instances, || self.tracker.detect(self.frame, frame.detections, size).assign_matches(matches));
         // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
         let mut localization = Localization {

@@ -151,6 +151,11 @@ impl<'s> Tracker<'s> {
         self.tracks.commit(self.instances.all(), &mut self.masks, &mut self.report.tracks);
     }
 
+    /// Sets the time from the frame before to the one that comes next, s.
+    pub(crate) fn set_frame_interval_s(&mut self, interval_s: f32) {
+        self.config.frame_interval_s = interval_s;
+    }
+
     /// Number of the frame.
     pub(crate) fn frame(&self) -> u32 {
         self.frame

@@ -265,7 +265,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
 fn finish(args: &RunArgs, plan: &Plan, folder: RunFolder, checkpoint: Option<Checkpoint>) -> anyhow::Result<()> {
     let record = map(plan, &folder, checkpoint)?;
     let summary = Summary::of(&record);
-    write(&folder, &record, &summary)?;
+    write(&folder, plan, &record, &summary)?;
     let temporary: &[&str] = if record.keeps_blocks() { &[] } else { &[BLOCKS_FILE] };
     let target = folder.commit(temporary)?;
     if args.json {
@@ -276,12 +276,14 @@ fn finish(args: &RunArgs, plan: &Plan, folder: RunFolder, checkpoint: Option<Che
     Ok(())
 }
 
-fn write(folder: &RunFolder, run: &RunRecord, summary: &Summary) -> Result<(), FolderError> {
+fn write(folder: &RunFolder, plan: &Plan, run: &RunRecord, summary: &Summary) -> Result<(), FolderError> {
     let sections = &run.sections;
     let (times_s, poses) = (&sections.trajectory.times_s, &sections.trajectory.poses);
+    let stamp_ns = |(&index, &time_s): (&usize, &f64)| plan.dataset.stamp_ns(index).unwrap_or((time_s * 1e9).round() as u64);
+    let times_ns: Vec<u64> = plan.indices.iter().zip(times_s).map(stamp_ns).collect();
     folder.write("config.toml", |out| std::io::Write::write_all(out, run.header.config_toml.as_bytes()))?;
     folder.write("trajectory_kitti.txt", |out| formats::write_kitti(out, poses))?;
-    folder.write("trajectory_tum.txt", |out| formats::write_tum(out, times_s, poses))?;
+    folder.write("trajectory_tum.txt", |out| formats::write_tum(out, &times_ns, poses))?;
     folder.write("frames.csv", |out| report::write_frames(out, &run.frames))?;
     folder.write("tracks.csv", |out| report::write_tracks(out, &sections.tracks.frames))?;
     if !sections.tracks.comparisons.is_empty() {

@@ -2,7 +2,7 @@
 //!
 //! Numbers are written so that reading them gives the same bits.
 
-use super::rows::{lines_of, numbers_of};
+use super::rows::{lines_of, numbers_of, seconds_text};
 use super::{FormatError, read_text};
 use dynvox_core::geometry::Transform;
 use std::io::{self, Write};
@@ -67,10 +67,10 @@ fn kitti_row(pose: &Transform) -> String {
     joined(pose.matrix_3x4().as_flattened().iter().copied())
 }
 
-/// TUM: `t x y z qx qy qz qw`, one line a frame.
-pub fn write_tum(out: &mut impl Write, times_s: &[f64], poses: &[Transform]) -> io::Result<()> {
-    for (time, pose) in times_s.iter().zip(poses) {
-        writeln!(out, "{}", joined([*time].into_iter().chain(pose.translation_m).chain(pose.rotation)))?;
+/// TUM: `t x y z qx qy qz qw`, one line a frame. Times are ns and written as seconds to the last digit.
+pub fn write_tum(out: &mut impl Write, times_ns: &[u64], poses: &[Transform]) -> io::Result<()> {
+    for (&time_ns, pose) in times_ns.iter().zip(poses) {
+        writeln!(out, "{} {}", seconds_text(time_ns), joined(pose.translation_m.into_iter().chain(pose.rotation)))?;
     }
     Ok(())
 }

@@ -66,6 +66,13 @@ pub fn parse_seconds(text: &str) -> Option<u64> {
     (0.0..1.8e19).contains(&ns).then_some(ns as u64)
 }
 
+/// Nanoseconds as seconds in decimals, to the last digit, with one digit at least.
+pub(super) fn seconds_text(ns: u64) -> String {
+    let text = format!("{}.{:09}", ns / NS_PER_S, ns % NS_PER_S);
+    let digits = text.trim_end_matches('0');
+    if digits.ends_with('.') { format!("{digits}0") } else { digits.to_owned() }
+}
+
 /// `2011-09-26 13:02:25.964389445` as ns since 1970.
 fn parse_date(text: &str) -> Option<u64> {
     let (date, time) = text.split_once([' ', 'T'])?;
@@ -98,6 +105,7 @@ mod tests {
             [parse_seconds("0"), parse_seconds("1.036e-01"), parse_seconds("7.5")],
             [Some(0), Some(103_600_000), Some(7_500_000_000)]
         );
+        assert_eq!([0, 100_000_000, 1_403_636_579_763_555_584].map(seconds_text), ["0.0", "0.1", "1403636579.763555584"]);
         assert_eq!([parse_seconds("-1"), parse_seconds("soon"), parse_seconds(""), parse_seconds("nan")], [None; 4]);
         assert_eq!(parse_date("2011-09-26 13:02:25.964389445"), Some(1_317_042_145_964_389_445));
         assert_eq!(parse_date("1970-01-01 00:00:00.0"), Some(0));

@@ -32,14 +32,14 @@ fn kitti_trajectories_are_read_back_as_they_were() {
 
 #[test]
 fn tum_trajectories_keep_every_digit_of_time_and_pose() {
-    let times = [0.0, 0.103_73, 1_317_354_879.123_456, 1_317_354_879.123_457, 2e9];
+    let times_ns = [0, 103_730_000, 1_317_354_879_123_456_000, 1_317_354_879_123_457_001, 2_000_000_000_000_000_000];
     let mut text = Vec::new();
-    write_tum(&mut text, &times, &poses()).unwrap();
+    write_tum(&mut text, &times_ns, &poses()).unwrap();
     let rows: Vec<Vec<f64>> =
         String::from_utf8(text).unwrap().lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
-    for ((row, time), pose) in rows.iter().zip(times).zip(poses()) {
+    for ((row, time_ns), pose) in rows.iter().zip(times_ns).zip(poses()) {
         let ([x, y, z], [i, j, k, w]) = (pose.translation_m, pose.rotation);
-        assert_eq!(*row, [time, x, y, z, i, j, k, w]);
+        assert_eq!(*row, [time_ns as f64 / 1e9, x, y, z, i, j, k, w]);
     }
 }
 

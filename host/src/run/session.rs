@@ -103,6 +103,7 @@ impl<'p, 's> Session<'p, 's> {
             class: None,
             disparity_q8: images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()),
             t_world_camera: self.poses.as_ref().and_then(|poses| poses.get(at).copied()),
+            time_ns: self.plan.indices.get(at).and_then(|&index| self.plan.dataset.stamp_ns(index)),
             detections,
         })
     }

@@ -103,7 +103,8 @@ fn agrees_with_evo() {
 fn both_formats_are_read_and_poses_are_joined_by_time() {
     let folder = tempfile::TempDir::new().unwrap();
     let poses = arc(12, Transform::new(Vector3::new(0.01, 0.03, 0.0), Vector3::new(0.1, 0.0, 1.0)));
-    let times: Vec<f64> = (0..12).map(|at| 100.0 + 0.1 * f64::from(at)).collect();
+    let times_ns: Vec<u64> = (0..12).map(|at| 100_000_000_000 + 100_000_000 * at).collect();
+    let times: Vec<f64> = times_ns.iter().map(|&ns| ns as f64 / 1e9).collect();
     let write = |name: &str, write: &dyn Fn(&mut Vec<u8>)| {
         let mut text = b"# a comment\n".to_vec();
         write(&mut text);
@@ -111,7 +112,7 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
         folder.path().join(name)
     };
     let kitti = read_trajectory(&write("kitti.txt", &|out| write_kitti(out, &poses).unwrap())).unwrap();
-    let tum = read_trajectory(&write("trajectory_tum.txt", &|out| write_tum(out, &times, &poses).unwrap())).unwrap();
+    let tum = read_trajectory(&write("trajectory_tum.txt", &|out| write_tum(out, &times_ns, &poses).unwrap())).unwrap();
     assert_eq!((&kitti.times_s, tum.times_s.as_deref()), (&None, Some(&times[..])));
     let (a, b) = together(&kitti, &tum).unwrap();
     assert!(errors(&a, &b).unwrap().ate_m < 1e-9, "one trajectory in two formats");
@@ -131,7 +132,7 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
     assert!(together(&late, &tum).unwrap_err().to_string().contains("same clock"));
     let mixed = write("mixed.txt", &|out| {
         write_kitti(out, &poses[..1]).unwrap();
-        write_tum(out, &times, &poses[..1]).unwrap();
+        write_tum(out, &times_ns, &poses[..1]).unwrap();
     });
     assert!(read_trajectory(&mixed).unwrap_err().to_string().contains("line 3 is of another format"));
     assert!(read_trajectory(&folder.path().join("none")).unwrap_err().to_string().contains("cannot be read"));

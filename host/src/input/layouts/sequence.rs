@@ -231,11 +231,13 @@ impl FrameSource for Sequence {
         self.masks.clone()
     }
 
+    fn stamp_ns(&self, index: usize) -> Option<u64> {
+        self.stamps_ns.as_ref()?.get(index).copied()
+    }
+
     fn time_s(&self, index: usize) -> f64 {
-        match &self.stamps_ns {
-            Some(stamps_ns) => stamps_ns.get(index).map_or(0.0, |&stamp_ns| stamp_ns as f64 / NS_PER_S),
-            None => self.numbers.get(index).map_or(0.0, |&number| number as f64 / ASSUMED_HZ),
-        }
+        let assumed = || self.numbers.get(index).map_or(0.0, |&number| number as f64 / ASSUMED_HZ);
+        self.stamp_ns(index).map_or_else(assumed, |stamp_ns| stamp_ns as f64 / NS_PER_S)
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {

@@ -45,6 +45,10 @@ impl FrameSource for StreetFrames {
         self.street.rig()
     }
 
+    fn stamp_ns(&self, index: usize) -> Option<u64> {
+        Some((self.time_s(index) * 1e9).round() as u64)
+    }
+
     fn time_s(&self, index: usize) -> f64 {
         self.street.time_s(index as u32)
     }

@@ -99,7 +99,12 @@ pub trait FrameSource: Send + Sync {
     /// The rig, equal for all frames.
     fn rig(&self) -> StereoRig;
 
-    /// Time of a frame, s.
+    /// When a frame was taken, ns since any moment that stays the same; `None` where nothing tells.
+    fn stamp_ns(&self, _: usize) -> Option<u64> {
+        None
+    }
+
+    /// Time of a frame, s: by its stamp, else by an assumed rate.
     fn time_s(&self, index: usize) -> f64;
 
     /// Decodes or renders a frame.

@@ -67,6 +67,10 @@ impl<L: Layer> FrameSource for Overlay<L> {
         self.dataset.rig()
     }
 
+    fn stamp_ns(&self, index: usize) -> Option<u64> {
+        self.dataset.stamp_ns(index)
+    }
+
     fn time_s(&self, index: usize) -> f64 {
         self.dataset.time_s(index)
     }

@@ -133,6 +133,10 @@ impl FrameSource for Scaled {
         }
     }
 
+    fn stamp_ns(&self, index: usize) -> Option<u64> {
+        self.inner.stamp_ns(index)
+    }
+
     fn time_s(&self, index: usize) -> f64 {
         self.inner.time_s(index)
     }
