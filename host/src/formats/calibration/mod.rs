@@ -2,9 +2,11 @@
 
 mod kitti;
 mod plain;
+mod raw;
 
 pub use kitti::{KittiCalibration, Projection};
 pub use plain::read_rig;
+pub use raw::{LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M, StereoCalibration, to_toml};
 
 use crate::formats::FormatError;
 use dynvox_core::geometry::{RigProblem, StereoRig};

@@ -1,0 +1,84 @@
+//! camodocal: one YAML file a camera, and `extrinsics.yaml`, whose transform maps left camera coordinates to right ones.
+
+use super::{
+    Placement, StereoCalibration, lens,
+    tree::{Node, Tree},
+};
+use crate::formats::FormatError;
+use dynvox_core::rectify::{LensModel, RawCamera};
+use nalgebra::{Matrix3, Vector3};
+
+/// Reads two camera files; the extrinsics from a third, or from `extrinsics.yaml` beside the first.
+pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
+    let (&[left, right], rest) = roots.split_first_chunk::<2>().ok_or_else(|| super::euroc::two_files(roots, "camera file"))?;
+    let beside = match rest.first() {
+        Some(_) => None,
+        None => Some(Tree::read(&left.path().with_file_name("extrinsics.yaml"))?),
+    };
+    let extrinsics = rest.first().copied().or_else(|| beside.as_ref().map(Tree::root));
+    let extrinsics = extrinsics.unwrap_or(left);
+    let transform = extrinsics.need("transform")?;
+    let number = |key| transform.need(key)?.number();
+    let r_right_left = rotation([number("q_x")?, number("q_y")?, number("q_z")?, number("q_w")?]).ok_or_else(|| {
+        transform.refuse("the quaternion does not have length 1", "Copy q_x, q_y, q_z, q_w from the calibration's output")
+    })?;
+    Ok(StereoCalibration {
+        left: camera(left)?,
+        right: camera(right)?,
+        placement: Placement::Motion {
+            r_right_left,
+            t_right_left_m: Vector3::new(number("t_x")?, number("t_y")?, number("t_z")?),
+        },
+        format: "camodocal",
+    })
+}
+
+/// The matrix of a quaternion; `None` where its length is not 1.
+fn rotation([x, y, z, w]: [f64; 4]) -> Option<Matrix3<f64>> {
+    let square = x * x + y * y + z * z + w * w;
+    ((square - 1.0).abs() < 1e-3).then(|| {
+        let s = 2.0 / square;
+        Matrix3::new(
+            1.0 - s * (y * y + z * z),
+            s * (x * y - z * w),
+            s * (x * z + y * w),
+            s * (x * y + z * w),
+            1.0 - s * (x * x + z * z),
+            s * (y * z - x * w),
+            s * (x * z - y * w),
+            s * (y * z + x * w),
+            1.0 - s * (x * x + y * y),
+        )
+    })
+}
+
+fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
+    let projection = node.need("projection_parameters")?;
+    let parameters = |of: Node<'_>, keys: [&'static str; 4]| -> Result<[f64; 4], FormatError> {
+        let mut values = [0.0; 4];
+        for (value, key) in values.iter_mut().zip(keys) {
+            *value = of.value_of(key)?;
+        }
+        Ok(values)
+    };
+    let (pinhole, model) = match node.need("model_type")?.text()? {
+        "PINHOLE" => {
+            let coefficients = parameters(node.need("distortion_parameters")?, ["k1", "k2", "p1", "p2"])?;
+            (parameters(projection, ["fx", "fy", "cx", "cy"])?, lens::radial_tangential(node, &coefficients)?)
+        }
+        "KANNALA_BRANDT" => {
+            let radial = parameters(projection, ["k2", "k3", "k4", "k5"])?;
+            (parameters(projection, ["mu", "mv", "u0", "v0"])?, LensModel::Equidistant { radial })
+        }
+        "MEI" => {
+            let coefficients = parameters(node.need("distortion_parameters")?, ["k1", "k2", "p1", "p2"])?;
+            let xi = node.need("mirror_parameters")?.need("xi")?.number()?;
+            lens::unified(node, xi, parameters(projection, ["gamma1", "gamma2", "u0", "v0"])?, &coefficients)?
+        }
+        other => {
+            let reason = format!("the camera model {other} is not known");
+            return Err(node.refuse(&reason, "Known are PINHOLE, KANNALA_BRANDT, and MEI without distortion"));
+        }
+    };
+    lens::camera(node, pinhole, model, [node.need("image_width")?.pixels()?, node.need("image_height")?.pixels()?])
+}

@@ -1,0 +1,32 @@
+//! EuRoC's `sensor.yaml`, one a camera: `T_BS` maps camera coordinates to the body's. TUM VI's files are alike.
+
+use super::{Placement, StereoCalibration, kalibr, tree::Node};
+use crate::formats::FormatError;
+
+/// Reads the left and the right camera's file.
+pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
+    let [left, right] = *roots else {
+        return Err(two_files(roots, "sensor.yaml"));
+    };
+    let (r_body_left, t_body_left) = kalibr::rigid(left.need("T_BS")?)?;
+    let (r_body_right, t_body_right) = kalibr::rigid(right.need("T_BS")?)?;
+    let to_right = r_body_right.transpose();
+    Ok(StereoCalibration {
+        left: kalibr::camera(left)?,
+        right: kalibr::camera(right)?,
+        placement: Placement::Motion {
+            r_right_left: to_right * r_body_left,
+            t_right_left_m: to_right * (t_body_left - t_body_right),
+        },
+        format: "EuRoC",
+    })
+}
+
+/// A format that has a file a camera.
+pub fn two_files(roots: &[Node<'_>], name: &str) -> FormatError {
+    let reason = format!("{} {name} of a pair that has two", if roots.len() == 1 { "it is one" } else { "it is among more than two" });
+    let action = "Give --calibration twice: the left camera's file, then the right one's";
+    roots
+        .first()
+        .map_or_else(|| FormatError::content(std::path::Path::new(""), "there is no file", action), |root| root.refuse(&reason, action))
+}

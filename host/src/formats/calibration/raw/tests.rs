@@ -1,0 +1,244 @@
+//! Each format says the same rig; each way to damage a file is answered by a sentence.
+
+use super::*;
+use dynvox_core::rectify::LensModel;
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+const KALIBR: &str = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  distortion_model: radtan\n  \
+    intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\ncam1:\n  T_cn_cnm1:\n  - [1.0, 0.0, 0.0, -0.11]\n  - [0.0, 1.0, 0.0, 0.0]\n  \
+    - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  \
+    distortion_model: radtan\n  intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\n";
+
+fn euroc(x: f64) -> String {
+    format!(
+        "%YAML:1.0\n# General sensor definitions.\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, {x},\n         0.0, 1.0, 0.0, 0.02,\n         \
+         0.0, 0.0, 1.0, 0.01,\n         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [752, 480]\ncamera_model: pinhole\n\
+         intrinsics: [458.6, 457.2, 367.2, 248.3] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n\
+         distortion_coefficients: [-0.28, 0.07, 0.0002, 0.00002]\n"
+    )
+}
+
+const MATRIX: &str = "!!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 458.6, 0., 367.2, 0., 457.2, 248.3, 0., 0., 1. ]\n";
+const COEFFICIENTS: &str = "!!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.28, 0.07, 0.0002, 0.00002, 0. ]\n";
+const R: &str = "R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]\n";
+const T: &str = "T: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ -0.11, 0., 0. ]\n";
+
+fn opencv_short() -> [String; 2] {
+    [
+        format!("%YAML:1.0\n---\nM1: {MATRIX}D1: {COEFFICIENTS}M2: {MATRIX}D2: {COEFFICIENTS}"),
+        format!("%YAML:1.0\n---\n{R}{T}size: [752, 480]\n"),
+    ]
+}
+
+fn opencv_long() -> [String; 2] {
+    let one = format!("%YAML:1.0\n---\nimage_width: 752\nimage_height: 480\ncameraMatrix: {MATRIX}distCoeffs: {COEFFICIENTS}");
+    [one.clone(), format!("{one}{R}{T}")]
+}
+
+fn opencv_xml() -> String {
+    let matrix = |name: &str, rows: u32, data: &str| {
+        format!("<{name} type_id=\"opencv-matrix\"><rows>{rows}</rows><cols>3</cols><dt>d</dt><data>\n {data}</data></{name}>\n")
+    };
+    let camera = |number: u32| {
+        matrix(&format!("M{number}"), 3, "458.6 0. 367.2 0. 457.2 248.3 0. 0. 1.")
+            + &matrix(&format!("D{number}"), 1, "-0.28 0.07 0.0002 0.00002 0.")
+    };
+    let rest = matrix("R", 3, "1. 0. 0. 0. 1. 0. 0. 0. 1.") + &matrix("T", 3, "-0.11 0. 0.");
+    format!(
+        "<?xml version=\"1.0\"?>\n<opencv_storage>\n{}{}{rest}<image_width>752</image_width><image_height>480</image_height></opencv_storage>",
+        camera(1),
+        camera(2)
+    )
+}
+
+fn ros(shift: f64) -> String {
+    format!(
+        "image_width: 752\nimage_height: 480\ncamera_name: left\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [458.6, 0, 367.2, 0, 457.2, 248.3, 0, 0, 1]\n\
+         distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.28, 0.07, 0.0002, 0.00002, 0]\n\
+         rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n\
+         projection_matrix:\n  rows: 3\n  cols: 4\n  data: [400, 0, 370, {shift}, 0, 400, 250, 0, 0, 0, 1, 0]\n"
+    )
+}
+
+fn camodocal() -> String {
+    "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\nimage_height: 480\ndistortion_parameters:\n   k1: -0.28\n   k2: 0.07\n   \
+     p1: 0.0002\n   p2: 0.00002\nprojection_parameters:\n   fx: 458.6\n   fy: 457.2\n   cx: 367.2\n   cy: 248.3\n"
+        .to_owned()
+}
+
+const EXTRINSICS: &str =
+    "%YAML:1.0\n---\ntransform:\n   q_x: 0.\n   q_y: 0.\n   q_z: 0.\n   q_w: 1.\n   t_x: -0.11\n   t_y: 0.\n   t_z: 0.\n";
+
+const KITTI: &str = "calib_time: 09-Jan-2012 13:57:47\nS_00: 7.52e+02 4.80e+02\nK_00: 458.6 0 367.2 0 457.2 248.3 0 0 1\nD_00: -0.28 0.07 0.0002 0.00002 0\n\
+    S_rect_00: 700 400\nR_rect_00: 1 0 0 0 1 0 0 0 1\nP_rect_00: 400 0 370 0 0 400 250 0 0 0 1 0\nS_01: 752 480\nK_01: 458.6 0 367.2 0 457.2 248.3 0 0 1\n\
+    D_01: -0.28 0.07 0.0002 0.00002 0\nR_rect_01: 1 0 0 0 1 0 0 0 1\nP_rect_01: 400 0 370 -44 0 400 250 0 0 0 1 0\n";
+
+/// Files with these names and texts, in a folder that lives as long as they are read.
+fn written(files: &[(&str, &str)]) -> (TempDir, Vec<PathBuf>) {
+    let folder = TempDir::new().unwrap();
+    let paths = files.iter().map(|(name, text)| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    });
+    let paths = paths.collect();
+    (folder, paths)
+}
+
+fn read(files: &[(&str, &str)]) -> Result<StereoCalibration, FormatError> {
+    let (_folder, paths) = written(files);
+    StereoCalibration::read(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), None)
+}
+
+fn refusal(files: &[(&str, &str)]) -> String {
+    read(files).unwrap_err().to_string()
+}
+
+#[test]
+fn all_formats_tell_of_the_same_rig() {
+    let (short, long) = (opencv_short(), opencv_long());
+    let (left, right) = (euroc(-0.02), euroc(0.09));
+    let files: [(&str, Vec<(&str, &str)>); 9] = [
+        ("Kalibr", vec![("camchain.yaml", KALIBR)]),
+        ("EuRoC", vec![("a.yaml", &left), ("b.yaml", &right)]),
+        ("OpenCV", vec![("intrinsics.yml", &short[0]), ("extrinsics.yml", &short[1])]),
+        ("OpenCV", vec![("left.yaml", &long[0]), ("right.yaml", &long[1])]),
+        (
+            "OpenCV",
+            vec![("stereo.xml", &opencv_xml())]
+                .into_iter()
+                .map(|(name, text)| (name, Box::leak(text.clone().into_boxed_str()) as &str))
+                .collect(),
+        ),
+        (
+            "ROS CameraInfo",
+            vec![("left.yaml", Box::leak(ros(0.0).into_boxed_str())), ("right.yaml", Box::leak(ros(-44.0).into_boxed_str()))],
+        ),
+        (
+            "camodocal",
+            vec![
+                ("l.yaml", Box::leak(camodocal().into_boxed_str())),
+                ("r.yaml", Box::leak(camodocal().into_boxed_str())),
+                ("extrinsics.yaml", EXTRINSICS),
+            ],
+        ),
+        ("KITTI raw", vec![("calib_cam_to_cam.txt", KITTI)]),
+        ("dynvox", vec![("own.toml", Box::leak(to_toml(&read(&[("camchain.yaml", KALIBR)]).unwrap()).into_boxed_str()))]),
+    ];
+    for (format, files) in files {
+        let calibration = read(&files).unwrap_or_else(|error| panic!("{format}: {error}"));
+        assert_eq!(calibration.format, format);
+        for camera in [calibration.left, calibration.right] {
+            assert_eq!(
+                ([camera.width, camera.height], camera.lens.focal_px(), camera.lens.center_px()),
+                ([752, 480], [458.6, 457.2], [367.2, 248.3])
+            );
+            let same = LensModel::RadialTangential { radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0], tangential: [0.0002, 0.00002] };
+            assert_eq!(*camera.lens.model(), same, "{format}");
+        }
+        assert!((calibration.baseline_m() - 0.11).abs() < 1e-12 && calibration.angle_deg() < 1e-9, "{format}");
+        let (rectification, rig) = calibration.rectify(Sizing::Automatic { max_width: 800, max_height: 600 }).unwrap();
+        assert!((rig.baseline_m - 0.11).abs() < 1e-12);
+        let given = matches!(format, "ROS CameraInfo" | "KITTI raw").then_some(400.0);
+        assert!(given.is_none_or(|focal| rig.focal_px == focal), "{format} gives its own rectification");
+        assert_eq!(rectification.left.raw, calibration.left);
+    }
+}
+
+#[test]
+fn own_files_keep_every_bit() {
+    for files in [vec![("camchain.yaml", KALIBR)], vec![("calib_cam_to_cam.txt", KITTI)]] {
+        let calibration = read(&files).unwrap();
+        let again = read(&[("own.toml", &to_toml(&calibration))]).unwrap();
+        assert_eq!(StereoCalibration { format: calibration.format, ..again }, calibration);
+    }
+}
+
+#[test]
+fn every_lens_of_kalibr_is_read() {
+    let with = |model: &str, distortion: &str, intrinsics: &str, coefficients: &str| {
+        KALIBR
+            .replace("camera_model: pinhole", &format!("camera_model: {model}"))
+            .replace("distortion_model: radtan", &format!("distortion_model: {distortion}"))
+            .replace("[458.6, 457.2, 367.2, 248.3]", intrinsics)
+            .replace("[-0.28, 0.07, 0.0002, 0.00002]", coefficients)
+    };
+    let model = |text: &str| read(&[("camchain.yaml", text)]).map(|calibration| *calibration.left.lens.model());
+    let fisheye = with("pinhole", "equidistant", "[190, 190, 376, 240]", "[0.003, 0.0007, -0.002, 0.0002]");
+    assert_eq!(model(&fisheye).unwrap(), LensModel::Equidistant { radial: [0.003, 0.0007, -0.002, 0.0002] });
+    let double = with("ds", "none", "[-0.2, 0.59, 350, 350, 376, 240]", "[]");
+    assert_eq!(model(&double).unwrap(), LensModel::DoubleSphere { xi: -0.2, alpha: 0.59 });
+    let extended = with("eucm", "none", "[0.6, 1.1, 350, 350, 376, 240]", "[]");
+    assert_eq!(model(&extended).unwrap(), LensModel::ExtendedUnified { alpha: 0.6, beta: 1.1 });
+    let omni = with("omni", "none", "[1.0, 700, 700, 376, 240]", "[]");
+    assert_eq!(model(&omni).unwrap(), LensModel::ExtendedUnified { alpha: 0.5, beta: 1.0 });
+    let bent = with("omni", "radtan", "[1.0, 700, 700, 376, 240]", "[-0.1, 0, 0, 0]");
+    assert!(model(&bent).unwrap_err().to_string().contains("with distortion is not served"));
+    let other = with("pinhole", "fov", "[350, 350, 376, 240]", "[0.9]");
+    assert!(model(&other).unwrap_err().to_string().contains("distortion model fov is not known"));
+}
+
+#[test]
+fn a_truncated_file_is_refused_wherever_it_ends() {
+    let long = opencv_long();
+    for (name, text) in [("camchain.yaml", KALIBR), ("calib_cam_to_cam.txt", KITTI), ("stereo.xml", &opencv_xml()), ("one.yaml", &long[1])]
+    {
+        for end in (0..text.len().saturating_sub(60)).step_by(37) {
+            let message = refusal(&[(name, &text[..end])]);
+            assert!(message.contains(name) && message.contains(". "), "{message}");
+        }
+    }
+}
+
+#[test]
+fn damaged_numbers_are_named_with_the_next_action() {
+    let kalibr = |from: &str, to: &str| {
+        assert!(KALIBR.contains(from), "{from}");
+        refusal(&[("camchain.yaml", &KALIBR.replace(from, to))])
+    };
+    let says = |message: String, words: &[&str]| {
+        for word in words {
+            assert!(message.contains(word), "{word}: {message}");
+        }
+    };
+    says(kalibr("458.6", ".nan"), &["intrinsics holds", "not a finite number"]);
+    says(kalibr("458.6", "0.0"), &["focal length is not a positive number", "above 0"]);
+    says(
+        kalibr("intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\ncam1", "resolution: [752, 480]\ncam1"),
+        &["intrinsics is missing in cam0"],
+    );
+    says(kalibr("[1.0, 0.0, 0.0, -0.11]", "[0.0, 0.0, 0.0, -0.11]"), &["not a rotation matrix", "copy it whole"]);
+    says(kalibr("-0.11]", "-537.0]"), &["537 m apart. Is it in millimetres?", "divide them by 1000"]);
+    says(kalibr("-0.11]", "0.11]"), &["right camera stands to the left", "Exchange the two cameras"]);
+    says(kalibr("-0.11]", "0.0]"), &["distance between the cameras is 0"]);
+    says(kalibr("resolution: [752, 480]", "resolution: [75, 48]"), &["does not fit images of 75 x 48 px"]);
+    says(kalibr("resolution: [752, 480]", "resolution: [752.5, 480]"), &["not a width and a height"]);
+    says(kalibr("T_cn_cnm1", "T_cn_cnm2"), &["T_cn_cnm1 is missing in cam1"]);
+    says(refusal(&[("a.yaml", "a: 1\n")]), &["no known calibration", "Known are EuRoC"]);
+    says(refusal(&[("a.yaml", "- 1\n")]), &["it holds no keys"]);
+    says(refusal(&[("a.yaml", &euroc(0.0))]), &["one sensor.yaml", "--calibration twice"]);
+    says(refusal(&[("a.toml", "[left]\n")]), &["not a calibration"]);
+    says(
+        refusal(&[("c.txt", &KITTI.replace("1 0 0 0 1 0 0 0 1\nP_rect_00", "1 0 0 0 1 0 0 1\nP_rect_00"))]),
+        &["R_rect_00 has 8 numbers, not 9"],
+    );
+    let short = opencv_short();
+    says(refusal(&[("intrinsics.yml", &short[0])]), &["R or rotation", "second --calibration"]);
+    let sizeless = short[1].replace("size: [752, 480]\n", "");
+    says(refusal(&[("intrinsics.yml", &short[0]), ("extrinsics.yml", &sizeless)]), &["does not say the size"]);
+    says(refusal(&[("l.yaml", &camodocal()), ("r.yaml", &camodocal())]), &["extrinsics.yaml", "cannot be read"]);
+}
+
+#[test]
+fn images_of_another_size_do_not_fit() {
+    let calibration = read(&[("camchain.yaml", KALIBR)]).unwrap();
+    assert!(calibration.fits(Path::new("c"), [752, 480]).is_ok());
+    let message = calibration.fits(Path::new("c"), [640, 480]).unwrap_err().to_string();
+    assert!(message.contains("752 x 480 px, but these are 640 x 480 px"), "{message}");
+    let (short, sizeless) = (opencv_short(), opencv_short()[1].replace("size: [752, 480]\n", ""));
+    let (_folder, paths) = written(&[("i.yml", &short[0]), ("e.yml", &sizeless)]);
+    let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+    assert_eq!(StereoCalibration::read(&paths, Some([752, 480])).unwrap().left.width, 752, "told by the images");
+}
