@@ -1,6 +1,7 @@
 //! Which bounds a run has: a named profile, a byte budget, or a file; without any of them 256 MiB for the images that come.
 
 use anyhow::{Context, bail};
+use dynvox_core::rectify::{Rectification, RectifiedImages, Rectifier};
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -24,17 +25,34 @@ pub struct CapacityArgs {
 }
 
 impl CapacityArgs {
-    /// The bounds for images of a size, with their name for reports.
-    pub fn resolve(&self, size: (usize, usize), voxel_size_m: f32) -> anyhow::Result<(String, Capacity)> {
+    /// The bounds for images of a size, with their name for reports. Where raw images are rectified a budget holds that too; named bounds and
+    /// those of a file get it on top.
+    pub fn resolve(
+        &self,
+        size: (usize, usize),
+        rectified: Option<&Rectification>,
+        voxel_size_m: f32,
+    ) -> anyhow::Result<(String, Capacity)> {
+        let raw = rectified.map(|of| [of.left.raw, of.right.raw]);
+        let [raw_width, raw_height] =
+            raw.map_or([0; 2], |[left, right]| [left.width.max(right.width), left.height.max(right.height)].map(|side| side as usize));
+        let with_raw = |capacity: Capacity| Capacity {
+            raw_width: capacity.raw_width.max(raw_width),
+            raw_height: capacity.raw_height.max(raw_height),
+            ..capacity
+        };
         if let Some(name) = &self.profile {
-            return super::profile(name);
+            let (name, capacity) = super::profile(name)?;
+            return Ok((name, with_raw(capacity)));
         }
         if let Some(path) = &self.capacity {
-            return Ok((path.display().to_string(), read(path)?));
+            return Ok((path.display().to_string(), with_raw(read(path)?)));
         }
         let memory = self.memory.unwrap_or(DEFAULT_MEMORY);
         let options = BudgetOptions { voxel_size_m: Some(voxel_size_m), ..BudgetOptions::default() };
-        Ok((memory.to_string(), solve(memory, size, &options)?))
+        let images = with_raw(Capacity { image_width: size.0, image_height: size.1, colour: true, ..Capacity::TINY });
+        let raw_bytes = Rectifier::bytes(&images) + RectifiedImages::bytes(&images);
+        Ok((memory.to_string(), with_raw(solve(Bytes(memory.0.saturating_sub(raw_bytes)), size, &options)?)))
     }
 }
 
@@ -181,10 +199,10 @@ mod tests {
         let text = to_toml(&solved).unwrap();
         std::fs::write(&path, &text).unwrap();
         let args = CapacityArgs { capacity: Some(path.clone()), ..CapacityArgs::default() };
-        assert_eq!(args.resolve((752, 480), 0.05).unwrap().1, solved);
+        assert_eq!(args.resolve((752, 480), None, 0.05).unwrap().1, solved);
         let refusal = |text: &str| {
             std::fs::write(&path, text).unwrap();
-            format!("{:#}", args.resolve((752, 480), 0.05).unwrap_err())
+            format!("{:#}", args.resolve((752, 480), None, 0.05).unwrap_err())
         };
         assert!(refusal(&text.replace("matches = ", "matchs = ")).contains("dynvox budget"));
         assert!(refusal(&text.replace("objects = ", "objects = 9")).contains("objects must be at most 16"));
@@ -195,7 +213,7 @@ mod tests {
     #[test]
     fn without_an_option_every_common_image_gets_a_map_below_256_mib() {
         for size in [(640, 480), (752, 480), (1_242, 375), (1_280, 720)] {
-            let (name, capacity) = CapacityArgs::default().resolve(size, 0.05).unwrap();
+            let (name, capacity) = CapacityArgs::default().resolve(size, None, 0.05).unwrap();
             assert_eq!(name, "256 MiB");
             assert!(capacity.bytes() <= 256 << 20 && capacity.blocks > 20_000 && capacity.colour, "{size:?}: {capacity:?}");
         }

@@ -1,6 +1,7 @@
 //! The command line. Errors become sentences here and nowhere else.
 
 mod budget;
+mod calibration;
 mod capacity;
 mod diff;
 mod egomotion;
@@ -27,6 +28,8 @@ Examples:
   dynvox run --config out/coarse/config.toml    the same again
   dynvox run ~/kitti --sequence 06 --snapshot-every 100 --out out/long
   dynvox run --resume out/long                  what stopped goes on from its last snapshot
+  dynvox run ~/raw-rig --calibration camchain.yaml   images as the cameras deliver them
+  dynvox calibration camchain.yaml              what a calibration means
   dynvox budget --profile small                 where the bytes of a profile go
   dynvox budget --memory 48MiB --image 752x480   bounds that fit a number of bytes
   dynvox run ~/my-rig --memory 48MiB            the same, for the images that come
@@ -53,6 +56,8 @@ enum Command {
     Run(Box<run::RunArgs>),
     /// Say what a folder holds, what is missing, and the command that maps it
     Inspect(inspect::InspectArgs),
+    /// Say what a calibration of raw cameras means, and write it as a file of our own
+    Calibration(calibration::CalibrationArgs),
     /// Show where the bytes go: all profiles, or one region by region
     Budget(budget::BudgetArgs),
     /// Hold files against the truth: trajectories, disparities
@@ -75,6 +80,7 @@ pub fn main() -> ExitCode {
         None => run::run(&run::RunArgs::without_arguments()),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
+        Some(Command::Calibration(args)) => calibration::run(&args),
         Some(Command::Budget(args)) => budget::run(&args),
         Some(Command::Evaluate(args)) => evaluate::run(&args),
         Some(Command::Sweep(args)) => sweep::run(&args),

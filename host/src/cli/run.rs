@@ -39,9 +39,10 @@ pub struct RunArgs {
     /// Both images of a pair lie in one file [default: told from the calibration]
     #[arg(long, value_enum, value_name = "HOW")]
     stacked: Option<Stacking>,
-    /// Calibration in place of the recording's own: KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
+    /// Calibration in place of the recording's own: of raw images in any format `dynvox calibration` reads (give it twice where each camera
+    /// has a file), of rectified ones KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
     #[arg(long, value_name = "FILE")]
-    calibration: Option<PathBuf>,
+    calibration: Vec<PathBuf>,
     #[command(flatten)]
     bounds: CapacityArgs,
     /// Threads; the result does not depend on them [default: as many as the machine has, at most 4]
@@ -189,7 +190,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         bail!("--threads, --stride and --frames must be at least 1. Give a larger number");
     }
     let dataset = args.open(&settings)?;
-    let (profile, capacity) = args.bounds.resolve(dataset.size(), settings.voxel_size_m())?;
+    let (profile, capacity) = args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;
     settings.fit(&capacity);
     let indices = run::frame_indices(dataset.len(), args.start, args.stride, args.frames)?;
     if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &indices) {
@@ -210,7 +211,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         poses,
         profile,
         capacity,
-        config: settings.config(dataset.rig()),
+        config: settings.config(dataset.rig(), dataset.rectification()),
         config_toml: settings.to_toml(args.path.is_none())?,
         threads,
         checkpoints: None,

@@ -6,6 +6,7 @@ use dynvox_core::egomotion::EgomotionConfig;
 use dynvox_core::egomotion::icp::IcpConfig;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::objects::ObjectsConfig;
+use dynvox_core::rectify::Rectification;
 use dynvox_core::scene_flow::SceneFlowConfig;
 use dynvox_core::stereo::StereoConfig;
 use dynvox_core::tracking::TrackingConfig;
@@ -65,8 +66,8 @@ impl Settings {
         self.stereo
     }
 
-    /// The mapper's configuration for a rig.
-    pub fn config(&self, rig: StereoRig) -> Config {
+    /// The mapper's configuration for a rig, and for raw images where they are rectified.
+    pub fn config(&self, rig: StereoRig, rectification: Option<&Rectification>) -> Config {
         let Self {
             stereo,
             scene_flow,
@@ -82,7 +83,7 @@ impl Settings {
         } = self;
         Config {
             rig,
-            rectification: None,
+            rectification: rectification.copied(),
             stereo: *stereo,
             scene_flow: *scene_flow,
             egomotion: *egomotion,
@@ -222,7 +223,7 @@ mod tests {
         let file = folder.path().join("c.toml");
         std::fs::write(&file, "[volume]\nvoxel_size_m = 1\nfar_m = 12.5\n").unwrap();
         let settings = Settings::resolve(Some(&file), &["volume.voxel_size_m=0.1".into()]).unwrap();
-        let volume = settings.config(any_rig()).volume;
+        let volume = settings.config(any_rig(), None).volume;
         assert_eq!((volume.voxel_size_m, volume.far_m, volume.near_m), (0.1, 12.5, 0.5));
     }
 

@@ -1,6 +1,7 @@
 //! Pictures of some frames, and of the finished map.
 
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
+use crate::formats::Image;
 use dynvox_core::geometry::Transform;
 use serde::{Deserialize, Serialize};
 
@@ -73,8 +74,10 @@ impl Observer for KeyframesObserver {
 
 fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
     let t_world_camera: Transform = frame.row.report.t_world_camera;
-    let grey = frame.images.left.view()?;
-    let colour = frame.images.colour.as_ref().and_then(|colour| colour.view());
+    let rectified = frame.view.mapper().rectified_pair().map(|[left, _]| Image::from_view(&left));
+    let grey = rectified.as_ref().unwrap_or(&frame.images.left).view()?;
+    // Colour is shown where it lies on the grey image.
+    let colour = frame.images.colour.as_ref().filter(|_| rectified.is_none()).and_then(|colour| colour.view());
     let near_px = NEAR_SHARE * grey.width() as f32;
     let disparity_png = pictures::disparity(&frame.view.mapper().disparity_q8(), near_px);
     let seen = frame.view.raycast(&t_world_camera)?;

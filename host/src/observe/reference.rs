@@ -5,6 +5,7 @@ use crate::evaluate::reference::{
     DepthErrors, EvaluatedFrame, Field, PendingFrame, PendingFrames, ProjectedScan, ReferenceFigures, Region, project_scan,
     sample_exact_depth,
 };
+use crate::formats::Image;
 use crate::input::InstanceMask;
 use crate::input::{FrameSource, StereoImages};
 use dynvox_core::Mapper;
@@ -184,7 +185,8 @@ fn pending(setup: &Setup<'_>, plan: &ReferencePlan, frame: &FrameContext<'_, '_>
     let region = |u: i32, v: i32| region(setup, mapper, images, u, v);
     Ok(scan.map(|scan| {
         let mut pending = PendingFrame::new(frame.row.frame, frame.row.report.t_world_camera, &scan, input_px, region);
-        pending.picture = plan.drawn.contains(&frame.at).then(|| images.left.clone());
+        let rectified = mapper.rectified_pair().map(|[left, _]| Image::from_view(&left));
+        pending.picture = plan.drawn.contains(&frame.at).then(|| rectified.unwrap_or_else(|| images.left.clone()));
         pending
     }))
 }

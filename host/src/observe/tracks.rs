@@ -121,7 +121,7 @@ impl Observer for TracksObserver {
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
         let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.detected).collect();
         if let Some(truth) = &frame.images.objects {
-            let size = (frame.images.left.width(), frame.images.left.height());
+            let size = setup.dataset.size();
             let large_enough = |pixels: &PixelBox| setup.config.tracking.is_reconstructable(pixels.area(), size.0);
             self.errors.add(&tracks, &frame.row.report.t_world_camera, truth, size, large_enough);
         }

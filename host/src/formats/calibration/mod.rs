@@ -1,9 +1,11 @@
 //! Calibration files of stereo cameras.
 
+mod geometry;
 mod kitti;
 mod plain;
 mod raw;
 
+pub use geometry::{CameraGeometry, FittedGeometry, beside};
 pub use kitti::{KittiCalibration, Projection};
 pub use plain::read_rig;
 pub use raw::{LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M, StereoCalibration, to_toml};

@@ -7,28 +7,29 @@ use super::names::pictures_in;
 use super::pairing::CameraFiles;
 use super::sequence::{ImageFiles, Parts, Sequence, camera_files, present, stamps_in_names};
 use super::stacked::Stacking;
+use crate::formats::calibration::{CameraGeometry, beside};
 use crate::formats::{calibration, picture_size, read_poses, read_times};
 use crate::input::source::InputError;
-use dynvox_core::geometry::StereoRig;
 use std::path::{Path, PathBuf};
 
 /// How far a principal point lies from the middle of an image at most, as a share of its side.
 const CENTRAL: f64 = 0.2;
 
-/// Opens the folder. `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see [`calibration::read_rig`]).
+/// Opens the folder. Without `calib.txt` a calibration of raw images is looked for ([`beside`]). `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see [`calibration::read_rig`]).
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and cam1/, one folder with left_ and right_ before the \
                   names, or both images in one file), and calib.txt with focal_px, center_u_px, center_v_px, baseline_m";
     let file = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
-    let rig = match &options.calibration {
-        Some(given) => calibration::read_rig(given)?,
-        None => calibration::read_rig(&present(path.join("calib.txt"), action)?)?,
+    let cameras = match (options.calibration.as_slice(), file("calib.txt"), beside(path)) {
+        ([], None, Some(own)) => CameraGeometry::read(&own, None)?,
+        ([], ..) => CameraGeometry::Rectified(calibration::read_rig(&present(path.join("calib.txt"), action)?)?),
+        (given, ..) => CameraGeometry::read(given, None)?,
     };
     Sequence::from_parts(Parts {
         name: path.canonicalize().ok().and_then(|full| Some(full.file_name()?.to_string_lossy().into_owned())).unwrap_or("folder".into()),
-        images: images(path, action, options.stacking, &rig)?,
+        images: images(path, action, options.stacking, cameras.center_px())?,
         bits: options.bits,
-        rig,
+        cameras,
         times: file("times.txt").map(|file| read_times(&file).map(|times| (file, times))).transpose()?,
         poses: file("poses.txt").map(|file| read_poses(&file).map(|read| (file, read.poses))).transpose()?,
         numbered: false,
@@ -56,7 +57,7 @@ pub fn describe(path: &Path) -> String {
     }
 }
 
-fn images(path: &Path, action: &str, stacking: Option<Stacking>, rig: &StereoRig) -> Result<ImageFiles, InputError> {
+fn images(path: &Path, action: &str, stacking: Option<Stacking>, center_px: [f64; 2]) -> Result<ImageFiles, InputError> {
     if let Some([left, right]) = side_folders(path) {
         return Ok(ImageFiles::Cameras([camera_in(&present(left, action)?)?, camera_in(&present(right, action)?)?]));
     }
@@ -68,7 +69,7 @@ fn images(path: &Path, action: &str, stacking: Option<Stacking>, rig: &StereoRig
     }
     let stacking = match (stacking, files.first()) {
         (Some(stacking), _) => Some(stacking),
-        (None, Some(first)) => told_stacking(picture_size(first).map_err(InputError::image)?, rig),
+        (None, Some(first)) => told_stacking(picture_size(first).map_err(InputError::image)?, center_px),
         (None, None) => None,
     };
     let stacking = stacking.ok_or_else(|| InputError::OneCamera { path: path.to_path_buf() })?;
@@ -76,10 +77,10 @@ fn images(path: &Path, action: &str, stacking: Option<Stacking>, rig: &StereoRig
 }
 
 /// Two images lie in one where the calibration's principal point is near the middle of a half, and not of the whole.
-fn told_stacking(size: (usize, usize), rig: &StereoRig) -> Option<Stacking> {
+fn told_stacking(size: (usize, usize), [center_u_px, center_v_px]: [f64; 2]) -> Option<Stacking> {
     let central = |(width, height): (usize, usize)| {
         let off = |center_px: f64, side: usize| (center_px / side as f64 - 0.5).abs();
-        off(rig.center_u_px, width) <= CENTRAL && off(rig.center_v_px, height) <= CENTRAL
+        off(center_u_px, width) <= CENTRAL && off(center_v_px, height) <= CENTRAL
     };
     let both = [Stacking::SideBySide, Stacking::TopBottom];
     both.into_iter().find(|stacking| central(stacking.size_of_one(size)) && !central(size))

@@ -1,7 +1,8 @@
 //! Guessing a layout from its path, and saying what was found.
 
 use super::{CameraPair, Stacking, folder, kitti};
-use crate::formats::{FormatError, calibration};
+use crate::formats::FormatError;
+use crate::formats::calibration::CameraGeometry;
 use crate::input::source::{FrameSource, InputError};
 use dynvox_core::geometry::StereoRig;
 use std::path::{Path, PathBuf};
@@ -86,17 +87,17 @@ pub struct OpenOptions {
     pub bits: Option<u32>,
     /// How both images of a pair lie in one file; told from the calibration where it is not said.
     pub stacking: Option<Stacking>,
-    /// Calibration in place of the recording's own.
-    pub calibration: Option<PathBuf>,
+    /// Files of a calibration in place of the recording's own; none for that one.
+    pub calibration: Vec<PathBuf>,
 }
 
 impl OpenOptions {
-    /// The rig of the given calibration, else the recording's own.
+    /// The cameras by the given calibration, else by the recording's own.
     ///
     /// # Errors
     /// Neither can be used.
-    pub fn rig_or(&self, own: impl FnOnce() -> Result<StereoRig, FormatError>) -> Result<StereoRig, FormatError> {
-        self.calibration.as_deref().map_or_else(own, calibration::read_rig)
+    pub fn cameras_or(&self, own: impl FnOnce() -> Result<StereoRig, FormatError>) -> Result<CameraGeometry, FormatError> {
+        if self.calibration.is_empty() { own().map(CameraGeometry::Rectified) } else { CameraGeometry::read(&self.calibration, None) }
     }
 }
 

@@ -4,9 +4,11 @@ use super::lidar::LidarFiles;
 use super::names::{pictures_in, stamp_in_name, stem_of};
 use super::pairing::{CameraFiles, Pairing};
 use super::stacked::Stacking;
+use crate::formats::calibration::{CameraGeometry, FittedGeometry};
 use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
 use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages};
 use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::rectify::Rectification;
 use std::path::{Path, PathBuf};
 
 /// Frames per second where the data set has no times.
@@ -22,10 +24,11 @@ pub struct Sequence {
     pairs: Vec<[PathBuf; 2]>,
     /// How the two images lie in one file, where they do: both paths of a pair are then the same.
     stacking: Option<Stacking>,
-    size: (usize, usize),
+    /// Width and height of the images in the files, px.
+    image_size: (usize, usize),
     /// Significant bits of 16-bit images.
     bits: Option<u32>,
-    rig: StereoRig,
+    geometry: FittedGeometry,
     /// One a frame, ns; `None` where nothing tells them.
     stamps_ns: Option<Vec<u64>>,
     /// Numbers of the frames, by which times are assumed where there are none.
@@ -71,7 +74,7 @@ pub(super) struct Parts {
     pub images: ImageFiles,
     /// Whether this is significant bits of 16-bit images; told from the data otherwise.
     pub bits: Option<u32>,
-    pub rig: StereoRig,
+    pub cameras: CameraGeometry,
     /// Times (ns) and poses as read: one row for each image of the left folder or frame number, or `None` without a file.
     pub times: Option<(PathBuf, Vec<u64>)>,
     pub poses: Option<(PathBuf, Vec<Transform>)>,
@@ -92,7 +95,9 @@ impl Sequence {
         let (pairs, stacking, left, places) = paired(parts.images, &mut notes)?;
         let first = &pairs.first().ok_or_else(|| InputError::Empty { path: PathBuf::from(&parts.name) })?[0];
         let size = picture_size(first).map_err(InputError::image)?;
-        let size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
+        let image_size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
+        let geometry = parts.cameras.fitted(image_size)?;
+        notes.extend(raw_note(&parts.cameras, &geometry));
         let bits = match parts.bits {
             Some(bits) => Some(bits),
             None => told_bits(&pairs, &mut notes)?,
@@ -123,9 +128,9 @@ impl Sequence {
             name: parts.name,
             pairs,
             stacking,
-            size,
+            image_size,
             bits,
-            rig: parts.rig,
+            geometry,
             stamps_ns,
             numbers,
             truth,
@@ -147,13 +152,25 @@ impl Sequence {
             })?,
         };
         for (path, image) in [left, right].into_iter().zip(&images) {
-            let ((found_width, found_height), (width, height)) = ((image.grey.width(), image.grey.height()), self.size);
+            let ((found_width, found_height), (width, height)) = ((image.grey.width(), image.grey.height()), self.image_size);
             if (found_width, found_height) != (width, height) {
                 return Err(InputError::Size { path: path.clone(), found_width, found_height, width, height });
             }
         }
         Ok(images)
     }
+}
+
+/// That images are rectified here, and to what.
+fn raw_note(cameras: &CameraGeometry, geometry: &FittedGeometry) -> Option<String> {
+    let CameraGeometry::Raw { calibration, path } = cameras else { return None };
+    let (width, height) = geometry.size;
+    let focal_px = geometry.rig.focal_px;
+    Some(format!(
+        "raw images: rectified to {width} x {height} px, focal length {focal_px:.1} px, by {} ({})",
+        path.display(),
+        calibration.format
+    ))
 }
 
 /// The pairs, how two images lie in one file, the left camera's files, and the position of each pair's left image among them.
@@ -216,11 +233,15 @@ impl FrameSource for Sequence {
     }
 
     fn size(&self) -> (usize, usize) {
-        self.size
+        self.geometry.size
     }
 
     fn rig(&self) -> StereoRig {
-        self.rig
+        self.geometry.rig
+    }
+
+    fn rectification(&self) -> Option<&Rectification> {
+        self.geometry.rectification.as_ref()
     }
 
     fn stem(&self, index: usize) -> Option<String> {

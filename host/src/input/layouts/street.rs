@@ -7,6 +7,7 @@ use crate::input::source::{
 use crate::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::masks::PixelBox;
+use dynvox_core::rectify::Rectification;
 
 /// Frames of a street.
 pub struct StreetFrames {
@@ -47,6 +48,10 @@ impl FrameSource for StreetFrames {
 
     fn stamp_ns(&self, index: usize) -> Option<u64> {
         Some((self.time_s(index) * 1e9).round() as u64)
+    }
+
+    fn rectification(&self) -> Option<&Rectification> {
+        None
     }
 
     fn time_s(&self, index: usize) -> f64 {

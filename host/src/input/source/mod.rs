@@ -20,6 +20,7 @@ pub use truth::{ObjectsTruth, TrueObject};
 
 use crate::formats::Image;
 use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::rectify::Rectification;
 use std::path::PathBuf;
 
 /// One stereo pair, decoded.
@@ -78,7 +79,7 @@ pub trait FrameSource: Send + Sync {
         self.len() == 0
     }
 
-    /// Width and height of every image, px.
+    /// Width and height of every image as it is mapped, px.
     fn size(&self) -> (usize, usize);
 
     /// The same of the images as they are stored, before any scaling: masks in files have this size.
@@ -98,6 +99,10 @@ pub trait FrameSource: Send + Sync {
 
     /// The rig, equal for all frames.
     fn rig(&self) -> StereoRig;
+
+    /// How the mapper is to rectify raw images; `None` where they come rectified. With one, [`FrameSource::size`] and [`FrameSource::rig`] are
+    /// those of the rectified pair, and a frame's images are raw. Without a default, so that no source laid over another loses it.
+    fn rectification(&self) -> Option<&Rectification>;
 
     /// When a frame was taken, ns since any moment that stays the same; `None` where nothing tells.
     fn stamp_ns(&self, _: usize) -> Option<u64> {

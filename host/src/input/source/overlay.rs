@@ -2,6 +2,7 @@
 
 use super::{AvailableMasks, FrameSource, InputError, LidarScan, StereoImages};
 use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::rectify::Rectification;
 
 /// What is laid over frames.
 pub trait Layer: Send + Sync {
@@ -69,6 +70,10 @@ impl<L: Layer> FrameSource for Overlay<L> {
 
     fn stamp_ns(&self, index: usize) -> Option<u64> {
         self.dataset.stamp_ns(index)
+    }
+
+    fn rectification(&self) -> Option<&Rectification> {
+        self.dataset.rectification()
     }
 
     fn time_s(&self, index: usize) -> f64 {

@@ -3,6 +3,7 @@
 use super::{AvailableMasks, ExactFrame, FrameSource, GivenDepth, InputError, LidarScan, StereoImages};
 use crate::formats::Image;
 use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::rectify::Rectification;
 
 /// Least side of a scaled image, px.
 const LEAST_SIDE_PX: usize = 32;
@@ -15,6 +16,8 @@ pub struct Scaled {
     scale: f64,
     columns: Vec<Span>,
     rows: Vec<Span>,
+    /// Raw images stay as they are: the rectified ones are made smaller.
+    rectification: Option<Rectification>,
     notes: Vec<String>,
 }
 
@@ -34,7 +37,9 @@ impl Scaled {
         }
         let mut notes = inner.notes().to_vec();
         notes.push(format!("images scaled from {width} x {height} to {} x {} px", side(width), side(height)));
+        let rectification = inner.rectification().map(|of| Rectification { width: side(width) as u32, height: side(height) as u32, ..*of });
         Ok(Self {
+            rectification,
             columns: spans(side(width), width, scale),
             rows: spans(side(height), height, scale),
             inner,
@@ -137,12 +142,19 @@ impl FrameSource for Scaled {
         self.inner.stamp_ns(index)
     }
 
+    fn rectification(&self) -> Option<&Rectification> {
+        self.rectification.as_ref()
+    }
+
     fn time_s(&self, index: usize) -> f64 {
         self.inner.time_s(index)
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let frame = self.inner.frame(index)?;
+        if self.rectification.is_some() {
+            return Ok(frame);
+        }
         let (width, height) = self.inner.size();
         let failed = || InputError::Scale { scale: self.scale, width, height, least: LEAST_SIDE_PX };
         let colour = frame.colour.map(|colour| {

@@ -165,7 +165,7 @@ impl<'t> Node<'t> {
     /// A whole number of pixels.
     pub fn pixels(&self) -> Result<u32, FormatError> {
         let number = self.number()?;
-        if number >= 1.0 && number <= 65_535.0 && number.fract() == 0.0 {
+        if is_side(number) {
             Ok(number as u32)
         } else {
             Err(self.refuse(&format!("{} is {number}, which is not a number of pixels", self.key), "Correct the image size"))
@@ -175,8 +175,7 @@ impl<'t> Node<'t> {
     /// Width and height from a list of two.
     pub fn size(&self) -> Result<[u32; 2], FormatError> {
         let [width, height] = self.array()?;
-        let side = |number: f64| number >= 1.0 && number <= 65_535.0 && number.fract() == 0.0;
-        if side(width) && side(height) {
+        if is_side(width) && is_side(height) {
             Ok([width as u32, height as u32])
         } else {
             Err(self.refuse(&format!("{} is not a width and a height", self.key), "Correct the image size"))
@@ -187,4 +186,9 @@ impl<'t> Node<'t> {
     pub fn refuse(&self, reason: &str, action: &str) -> FormatError {
         FormatError::content(self.path, reason, action)
     }
+}
+
+/// Whether an image can be so wide or high, px.
+fn is_side(number: f64) -> bool {
+    (1.0..=65_535.0).contains(&number) && number.fract() == 0.0
 }

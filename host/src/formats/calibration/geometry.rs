@@ -1,0 +1,95 @@
+//! The cameras of a recording, from whichever files say it.
+
+use super::{StereoCalibration, read_rig};
+use crate::formats::{FormatError, read_text};
+use dynvox_core::geometry::StereoRig;
+use dynvox_core::rectify::{Rectification, Sizing};
+use std::path::{Path, PathBuf};
+
+/// Widest and highest image that raw pairs are rectified to: wider and higher ones cost time and show nothing that was not seen.
+const LARGEST_PX: [u32; 2] = [1_920, 1_088];
+
+/// The cameras of a recording.
+#[derive(Clone, Debug)]
+pub enum CameraGeometry {
+    /// Images come rectified.
+    Rectified(StereoRig),
+    /// Images come raw.
+    Raw {
+        /// Lenses and placement.
+        calibration: Box<StereoCalibration>,
+        /// The first file that says so, to name it.
+        path: PathBuf,
+    },
+}
+
+/// The cameras for images of a known size: rig and size of what is mapped.
+#[derive(Clone, Copy, Debug)]
+pub struct FittedGeometry {
+    /// The rectified rig.
+    pub rig: StereoRig,
+    /// Width and height of rectified images, px.
+    pub size: (usize, usize),
+    /// How raw pairs are rectified; `None` where they come so.
+    pub rectification: Option<Rectification>,
+}
+
+impl CameraGeometry {
+    /// Reads a calibration of either kind. `image_size` is the images' where it is known.
+    ///
+    /// # Errors
+    /// See [`StereoCalibration::read`] and [`read_rig`].
+    pub fn read(paths: &[PathBuf], image_size: Option<[u32; 2]>) -> Result<Self, FormatError> {
+        if let [path] = paths
+            && path.extension().is_none_or(|ending| ending == "txt")
+            && !read_text(path)?.contains("P_rect_")
+        {
+            return Ok(Self::Rectified(read_rig(path)?));
+        }
+        let files: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+        let calibration = Box::new(StereoCalibration::read(&files, image_size)?);
+        Ok(Self::Raw { calibration, path: paths.first().cloned().unwrap_or_default() })
+    }
+
+    /// Principal point of the left camera's images, px.
+    pub fn center_px(&self) -> [f64; 2] {
+        match self {
+            Self::Rectified(rig) => [rig.center_u_px, rig.center_v_px],
+            Self::Raw { calibration, .. } => calibration.left.lens.center_px(),
+        }
+    }
+
+    /// What is mapped of images of a size.
+    ///
+    /// # Errors
+    /// A raw calibration is for images of another size.
+    pub fn fitted(&self, size: (usize, usize)) -> Result<FittedGeometry, FormatError> {
+        match self {
+            Self::Rectified(rig) => Ok(FittedGeometry { rig: *rig, size, rectification: None }),
+            Self::Raw { calibration, path } => {
+                calibration.fits(path, [size.0, size.1].map(|side| u32::try_from(side).unwrap_or(u32::MAX)))?;
+                let [max_width, max_height] = LARGEST_PX;
+                let (rectification, rig) = calibration
+                    .rectify(Sizing::Automatic { max_width, max_height })
+                    .map_err(|problem| FormatError::content(path, problem.to_string(), "Check the calibration's numbers"))?;
+                let size = (rectification.width as usize, rectification.height as usize);
+                Ok(FittedGeometry { rig, size, rectification: Some(rectification) })
+            }
+        }
+    }
+}
+
+/// The calibration of a raw pair that lies in a recording's folder: our own `calibration.toml`, Kalibr's `camchain.yaml`, EuRoC's
+/// `sensor.yaml` of each camera, or KITTI raw's `calib_cam_to_cam.txt`, there or a folder up.
+pub fn beside(folder: &Path) -> Option<Vec<PathBuf>> {
+    let one = |path: PathBuf| path.is_file().then(|| vec![path]);
+    let euroc = || {
+        let pair = ["cam0", "cam1"].map(|camera| folder.join(camera).join("sensor.yaml"));
+        pair.iter().all(|path| path.is_file()).then(|| pair.to_vec())
+    };
+    one(folder.join("calibration.toml"))
+        .or_else(|| one(folder.join("camchain.yaml")))
+        .or_else(euroc)
+        .or_else(|| one(folder.join("calib_cam_to_cam.txt")))
+        .or_else(|| one(folder.canonicalize().ok()?.parent()?.join("calib_cam_to_cam.txt")))
+}
