@@ -31,6 +31,17 @@ const KEYS: [u64; LANES] = [
 ];
 
 /// A digest under construction.
+///
+/// ```
+/// use dynvox_core::digest::Digest;
+///
+/// let of = |values: &[u64]| {
+///     let mut digest = Digest::default();
+///     values.iter().for_each(|&value| digest.u64(value));
+///     digest.finish()
+/// };
+/// assert!(of(&[1, 2]) == of(&[1, 2]) && of(&[1, 2]) != of(&[2, 1]));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Digest {
     state: u64,

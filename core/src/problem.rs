@@ -7,6 +7,15 @@ use heapless::Vec;
 pub const MAX_PROBLEMS: usize = 32;
 
 /// One thing wrong with a configuration.
+///
+/// ```
+/// use dynvox_core::view::MeshConfig;
+/// use dynvox_core::Problems;
+///
+/// let mut problems = Problems::new();
+/// MeshConfig { min_weight: 0 }.validate(&mut problems);
+/// assert_eq!(problems[0].to_string(), "mesh.min_weight must be from 1 to 255");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -4,6 +4,14 @@ use crate::state::Visitor;
 
 /// PCG-XSH-RR 64/32 (O'Neill, *PCG: A Family of Simple Fast Space-Efficient Statistically Good Algorithms*, 2014): 8 bytes of state,
 /// integers only.
+///
+/// ```
+/// use dynvox_core::random::Random;
+///
+/// let (mut a, mut b) = (Random::new(7), Random::new(7));
+/// assert_eq!([a.next_u32(), a.next_u32()], [b.next_u32(), b.next_u32()]);
+/// assert!(a.below(6) < 6);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Random {
     state: u64,

@@ -86,7 +86,7 @@ impl From<RaycastError> for DynvoxStatus {
         match error {
             RaycastError::ImageSize => Self::NoFrame,
             RaycastError::Viewpoint => Self::Pose,
-            RaycastError::Object => Self::Unknown,
+            _ => Self::Unknown,
         }
     }
 }

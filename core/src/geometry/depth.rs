@@ -5,6 +5,16 @@ use crate::image::{DISPARITY_ONE_PX, View, ViewMut};
 
 /// Turns disparity (1/256 px, 0 none) into depth in metres, 0 where there is none or it lies outside `near_m..=far_m`.
 /// Images of different sizes are turned as far as both reach.
+///
+/// ```
+/// use dynvox_core::{geometry::{StereoRig, depth_from_disparity}, image::{DISPARITY_ONE_PX, View, ViewMut}};
+///
+/// let rig = StereoRig { focal_px: 200.0, center_u_px: 1.0, center_v_px: 0.0, baseline_m: 0.5 };
+/// let disparity_q8 = [10 * DISPARITY_ONE_PX, 0]; // 10 px, none
+/// let mut depth_m = [0.0; 2];
+/// depth_from_disparity(&rig, 0.5, 20.0, View::new(&disparity_q8, 2, 1).unwrap(), &mut ViewMut::new(&mut depth_m, 2, 1).unwrap());
+/// assert_eq!(depth_m, [10.0, 0.0]);
+/// ```
 pub fn depth_from_disparity(rig: &StereoRig, near_m: f32, far_m: f32, disparity_q8: View<'_, u16>, depth_m: &mut ViewMut<'_, f32>) {
     let scale = (rig.focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX)) as f32;
     let width = depth_m.width();

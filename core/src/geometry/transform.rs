@@ -82,6 +82,13 @@ impl Transform {
     }
 
     /// Undoes the motion.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let t_world_camera = Transform::from_translation([0.0, 0.0, 9.0]);
+    /// assert_eq!(t_world_camera.inverse().transform_point([0.0, 0.0, 10.0]), [0.0, 0.0, 1.0]);
+    /// ```
     #[must_use]
     pub fn inverse(&self) -> Self {
         let ([x, y, z, w], [tx, ty, tz]) = (self.rotation, self.translation_m);
@@ -110,6 +117,13 @@ impl Transform {
     }
 
     /// The upper three rows of the homogeneous matrix: rotation, and translation in the last column, m.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let [first, ..] = Transform::from_translation([4.0, 5.0, 6.0]).matrix_3x4(); // KITTI's first four numbers of a pose
+    /// assert_eq!(first, [1.0, 0.0, 0.0, 4.0]);
+    /// ```
     pub fn matrix_3x4(&self) -> [[f64; 4]; 3] {
         let ([[a, b, c], [d, e, f], [g, h, i]], [x, y, z]) = (self.rotation_matrix(), self.translation_m);
         [[a, b, c, x], [d, e, f, y], [g, h, i, z]]
@@ -133,6 +147,13 @@ impl Transform {
     }
 
     /// Whether the quaternion has length 1, but for what rounding takes from it; `false` where it is not finite.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// assert!(Transform::IDENTITY.is_rotation());
+    /// assert!(!Transform { rotation: [0.0; 4], ..Transform::IDENTITY }.is_rotation());
+    /// ```
     pub fn is_rotation(&self) -> bool {
         let [x, y, z, w] = self.rotation;
         // False for NaN as well.

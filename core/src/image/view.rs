@@ -1,6 +1,15 @@
 //! Row-major image views over borrowed slices.
 
 /// A read-only image. Rows are `stride` items apart.
+///
+/// ```
+/// use dynvox_core::image::View;
+///
+/// let pixels = [1, 2, 3, 4, 5, 6];
+/// let view = View::new(&pixels, 3, 2).unwrap();
+/// assert_eq!((view.get(2, 1), view.get(3, 0), view.row(1)), (Some(6), None, &[4, 5, 6][..]));
+/// assert!(View::new(&pixels, 3, 3).is_none(), "three pixels are missing");
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a, T> {
     data: &'a [T],
@@ -29,11 +38,27 @@ impl<'a, T> View<'a, T> {
     }
 
     /// As [`View::new`] with rows `stride` items apart.
+    ///
+    /// ```
+    /// use dynvox_core::image::View;
+    ///
+    /// let padded = [1, 2, 0, 0, 3, 4];
+    /// let rows: Vec<&[u8]> = View::with_stride(&padded, 2, 2, 4).unwrap().rows().collect();
+    /// assert_eq!(rows, [[1, 2], [3, 4]]);
+    /// ```
     pub fn with_stride(data: &'a [T], width: usize, height: usize, stride: usize) -> Option<Self> {
         (data.len() >= span(width, height, stride)?).then_some(Self { data, width, height, stride })
     }
 
     /// The part of `width` x `height` pixels from (`left`, `top`) on; `None` when it is empty or does not lie within.
+    ///
+    /// ```
+    /// use dynvox_core::image::View;
+    ///
+    /// let pixels: Vec<u8> = (0..12).collect();
+    /// let part = View::new(&pixels, 4, 3).unwrap().part(1, 1, 2, 2).unwrap();
+    /// assert_eq!((part.row(0), part.row(1)), (&[5, 6][..], &[9, 10][..]));
+    /// ```
     pub fn part(&self, left: usize, top: usize, width: usize, height: usize) -> Option<Self> {
         let within = left.checked_add(width)? <= self.width && top.checked_add(height)? <= self.height;
         let first = top.checked_mul(self.stride)?.checked_add(left)?;
@@ -83,6 +108,15 @@ impl<'a, T: Copy> View<'a, T> {
 }
 
 /// A writable image without padding.
+///
+/// ```
+/// use dynvox_core::image::ViewMut;
+///
+/// let mut depths = [0.0; 6];
+/// let mut view = ViewMut::new(&mut depths, 3, 2).unwrap();
+/// view.pixels_mut()[4] = 7.5;
+/// assert_eq!(view.as_view().get(1, 1), Some(7.5));
+/// ```
 #[derive(Debug)]
 pub struct ViewMut<'a, T> {
     data: &'a mut [T],

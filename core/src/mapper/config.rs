@@ -15,6 +15,15 @@ use crate::{
 };
 
 /// Everything a mapper can be told, beside its bounds. Every default stands with its field, in the struct of the stage it belongs to.
+///
+/// ```
+/// use dynvox_core::{Config, geometry::StereoRig};
+///
+/// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let mut config = Config::for_rig(rig);
+/// config.volume.voxel_size_m = 0.1;
+/// assert!(config.validate().is_empty());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// The cameras.
@@ -63,6 +72,16 @@ impl Config {
     }
 
     /// Everything wrong with it; empty when nothing is.
+    ///
+    /// ```
+    /// use dynvox_core::{Config, geometry::StereoRig};
+    ///
+    /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let mut config = Config::for_rig(rig);
+    /// (config.mapper.fuse_every, config.mesh.min_weight) = (0, 0);
+    /// let keys: Vec<_> = config.validate().iter().map(|problem| problem.key).collect();
+    /// assert_eq!(keys, ["mapper.fuse_every", "mesh.min_weight"]);
+    /// ```
     pub fn validate(&self) -> Problems {
         let mut problems = Problems::new();
         let rig = self.rig.validate();

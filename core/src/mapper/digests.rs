@@ -124,6 +124,15 @@ impl StageDigests {
     }
 
     /// The first stage, in the order data flows, whose digest differs from another step's.
+    ///
+    /// ```
+    /// use dynvox_core::{Digested, StageDigests};
+    ///
+    /// let one = StageDigests { disparity: 1, matches: 2, ..StageDigests::default() };
+    /// let other = StageDigests { disparity: 1, matches: 3, ..StageDigests::default() };
+    /// assert_eq!(one.first_difference(&other), Some(Digested::Matches));
+    /// assert_eq!(one.first_difference(&one), None);
+    /// ```
     pub fn first_difference(&self, other: &Self) -> Option<Digested> {
         let stages = [
             (Digested::Input, self.input, other.input),

@@ -9,6 +9,14 @@ pub const MIN_WIDTH: usize = 64;
 pub const MIN_HEIGHT: usize = 32;
 
 /// Why a mapper cannot be made.
+///
+/// ```
+/// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig};
+///
+/// let rig = StereoRig { focal_px: -1.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let error = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut []).unwrap_err();
+/// assert_eq!(error.to_string(), "the configuration cannot be used: rig.focal_px must be a positive number");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -40,6 +48,19 @@ impl fmt::Display for NewError {
 impl core::error::Error for NewError {}
 
 /// Why a frame cannot be taken. The mapper is as it was before.
+///
+/// ```
+/// use dynvox_core::{Capacity, Config, Mapper, Serial, StepError, StereoFrame, geometry::StereoRig, image::View, memory::SLAB_ALIGN};
+///
+/// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
+/// let mut mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
+/// let (pixels, width) = (vec![0; 640 * 192], Capacity::TINY.image_width);
+/// let image = View::new(&pixels, 640, 192).unwrap();
+/// let refusal = mapper.step(&StereoFrame::pair(image, image), &Serial).unwrap_err();
+/// assert!(matches!(refusal, StepError::TooLarge { width: most, .. } if most == width));
+/// # Ok::<(), dynvox_core::NewError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -9,6 +9,15 @@ use crate::{
 
 /// One stereo frame as the core takes it, 8 bit: rectified images of equal sizes, or raw ones for a mapper that rectifies
 /// ([`crate::Config::rectification`]). Classes, disparities and detections belong to the rectified left image in either case.
+///
+/// ```
+/// use dynvox_core::{StereoFrame, geometry::Transform, image::View};
+///
+/// let pixels = [0; 320 * 96];
+/// let image = View::new(&pixels, 320, 96).unwrap();
+/// let frame = StereoFrame { t_world_camera: Some(Transform::IDENTITY), ..StereoFrame::pair(image, image) };
+/// assert!(frame.detections.is_empty() && frame.digest() != StereoFrame::pair(image, image).digest());
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct StereoFrame<'a> {
     /// Left grey image.

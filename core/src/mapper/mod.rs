@@ -43,6 +43,19 @@ use crate::{
 };
 
 /// A stereo mapper in a slab.
+///
+/// ```
+/// use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, geometry::StereoRig, image::View, memory::SLAB_ALIGN};
+///
+/// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
+/// let mut mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
+/// let image = [90; 320 * 96];
+/// let view = View::new(&image, 320, 96).unwrap();
+/// let report = mapper.step(&StereoFrame::pair(view, view), &Serial)?;
+/// assert_eq!((report.frame, mapper.triangles(&mut |_| ())), (0, 0)); // a grey image shows nothing
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Mapper<'s> {
     config: Config,
@@ -66,6 +79,14 @@ pub struct Mapper<'s> {
 
 impl Capacity {
     /// Bytes of slab a mapper of this capacity needs.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, Slab};
+    ///
+    /// const CAPACITY: Capacity = Capacity { image_width: 128, image_height: 64, blocks: 500, ..Capacity::TINY };
+    /// static SLAB: Slab<{ CAPACITY.bytes() }> = Slab::ZERO; // a constant: known when the program is compiled
+    /// assert_eq!(SLAB.len(), CAPACITY.bytes());
+    /// ```
     pub const fn bytes(&self) -> usize {
         StereoMatcher::bytes(self)
             + FlowMatcher::bytes(self)
@@ -80,6 +101,14 @@ impl Capacity {
     }
 
     /// Every region a mapper of this capacity cuts out of its slab.
+    ///
+    /// ```
+    /// use dynvox_core::Capacity;
+    ///
+    /// let footprint = Capacity::SMALL.footprint();
+    /// let largest = footprint.regions().iter().max_by_key(|region| region.bytes).unwrap();
+    /// assert!(largest.name.starts_with("volume.") && footprint.bytes() == Capacity::SMALL.bytes());
+    /// ```
     pub fn footprint(&self) -> Footprint {
         let mut carver = Carver::without_slab();
         // Regions depend on the capacity alone: any rig will do.

@@ -12,6 +12,20 @@ use crate::{
 
 impl<'s> Mapper<'s> {
     /// Looks at the static map from a pose, at the size of the frames taken so far. Before the first frame there is no size to look at.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform}, image::View, memory::SLAB_ALIGN};
+    ///
+    /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
+    /// let mut mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
+    /// assert!(mapper.raycast(&Transform::IDENTITY, &Serial).is_err(), "no frame, no image size");
+    /// let image = View::new(&[90; 320 * 96], 320, 96).unwrap();
+    /// mapper.step(&StereoFrame::pair(image, image), &Serial)?;
+    /// let view = mapper.raycast(&Transform::IDENTITY, &Serial)?;
+    /// assert!(view.depth_m().unwrap().pixels().iter().all(|&depth_m| depth_m == 0.0), "an empty map");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn raycast<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(t_world_camera)?;
         executor.stage(Stage::Raycast, || self.raycaster.cast(&self.background, &view, executor))?;

@@ -13,6 +13,13 @@ use crate::{
 };
 
 /// How much a step's events matter.
+///
+/// ```
+/// use dynvox_core::Severity;
+///
+/// assert!(Severity::MapAffected > Severity::Recovered && Severity::Recovered > Severity::Info);
+/// assert_eq!(Severity::MapAffected.name(), "map affected");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// Nothing to say.

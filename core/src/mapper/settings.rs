@@ -14,6 +14,15 @@ pub enum MotionSource {
 }
 
 /// What the loop can be told.
+///
+/// ```
+/// use dynvox_core::{Config, MotionSource, geometry::StereoRig};
+///
+/// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let mut config = Config::for_rig(rig);
+/// (config.mapper.egomotion, config.mapper.fuse_every) = (MotionSource::Icp, 2);
+/// assert!(config.validate().is_empty());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct MapperConfig {

@@ -88,6 +88,23 @@ impl<'s> Mapper<'s> {
     ///
     /// # Errors
     /// The sink's first one; what it took until then is not a snapshot.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
+    /// use std::io::{Error, Read};
+    ///
+    /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let (capacity, config) = (Capacity::TINY, Config::for_rig(rig));
+    /// let [mut first, mut second] = [0, 1].map(|_| vec![0; capacity.bytes() + SLAB_ALIGN]);
+    /// let mut bytes = Vec::new();
+    /// Mapper::new(&capacity, &config, &mut first)?.save(&mut |piece: &[u8]| {
+    ///     bytes.extend_from_slice(piece);
+    ///     Ok::<(), Error>(())
+    /// })?;
+    /// let mut file = &bytes[..];
+    /// let restored = Mapper::restore(&capacity, &config, &mut second, &mut |piece: &mut [u8]| file.read_exact(piece))?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn save<E>(&mut self, sink: &mut impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
         let mut writer = Writer::new(sink);
         let (mut magic, mut version) = (MAGIC, VERSION);

@@ -4,6 +4,14 @@ use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
 /// A box of pixels: it holds columns `left .. left + width` and rows `top .. top + height`. It may lie partly or wholly beside the image.
+///
+/// ```
+/// use dynvox_core::masks::PixelBox;
+///
+/// let car = PixelBox { left: 10, top: 20, width: 40, height: 30 };
+/// assert!(car.contains(10, 20) && !car.contains(50, 20));
+/// assert_eq!((car.area(), car.overlap(&car)), (1_200, 1.0));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]

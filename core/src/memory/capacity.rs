@@ -1,6 +1,13 @@
 //! Every bound of the mapper, in one table.
 
 /// All bounds. Bytes follow from them alone, at compile time.
+///
+/// ```
+/// use dynvox_core::Capacity;
+///
+/// let larger = Capacity { blocks: 5_000, ..Capacity::TINY };
+/// assert!(Capacity::TINY.bytes() < 8 << 20 && larger.bytes() > Capacity::TINY.bytes());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capacity {
     /// Widest image, px. A wider frame is refused.

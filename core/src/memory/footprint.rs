@@ -19,6 +19,14 @@ pub struct Region {
 }
 
 /// The list of all regions, in slab order.
+///
+/// ```
+/// use dynvox_core::Capacity;
+///
+/// for region in Capacity::TINY.footprint().regions() {
+///     println!("{:24} {:>9} bytes, at most {:>9} used", region.name, region.bytes, region.peak);
+/// }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Footprint {
     regions: Vec<Region, MAX_REGIONS>,
@@ -40,6 +48,14 @@ impl Footprint {
     }
 
     /// The region of that name.
+    ///
+    /// ```
+    /// use dynvox_core::Capacity;
+    ///
+    /// let footprint = Capacity::TINY.footprint();
+    /// assert_eq!(footprint.region("depth_m").unwrap().bytes, 4 * Capacity::TINY.pixels());
+    /// assert!(footprint.region("unknown").is_none());
+    /// ```
     pub fn region(&self, name: &str) -> Option<&Region> {
         self.regions.iter().find(|region| region.name == name)
     }

@@ -86,6 +86,10 @@ impl fmt::Display for SlabError {
 impl core::error::Error for SlabError {}
 
 /// Bytes that `count` items of `T` occupy in the slab: their size, rounded up to [`SLAB_ALIGN`].
+///
+/// ```
+/// assert_eq!(dynvox_core::memory::region_bytes::<u16>(33), 128);
+/// ```
 pub const fn region_bytes<T>(count: usize) -> usize {
     (count * size_of::<T>()).next_multiple_of(SLAB_ALIGN)
 }
@@ -94,6 +98,19 @@ pub const fn region_bytes<T>(count: usize) -> usize {
 ///
 /// A single allocation returns no error: from the first failure on every region is empty, and [`Carver::check`] returns the
 /// failure. So a stage is built of its regions without a `Result` at each, which would be a copy of the stage on the stack.
+///
+/// ```
+/// use dynvox_core::memory::{Carver, SLAB_ALIGN, region_bytes};
+///
+/// let bytes = region_bytes::<u16>(100) + region_bytes::<f32>(10);
+/// let mut slab = vec![0; bytes + SLAB_ALIGN];
+/// let mut carver = Carver::new(&mut slab, bytes)?;
+/// let disparity: &mut [u16] = carver.alloc("disparity", 100);
+/// let depth_m: &mut [f32] = carver.alloc("depth_m", 10);
+/// carver.check()?; // once, after all of them
+/// assert_eq!((disparity.len(), depth_m.len(), carver.footprint().bytes()), (100, 10, bytes));
+/// # Ok::<(), dynvox_core::memory::SlabError>(())
+/// ```
 #[derive(Debug)]
 pub struct Carver<'s> {
     /// What is not allocated yet; `None` without a slab.
@@ -168,6 +185,14 @@ impl<'s> Carver<'s> {
     }
 
     /// Records all that `alloc` allocates as one region: for arrays of stages, whose regions would have too many names.
+    ///
+    /// ```
+    /// use dynvox_core::memory::Carver;
+    ///
+    /// let mut carver = Carver::without_slab();
+    /// carver.group("volumes", |carver| (carver.alloc::<u8>("a", 64).len(), carver.alloc::<u8>("b", 64).len()));
+    /// assert_eq!(carver.footprint().region("volumes").unwrap().bytes, 128);
+    /// ```
     pub fn group<R>(&mut self, name: &'static str, alloc: impl FnOnce(&mut Self) -> R) -> R {
         self.name = Some(name);
         let made = alloc(self);

@@ -11,6 +11,31 @@ pub use bands::{BANDS, Bands, each, zip2, zip3};
 pub use stage::Stage;
 
 /// Runs work for the core.
+///
+/// ```
+/// use dynvox_core::{Executor, Stage};
+///
+/// /// Runs halves on two threads.
+/// struct TwoThreads;
+///
+/// impl Executor for TwoThreads {
+///     fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
+///     where
+///         A: FnOnce() -> RA + Send,
+///         B: FnOnce() -> RB + Send,
+///         RA: Send,
+///         RB: Send,
+///     {
+///         std::thread::scope(|scope| {
+///             let b = scope.spawn(b);
+///             (a(), b.join().unwrap())
+///         })
+///     }
+/// }
+///
+/// assert_eq!(TwoThreads.join(|| 1, || 2), (1, 2));
+/// assert_eq!(TwoThreads.stage(Stage::Fuse, || 3), 3);
+/// ```
 pub trait Executor: Sync {
     /// Does both and returns both results, in any order or at once; one after the other unless an executor knows better.
     fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)

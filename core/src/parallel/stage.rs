@@ -1,6 +1,11 @@
 //! Names of the stages.
 
 /// A stage of the pipeline, as a name for measurements.
+///
+/// ```
+/// let names: Vec<_> = dynvox_core::Stage::ALL.map(|stage| stage.name()).into();
+/// assert!(names.contains(&"stereo") && names.contains(&"fuse"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Raw pair to rectified pair.

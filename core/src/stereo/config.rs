@@ -12,6 +12,14 @@ pub const MIN_GRID_SIZE: usize = 10;
 pub const MAX_PLANE_RADIUS: usize = 16;
 
 /// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving; [`Default`] is DynSLAM's, which fills wider gaps.
+///
+/// ```
+/// use dynvox_core::stereo::StereoConfig;
+///
+/// let mut problems = dynvox_core::Problems::new();
+/// StereoConfig::default().validate(&mut problems);
+/// assert!(problems.is_empty());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct StereoConfig {

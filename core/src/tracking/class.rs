@@ -105,6 +105,13 @@ impl Class {
     ];
 
     /// The class a data set means by a name, whatever its case; `None` for a name nobody knows.
+    ///
+    /// ```
+    /// use dynvox_core::tracking::Class;
+    ///
+    /// assert_eq!(Class::from_name("Pedestrian"), Some(Class::Person));
+    /// assert_eq!(Class::from_name("unicorn"), None);
+    /// ```
     pub fn from_name(name: &str) -> Option<Self> {
         let name = name.trim();
         NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|&(_, class)| class)

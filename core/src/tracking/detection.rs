@@ -7,6 +7,14 @@ use crate::digest::Digest;
 pub const MAX_DETECTIONS: usize = 64;
 
 /// An instance a detector found in the left image.
+///
+/// ```
+/// use dynvox_core::tracking::{Class, Detection};
+///
+/// let mask = [1; 60 * 40]; // every pixel of the box
+/// let car = Detection { class: Class::Car, score: 0.9, left: 100, top: 30, width: 60, height: 40, mask: &mask };
+/// assert_eq!(car.digest(), Detection { ..car }.digest());
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Detection<'a> {
     /// The class the detector gives it.

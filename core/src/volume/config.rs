@@ -28,6 +28,15 @@ pub enum WhenFull {
 }
 
 /// Parameters of the map. Defaults are the original's published ones.
+///
+/// ```
+/// use dynvox_core::volume::VolumeConfig;
+///
+/// let coarse = VolumeConfig { voxel_size_m: 0.1, far_m: 30.0, ..VolumeConfig::default() };
+/// let mut problems = dynvox_core::Problems::new();
+/// coarse.validate(&mut problems);
+/// assert!(problems.is_empty());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct VolumeConfig {

@@ -3,6 +3,14 @@
 use crate::problem::{Problems, require};
 
 /// Parameters of the raycast.
+///
+/// ```
+/// use dynvox_core::view::RaycastConfig;
+///
+/// let mut problems = dynvox_core::Problems::new();
+/// RaycastConfig { near_m: 5.0, far_m: 2.0, ..RaycastConfig::default() }.validate(&mut problems);
+/// assert_eq!(problems[0].key, "raycast.far_m");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct RaycastConfig {

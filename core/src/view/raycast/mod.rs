@@ -38,6 +38,7 @@ use crate::{
     parallel::{Executor, each},
     volume::{Slot, Viewpoint, Volume},
 };
+use core::fmt;
 use eye::Eye;
 use march::Marcher;
 use ranges::Ranges;
@@ -46,16 +47,30 @@ use surface::Surface;
 /// Units of a normal's components: ±127 is ±1.
 pub const NORMAL_ONE: f32 = 127.0;
 
-/// Why there is no picture.
+/// Why a view cannot be rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum RaycastError {
     /// The image is empty or larger than the capacity's.
     ImageSize,
-    /// The pose is not finite or lies beyond the map, or the rig is absurd.
+    /// The pose is not finite or lies beyond the map, or the rig is invalid.
     Viewpoint,
-    /// No such object is in the world now.
+    /// The object has no pose now.
     Object,
 }
+
+impl fmt::Display for RaycastError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ImageSize => "the image is empty, or larger than the capacity's",
+            Self::Viewpoint => "the pose is not finite or lies beyond the map",
+            Self::Object => "the object has no pose now",
+        })
+    }
+}
+
+impl core::error::Error for RaycastError {}
 
 /// What a picture is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
