@@ -24,8 +24,8 @@ pub struct KittiCalibration {
 }
 
 impl KittiCalibration {
-    /// Reads lines `P0: 12 numbers`, or bare lines of 12 numbers for P0, P1, ... in order; `Tr:` and `R0_rect:` by their several names.
-    /// Other lines are passed over.
+    /// Reads lines `P0: 12 numbers`, or bare lines of 12 numbers for P0, P1, ... in order; `P_rect_00:` is another name of P0,
+    /// `Tr:` and `R0_rect:` have several. Other lines are passed over.
     pub fn read(path: &Path) -> Result<Self, FormatError> {
         Self::parse(&read_text(path)?, path)
     }
@@ -42,14 +42,14 @@ impl KittiCalibration {
                     lidar = numbers(line);
                     continue;
                 }
-                "R_rect" | "R0_rect" => {
+                "R_rect" | "R0_rect" | "R_rect_00" => {
                     rectifying = numbers(line);
                     continue;
                 }
-                "P0" => 0,
-                "P1" => 1,
-                "P2" => 2,
-                "P3" => 3,
+                "P0" | "P_rect_00" => 0,
+                "P1" | "P_rect_01" => 1,
+                "P2" | "P_rect_02" => 2,
+                "P3" | "P_rect_03" => 3,
                 other if other.parse::<f64>().is_ok() => {
                     bare += 1;
                     bare - 1

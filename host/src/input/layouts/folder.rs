@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 /// How far a principal point lies from the middle of an image at most, as a share of its side.
 const CENTRAL: f64 = 0.2;
 
-/// Opens the folder. Without `calib.txt` a calibration of raw images is looked for ([`beside`]). `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see [`calibration::read_rig`]).
+/// Opens the folder. `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see [`calibration::read_rig`]); without it a calibration of
+/// raw images is looked for ([`beside`]).
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and cam1/, one folder with left_ and right_ before the \
                   names, or both images in one file), and calib.txt with focal_px, center_u_px, center_v_px, baseline_m";
@@ -26,7 +27,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
         (given, ..) => CameraGeometry::read(given, None)?,
     };
     Sequence::from_parts(Parts {
-        name: path.canonicalize().ok().and_then(|full| Some(full.file_name()?.to_string_lossy().into_owned())).unwrap_or("folder".into()),
+        name: name_of(path),
         images: images(path, action, options.stacking, cameras.center_px())?,
         bits: options.bits,
         cameras,
@@ -38,6 +39,11 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
         objects: Vec::new(),
         lidar: None,
     })
+}
+
+/// The name of a folder, whatever way it was reached.
+pub fn name_of(path: &Path) -> String {
+    path.canonicalize().ok().and_then(|full| Some(full.file_name()?.to_string_lossy().into_owned())).unwrap_or("folder".into())
 }
 
 /// Whether the folder has this layout.

@@ -166,7 +166,8 @@ fn odometry_poses(folder: &Path, number: &str) -> Option<PathBuf> {
     beside.into_iter().chain([folder.join("poses.txt")]).find(|path| path.is_file())
 }
 
-fn chosen(root: &Path, wanted: Option<&str>, names: &[String]) -> Result<String, InputError> {
+/// The sequence that is asked for, or the only one.
+pub fn chosen(root: &Path, wanted: Option<&str>, names: &[String]) -> Result<String, InputError> {
     let known = names.join(", ");
     match (wanted, names) {
         (Some(wanted), _) if names.iter().any(|name| name == wanted) => Ok(wanted.to_owned()),

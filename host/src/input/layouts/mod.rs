@@ -1,8 +1,12 @@
-//! Recordings, by how they lie on the disk: KITTI odometry and tracking, a plain stereo folder; and the synthetic street.
+//! Recordings, by how they lie on the disk: KITTI odometry, tracking and raw, KITTI-360, Cityscapes, EuRoC
+//! and TUM VI, any folders of images; and the synthetic street.
 
 mod camera_folders;
+mod cityscapes;
+mod euroc;
 mod folder;
 mod kitti;
+mod kitti_raw;
 mod labels;
 mod lidar;
 mod names;

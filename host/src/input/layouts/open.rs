@@ -1,6 +1,6 @@
 //! Guessing a layout from its path, and saying what was found.
 
-use super::{CameraPair, Stacking, folder, kitti};
+use super::{CameraPair, Stacking, cityscapes, euroc, folder, kitti, kitti_raw};
 use crate::formats::FormatError;
 use crate::formats::calibration::CameraGeometry;
 use crate::input::source::{FrameSource, InputError};
@@ -20,6 +20,15 @@ pub enum Layout {
     KittiOdometry,
     /// KITTI tracking: `training/{image_02,image_03}/NNNN`, `training/calib/NNNN.txt`.
     KittiTracking,
+    /// KITTI raw: `DAY/DRIVE_sync/{image_00,image_01}/data`, `DAY/calib_cam_to_cam.txt`.
+    KittiRaw,
+    /// KITTI-360: `data_2d_raw/DRIVE/{image_00,image_01}/data_rect`, `calibration/perspective.txt`.
+    #[value(name = "kitti-360")]
+    Kitti360,
+    /// Cityscapes: `leftImg8bit_sequence`, `rightImg8bit_sequence`, `camera`.
+    Cityscapes,
+    /// EuRoC and TUM VI: `mav0/{cam0,cam1}/data`, `data.csv`.
+    Euroc,
     /// Two folders of images, one with prefixes or suffixes, or images that hold both cameras; and `calib.txt`.
     Folder,
 }
@@ -30,6 +39,10 @@ impl Layout {
         match self {
             Self::KittiOdometry => "kitti-odometry",
             Self::KittiTracking => "kitti-tracking",
+            Self::KittiRaw => "kitti-raw",
+            Self::Kitti360 => "kitti-360",
+            Self::Cityscapes => "cityscapes",
+            Self::Euroc => "euroc",
             Self::Folder => "folder",
         }
     }
@@ -39,6 +52,10 @@ impl Layout {
         match self {
             Self::KittiOdometry => "KITTI odometry: image_0 to image_3 of each sequence".to_owned(),
             Self::KittiTracking => "KITTI tracking: image_02 and image_03 of each sequence".to_owned(),
+            Self::KittiRaw => "KITTI raw: image_00 to image_03 of each drive, times of timestamps.txt".to_owned(),
+            Self::Kitti360 => "KITTI-360: image_00 and image_01 of each drive, times of timestamps.txt".to_owned(),
+            Self::Cityscapes => "Cityscapes: left and right images of each sequence".to_owned(),
+            Self::Euroc => "EuRoC or TUM VI: mav0/cam0 and mav0/cam1, times of data.csv".to_owned(),
             Self::Folder => folder::describe(path),
         }
     }
@@ -66,6 +83,14 @@ impl Layout {
     fn of(path: &Path) -> Option<Self> {
         if kitti::odometry_root(path).is_some() || kitti::is_odometry_sequence(path) {
             Some(Self::KittiOdometry)
+        } else if cityscapes::left_root(path).is_some() {
+            Some(Self::Cityscapes)
+        } else if euroc::sensors_of(path).is_some() {
+            Some(Self::Euroc)
+        } else if kitti_raw::drives_360(path).is_some() || kitti_raw::is_drive_360(path) {
+            Some(Self::Kitti360)
+        } else if kitti_raw::is_drive(path) || kitti_raw::drives(path).is_ok_and(|drives| !drives.is_empty()) {
+            Some(Self::KittiRaw)
         } else if kitti::tracking_split(path).is_some() {
             Some(Self::KittiTracking)
         } else {
@@ -113,6 +138,10 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>, 
     Ok(match layout {
         Layout::KittiOdometry => Box::new(kitti::open_odometry(path, options)?),
         Layout::KittiTracking => Box::new(kitti::open_tracking(path, options)?),
+        Layout::KittiRaw => Box::new(kitti_raw::open_raw(path, options)?),
+        Layout::Kitti360 => Box::new(kitti_raw::open_360(path, options)?),
+        Layout::Cityscapes => Box::new(cityscapes::open(path, options)?),
+        Layout::Euroc => Box::new(euroc::open(path, options)?),
         Layout::Folder => Box::new(folder::open(path, options)?),
     })
 }
@@ -130,7 +159,11 @@ pub fn sequences_at(path: &Path, layout: Layout) -> Result<Vec<String>, InputErr
     match layout {
         Layout::KittiOdometry => kitti::odometry_root(path).map_or(Ok(Vec::new()), |root| kitti::sequences(&root)),
         Layout::KittiTracking => kitti::tracking_split(path).map_or(Ok(Vec::new()), |split| kitti::tracking_sequences(&split)),
-        Layout::Folder => Ok(Vec::new()),
+        Layout::KittiRaw if kitti_raw::is_drive(path) => Ok(Vec::new()),
+        Layout::KittiRaw => kitti_raw::drives(path),
+        Layout::Kitti360 => kitti_raw::drives_360(path).map_or(Ok(Vec::new()), |drives| kitti::sequences(&drives)),
+        Layout::Cityscapes => cityscapes::names(path),
+        Layout::Euroc | Layout::Folder => Ok(Vec::new()),
     }
 }
 

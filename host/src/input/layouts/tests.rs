@@ -328,3 +328,91 @@ fn images_of_one_camera_are_refused_unless_said_to_hold_both() {
     let options = OpenOptions { stacking: Some(Stacking::SideBySide), ..OpenOptions::default() };
     assert_eq!(open(root.path(), &options).unwrap().size(), (20, 32));
 }
+
+/// Four frames at 20 Hz in the layouts of other data sets, each with its own calibration and times.
+#[test]
+fn one_recording_dressed_as_each_data_set_gives_the_same_frames_rig_and_times() {
+    let each = |dress: &dyn Fn(u32, [GrayImage; 2])| (0..4).for_each(|at| dress(at, pair(at)));
+    let rect = CALIB.replace("P0", "P_rect_00").replace("P1", "P_rect_01").replace("P2", "P_rect_02").replace("P3", "P_rect_03");
+    let dates: String = (0..4).map(|at| format!("2011-09-26 13:02:25.{:09}\n", at * 50_000_000)).collect();
+    let start_ns: u64 = 1_317_042_145_000_000_000;
+    let write = |path: PathBuf, text: &str| {
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    };
+    let dress = |layout: Layout, root: &Path| match layout {
+        Layout::KittiRaw => {
+            let drive = root.join("2011_09_26_drive_0001_sync");
+            write(root.join("calib_cam_to_cam.txt"), &format!("calib_time: 09-Jan-2012\nS_rect_00: 40 32\n{rect}"));
+            each(&|at, [l, r]| {
+                save(&l, drive.join(format!("image_00/data/{at:010}.png")));
+                save(&r, drive.join(format!("image_01/data/{at:010}.png")));
+            });
+            ["image_00", "image_01"].iter().for_each(|camera| write(drive.join(camera).join("timestamps.txt"), &dates));
+        }
+        Layout::Kitti360 => {
+            let drive = root.join("data_2d_raw/2013_05_28_drive_0000_sync");
+            write(root.join("calibration/perspective.txt"), &rect);
+            each(&|at, [l, r]| {
+                save(&l, drive.join(format!("image_00/data_rect/{at:010}.png")));
+                save(&r, drive.join(format!("image_01/data_rect/{at:010}.png")));
+            });
+            ["image_00", "image_01"].iter().for_each(|camera| write(drive.join(camera).join("timestamps.txt"), &dates));
+        }
+        Layout::Cityscapes => {
+            let camera = r#"{"extrinsic": {"baseline": 0.5, "x": 1.7}, "intrinsic": {"fx": 50, "fy": 50.1, "u0": 20, "v0": 16}}"#;
+            write(root.join("camera/train/aachen/aachen_000001_000002_camera.json"), camera);
+            each(&|at, [l, r]| {
+                save(&l, root.join(format!("leftImg8bit_sequence/train/aachen/aachen_000001_{at:06}_leftImg8bit.png")));
+                save(&r, root.join(format!("rightImg8bit_sequence/train/aachen/aachen_000001_{at:06}_rightImg8bit.png")));
+            });
+        }
+        _ => {
+            write(root.join("mav0/calib.txt"), CALIB);
+            let table = |late: u64| {
+                let row = |at: u64| format!("{},{at}.png\r\n", start_ns + at * 50_000_000 + late);
+                format!("#timestamp [ns],filename\r\n{}", (0..4).map(row).collect::<String>())
+            };
+            each(&|at, [l, r]| {
+                save(&l, root.join(format!("mav0/cam0/data/{at}.png")));
+                save(&r, root.join(format!("mav0/cam1/data/{at}.png")));
+            });
+            write(root.join("mav0/cam0/data.csv"), &table(0));
+            write(root.join("mav0/cam1/data.csv"), &table(1_000_000));
+        }
+    };
+    for layout in [Layout::KittiRaw, Layout::Kitti360, Layout::Cityscapes, Layout::Euroc] {
+        let root = TempDir::new().unwrap();
+        dress(layout, root.path());
+        assert_eq!(Layout::guess(root.path()).unwrap(), layout);
+        let (found, sequences) = survey(root.path(), None).unwrap();
+        assert_eq!((found, sequences.len()), (layout, 1), "{layout:?}");
+        let dataset = open(root.path(), &OpenOptions::default()).unwrap_or_else(|error| panic!("{layout:?}: {error}"));
+        assert_eq!(
+            (dataset.len(), dataset.size(), dataset.rig().focal_px, dataset.rig().baseline_m),
+            (4, (40, 32), 50.0, 0.5),
+            "{layout:?}"
+        );
+        for at in 0..4 {
+            let frame = dataset.frame(at).unwrap();
+            let expected = pair(at as u32).map(|image| image.into_raw());
+            assert_eq!([frame.left.pixels(), frame.right.pixels()], expected.each_ref().map(Vec::as_slice), "{layout:?} frame {at}");
+            let ns = if layout == Layout::Cityscapes { at as u64 * 1_000_000_000 / 17 } else { start_ns + at as u64 * 50_000_000 };
+            assert_eq!(dataset.stamp_ns(at), Some(ns), "{layout:?} frame {at}");
+        }
+    }
+}
+
+#[test]
+fn recordings_as_the_lenses_drew_them_are_refused_unless_a_calibration_says_otherwise() {
+    let root = TempDir::new().unwrap();
+    (0..2).for_each(|at| {
+        for (side, image) in ["cam0", "cam1"].iter().zip(pair(at)) {
+            save(&image, root.path().join(format!("mav0/{side}/data/{at}.png")));
+        }
+    });
+    assert!(refusal(root.path(), None).contains("are raw, and no calibration of their lenses"));
+    let calibration = root.path().join("mine.txt");
+    fs::write(&calibration, CALIB).unwrap();
+    assert_eq!(open(root.path(), &OpenOptions { calibration: vec![calibration], ..OpenOptions::default() }).unwrap().len(), 2);
+}

@@ -16,7 +16,7 @@ pub enum InputError {
     /// No known layout.
     #[error(
         "the layout of {path} is unknown. Known are KITTI odometry (sequences/NN/image_0), KITTI tracking \
-         (training/image_02/NNNN), two folders of images (left/ and right/, cam0/ and cam1/, infra1/ and infra2/, ...), and one folder of images \
+         (training/image_02/NNNN), KITTI raw, KITTI-360, Cityscapes, EuRoC and TUM VI (mav0/cam0), two folders of images (left/ and right/, cam0/ and cam1/, infra1/ and infra2/, ...), and one folder of images \
          with calib.txt; --dataset says which one is meant{}",
         hint(below)
     )]
@@ -78,6 +78,15 @@ pub enum InputError {
         right: PathBuf,
         /// Images of each side.
         counts: (usize, usize),
+    },
+    /// Images as the lenses drew them.
+    #[error(
+        "the images of {path} are raw, and no calibration of their lenses is beside them. Put cam0/sensor.yaml and cam1/sensor.yaml there, or name \
+         the files with --calibration, once for each; if the images were rectified, their calibration as calib.txt"
+    )]
+    Unrectified {
+        /// The recording.
+        path: PathBuf,
     },
     /// One image a frame, of one camera.
     #[error(

@@ -1,0 +1,46 @@
+//! EuRoC's layout, which TUM VI shares: `mav0/cam0/data`, `mav0/cam1/data`, and `data.csv` with the time stamp of each image.
+
+use super::OpenOptions;
+use super::camera_folders::camera_in;
+use super::sequence::{ImageFiles, Parts, Sequence, present};
+use crate::formats::calibration::{CameraGeometry, beside};
+use crate::input::source::InputError;
+use std::path::{Path, PathBuf};
+
+/// Folder of all sensors.
+const SENSORS: &str = "mav0";
+
+/// Opens the recording. `path` is its root or `mav0` in it.
+pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+    let sensors = sensors_of(path).ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
+    let action = "A recording of EuRoC or TUM VI has mav0/cam0 and mav0/cam1: fetch the other half";
+    let cameras = [camera_in(&present(sensors.join("cam0"), action)?)?, camera_in(&present(sensors.join("cam1"), action)?)?];
+    // The recordings are raw, with a calibration of each camera; a calib.txt says that they were rectified since.
+    let rectified = [sensors.join("calib.txt"), path.join("calib.txt")].into_iter().find(|file| file.is_file());
+    let cameras_from = match (options.calibration.is_empty(), rectified) {
+        (false, _) => options.calibration.clone(),
+        (true, Some(file)) => vec![file],
+        (true, None) => beside(&sensors).ok_or_else(|| InputError::Unrectified { path: path.to_path_buf() })?,
+    };
+    let root = sensors.parent().filter(|root| *root != Path::new("")).unwrap_or(&sensors);
+    Sequence::from_parts(Parts {
+        name: super::folder::name_of(root),
+        images: ImageFiles::Cameras(cameras),
+        bits: options.bits,
+        cameras: CameraGeometry::read(&cameras_from, None)?,
+        times: None,
+        poses: None,
+        numbered: false,
+        notes: Vec::new(),
+        instances: path.join("instances"),
+        objects: Vec::new(),
+        lidar: None,
+    })
+}
+
+/// The folder of the sensors, if there is one with a camera.
+pub fn sensors_of(path: &Path) -> Option<PathBuf> {
+    let is_mav = path.file_name().is_some_and(|name| name == SENSORS);
+    let sensors = if is_mav { path.to_path_buf() } else { path.join(SENSORS) };
+    sensors.join("cam0").is_dir().then_some(sensors)
+}
