@@ -100,7 +100,7 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
     assert!(
         said(&run).contains("do not fit profile tiny") && said(&run).contains("--profile small, or shrink the images with --scale 0.5")
     );
-    assert!(said(&run).contains("desktop") && said(&run).contains("drive, s"), "the table is shown");
+    assert!(said(&run).contains("desktop") && said(&run).contains("path, s"), "the table is shown");
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--scale", "0.5", "--quiet"]);
     assert!(run.status.success(), "black images are a value, not a failure: {}", said(&run));
 }
@@ -420,7 +420,7 @@ fn files_are_evaluated_without_a_run() {
     let told = String::from_utf8(dynvox(root.path(), &["inspect", "set"]).stdout).unwrap();
     assert!(told.contains("kitti-2015, 1 pairs") && told.contains("dynvox evaluate stereo set"), "{told}");
     let refused = dynvox(root.path(), &["evaluate", "stereo", "rig"]);
-    assert!(!refused.status.success() && said(&refused).contains("is no stereo benchmark"), "{}", said(&refused));
+    assert!(!refused.status.success() && said(&refused).contains("is not a stereo benchmark"), "{}", said(&refused));
     // A run's folder against its own poses in the other format.
     let small = ["--set", "street.width=160", "--set", "street.height=64", "--set", "street.frames=3"];
     json(&[&["run", "--profile", "tiny", "--out", "run", "--json"], &small[..]].concat());
@@ -428,4 +428,31 @@ fn files_are_evaluated_without_a_run() {
     assert!(same["ate_m"].as_f64().unwrap() < 1e-9 && same["rpe_r_deg"].as_f64().unwrap() < 1e-6, "{same}");
     let refused = dynvox(root.path(), &["evaluate", "trajectory", "run", "rig/calib.txt"]);
     assert!(!refused.status.success() && said(&refused).contains("line 1 is not a pose"), "{}", said(&refused));
+}
+
+#[test]
+fn a_closed_pipe_or_a_full_device_is_an_error_and_no_panic() {
+    let root = TempDir::new().unwrap();
+    for (device, sentence) in [("/dev/full", "standard output cannot be written"), ("/dev/null", "")] {
+        let Ok(device) = fs::OpenOptions::new().write(true).open(device) else { continue };
+        let args = ["budget", "--json"];
+        let run =
+            std::process::Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(root.path()).stdout(device).output().unwrap();
+        assert_eq!(run.status.code(), Some(i32::from(!sentence.is_empty())), "{}", said(&run));
+        assert!(said(&run).contains(sentence) && !said(&run).contains("panicked"), "{}", said(&run));
+    }
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let run = std::process::Command::new(env!("CARGO_BIN_EXE_dynvox")).arg("budget").stdout(writer).output().unwrap();
+    assert_eq!(run.status.code(), Some(1), "{}", said(&run));
+    assert!(said(&run).contains("standard output cannot be written") && !said(&run).contains("panicked"), "{}", said(&run));
+}
+
+#[test]
+fn more_threads_than_any_machine_has_are_refused() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 2);
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--threads", "100000", "--out", "result"]);
+    assert_eq!(run.status.code(), Some(1));
+    assert!(said(&run).contains("--threads 100000 is more than 256"), "{}", said(&run));
 }

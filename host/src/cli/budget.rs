@@ -6,7 +6,7 @@ use dynvox_core::volume::{BLOCK_SIDE, VolumeConfig};
 use dynvox_core::{BudgetOptions, Capacity};
 use std::fmt::Write;
 
-/// Speed of the drive in the table, m/s.
+/// Speed of the camera in the table, m/s.
 const SPEED_M_S: f64 = 10.0;
 /// Blocks a metre of the synthetic street leaves in the map (docs/measurements.md).
 const BLOCKS_PER_M: u32 = 1_000;
@@ -51,7 +51,7 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
         return solved(args, memory, &super::capacity::solve(memory, (width, height), &options)?);
     }
     match &args.profile {
-        None if args.json => println!("{}", serde_json::to_string_pretty(&profiles_json()?)?),
+        None if args.json => outln!("{}", serde_json::to_string_pretty(&profiles_json()?)?),
         None => overview(),
         Some(name) => {
             let (name, capacity) = super::profile(name)?;
@@ -70,40 +70,40 @@ fn profiles_json() -> anyhow::Result<serde_json::Value> {
     Ok(serde_json::Value::Object(profiles.collect::<anyhow::Result<_>>()?))
 }
 
-/// Shows the bounds a budget gives: what they hold, as Rust and as TOML.
+/// Shows the capacity of a budget: what fits into it, as Rust and as TOML.
 fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Result<()> {
     let volume = VolumeConfig { voxel_size_m: args.voxel, ..VolumeConfig::default() };
-    let drive_m = drive_m(capacity.blocks, &volume);
+    let path_m = path_m(capacity.blocks, &volume);
     if args.json {
         let mut value = to_json(capacity)?;
         value["bytes"] = capacity.bytes().into();
-        value["drive_m"] = drive_m.into();
-        println!("{}", serde_json::to_string_pretty(&value)?);
+        value["path_m"] = path_m.into();
+        outln!("{}", serde_json::to_string_pretty(&value)?);
         return Ok(());
     }
-    println!("{} of {} bytes ({memory})", grouped(capacity.bytes() as u64), grouped(memory.0 as u64));
-    println!("  drive before blocks leave the pool: about {drive_m:.0} m, by the synthetic street's blocks a metre");
-    println!("  pruning window: {} frames", capacity.history_frames);
-    println!("  objects reconstructed at once: {}, of {} blocks each", capacity.objects, grouped(capacity.object_blocks as u64));
-    println!("\nas a file for `dynvox run --capacity FILE`:\n\n{}", to_toml(capacity)?);
-    println!("as Rust:\n\nconst CAPACITY: Capacity = {capacity:#?};");
+    outln!("{} of {} bytes ({memory})", grouped(capacity.bytes() as u64), grouped(memory.0 as u64));
+    outln!("  distance before blocks are evicted: about {path_m:.0} m, by the synthetic street's blocks a metre");
+    outln!("  pruning window: {} frames", capacity.history_frames);
+    outln!("  objects reconstructed at once: {}, of {} blocks each", capacity.objects, grouped(capacity.object_blocks as u64));
+    outln!("\nas a file for `dynvox run --capacity FILE`:\n\n{}", to_toml(capacity)?);
+    outln!("as Rust:\n\nconst CAPACITY: Capacity = {capacity:#?};");
     Ok(())
 }
 
 fn overview() {
-    print!("{}", table(&VolumeConfig::default()));
-    println!(
+    out!("{}", table(&VolumeConfig::default()));
+    outln!(
         "\n`dynvox budget --profile NAME` shows a profile region by region; `dynvox budget --memory 48MiB --image 752x480` finds bounds for other cases."
     );
 }
 
-/// All profiles with what they hold.
+/// All profiles and what fits into them.
 pub fn table(volume: &VolumeConfig) -> String {
     let mut table = String::new();
     let _ = writeln!(
         table,
         "{:<10}{:>16}{:>10}{:>14}{:>10}{:>10}{:>10}{:>10}{:>8}{:>8}{:>10}",
-        "profile", "slab, bytes", "MiB", "image, px", "blocks", "m3", "drive, s", "visible", "window", "matches", "colour"
+        "profile", "slab, bytes", "MiB", "image, px", "blocks", "m3", "path, s", "visible", "window", "matches", "colour"
     );
     let block_m = f64::from(volume.voxel_size_m) * BLOCK_SIDE as f64;
     for (name, capacity) in Capacity::PROFILES {
@@ -116,7 +116,7 @@ pub fn table(volume: &VolumeConfig) -> String {
             format!("{} x {}", capacity.image_width, capacity.image_height),
             grouped(capacity.blocks as u64),
             capacity.blocks as f64 * block_m.powi(3),
-            drive_s(capacity.blocks, volume).map_or_else(|| "-".to_owned(), |s| format!("{s:.1}")),
+            path_s(capacity.blocks, volume).map_or_else(|| "-".to_owned(), |s| format!("{s:.1}")),
             grouped(capacity.visible_blocks as u64),
             capacity.history_frames,
             grouped(capacity.matches as u64),
@@ -125,21 +125,21 @@ pub fn table(volume: &VolumeConfig) -> String {
     }
     let _ = writeln!(
         table,
-        "\nimage: the largest; m3: blocks of {block_m:.2} m a side; window: frames `volume.prune_lag` can span; drive: seconds at {SPEED_M_S} m/s until \
-         the pool is full and blocks leave to disk,\nby the {BLOCKS_PER_M} blocks a metre of the synthetic street at its default size, noise pruned, with \
+        "\nimage: the largest; m3: blocks of {block_m:.2} m a side; window: frames `volume.prune_lag` can span; path: seconds at {SPEED_M_S} m/s until \
+         the pool is full and blocks are evicted to disk,\nby the {BLOCKS_PER_M} blocks a metre of the synthetic street at its default size, noise pruned, with \
          voxels of 0.05 m (another street or voxel: another figure)"
     );
     table
 }
 
 /// Metres of driving until so many blocks are full: surfaces of the same extent take fewer blocks of larger voxels, by the square of their side.
-fn drive_m(blocks: usize, volume: &VolumeConfig) -> f64 {
+fn path_m(blocks: usize, volume: &VolumeConfig) -> f64 {
     let coarser = f64::from(volume.voxel_size_m) / f64::from(VolumeConfig::default().voxel_size_m);
     blocks as f64 / f64::from(BLOCKS_PER_M) * coarser * coarser
 }
 
-/// Seconds of driving until so many blocks are full; known for the voxels it was measured with.
-fn drive_s(blocks: usize, volume: &VolumeConfig) -> Option<f64> {
+/// Seconds until so many blocks are full; known for the voxels it was measured with.
+fn path_s(blocks: usize, volume: &VolumeConfig) -> Option<f64> {
     let measured = VolumeConfig::default();
     let same =
         volume.voxel_size_m == measured.voxel_size_m && volume.truncation_m == measured.truncation_m && volume.far_m == measured.far_m;
@@ -151,13 +151,13 @@ fn regions(name: &str, capacity: &Capacity, json: bool) -> anyhow::Result<()> {
     if json {
         let regions: Vec<_> =
             footprint.regions().iter().map(|region| serde_json::json!({ "name": region.name, "bytes": region.bytes })).collect();
-        println!("{}", serde_json::to_string_pretty(&serde_json::json!({ "profile": name, "bytes": bytes, "regions": regions }))?);
+        outln!("{}", serde_json::to_string_pretty(&serde_json::json!({ "profile": name, "bytes": bytes, "regions": regions }))?);
         return Ok(());
     }
-    println!("{:<34}{:>16}{:>10}", format!("region of {name}"), "bytes", "share");
+    outln!("{:<34}{:>16}{:>10}", format!("region of {name}"), "bytes", "share");
     for region in footprint.regions() {
-        println!("{:<34}{:>16}{:>8.1} %", region.name, grouped(region.bytes as u64), 100.0 * region.bytes as f64 / bytes as f64);
+        outln!("{:<34}{:>16}{:>8.1} %", region.name, grouped(region.bytes as u64), 100.0 * region.bytes as f64 / bytes as f64);
     }
-    println!("{:<34}{:>16}{:>8.1} %", "slab", grouped(footprint.bytes() as u64), 100.0 * footprint.bytes() as f64 / bytes as f64);
+    outln!("{:<34}{:>16}{:>8.1} %", "slab", grouped(footprint.bytes() as u64), 100.0 * footprint.bytes() as f64 / bytes as f64);
     Ok(())
 }

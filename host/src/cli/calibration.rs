@@ -38,7 +38,7 @@ pub fn run(args: &CalibrationArgs) -> anyhow::Result<()> {
     print(&calibration, &rectification, &rig);
     if let Some(out) = &args.out {
         write_new(out, &to_toml(&calibration))?;
-        println!("{:<22}{}", "written", out.display());
+        outln!("{:<22}{}", "written", out.display());
     }
     Ok(())
 }
@@ -56,7 +56,7 @@ fn write_new(path: &Path, text: &str) -> anyhow::Result<()> {
 }
 
 fn print(calibration: &StereoCalibration, rectification: &Rectification, rig: &StereoRig) {
-    let line = |name: &str, value: String| println!("{name:<22}{value}");
+    let line = |name: &str, value: String| outln!("{name:<22}{value}");
     line("format", calibration.format.to_owned());
     for (name, camera) in [("left camera", &calibration.left), ("right camera", &calibration.right)] {
         let [fx, fy] = camera.lens.focal_px();

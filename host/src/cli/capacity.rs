@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// The budget of a run that says nothing.
+/// The default budget.
 pub const DEFAULT_MEMORY: Bytes = Bytes(256 << 20);
 
 /// The options that choose the bounds.
@@ -56,7 +56,7 @@ impl CapacityArgs {
     }
 }
 
-/// The capacity for a budget; a refusal says what to do.
+/// The capacity for a budget; a refusal names the next action.
 pub fn solve(memory: Bytes, (width, height): (usize, usize), options: &BudgetOptions) -> anyhow::Result<Capacity> {
     Capacity::for_budget(memory.0, width, height, options).map_err(|error| match error {
         BudgetError::TooSmall { least } => anyhow::anyhow!(

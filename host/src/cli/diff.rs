@@ -20,11 +20,11 @@ pub struct DiffArgs {
 
 /// 0 for equal runs, 1 for different ones, 2 where they cannot be compared.
 pub fn main(args: &DiffArgs) -> ExitCode {
-    match run(args) {
+    match run(args).and_then(|equal| super::output::finish().map(|()| equal)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", super::sentence(&error));
             ExitCode::from(2)
         }
     }
@@ -32,7 +32,7 @@ pub fn main(args: &DiffArgs) -> ExitCode {
 
 fn run(args: &DiffArgs) -> anyhow::Result<bool> {
     let comparison = compare(&RunDigests::read(&args.a)?, &RunDigests::read(&args.b)?)?;
-    print!("{}", sentences(&comparison, [&args.a, &args.b]));
+    out!("{}", sentences(&comparison, [&args.a, &args.b]));
     Ok(comparison.equal() || args.shared && comparison.divergence.is_none())
 }
 

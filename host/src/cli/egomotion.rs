@@ -7,7 +7,7 @@ use dynvox_core::geometry::Transform;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Where the camera's motion comes from, as the command line says it.
+/// The source of the camera's motion on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum EgomotionChoice {
     /// Matches over two stereo pairs.
@@ -32,7 +32,7 @@ impl FromStr for EgomotionChoice {
 }
 
 impl EgomotionChoice {
-    /// Says it to the settings, and reads the poses of the chosen frames where they come from a file.
+    /// Applies it to the settings, and reads the poses of the chosen frames where they come from a file.
     pub fn apply(
         &self,
         settings: &mut Settings,

@@ -21,7 +21,7 @@ enum Action {
         #[arg(default_value = "fixtures", value_name = "DIR")]
         path: PathBuf,
     },
-    /// Write the golden digests anew, with the reason beside them
+    /// Rewrite the golden digests, with the reason
     Bless {
         /// A fixture, or a folder of fixtures
         #[arg(default_value = "fixtures", value_name = "DIR")]
@@ -30,7 +30,7 @@ enum Action {
         #[arg(long, value_name = "TEXT")]
         reason: String,
     },
-    /// Turn a fixture into one run of bytes that a firmware can embed
+    /// Pack a fixture into one file that a firmware can embed
     Pack {
         /// The fixture
         fixture: PathBuf,
@@ -44,24 +44,24 @@ pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
     match &args.action {
         Action::Verify { path } => {
             let verdicts = fixtures::all(path)?.iter().map(|fixture| fixtures::verify(fixture, &Serial)).collect::<Result<Vec<_>, _>>()?;
-            verdicts.iter().for_each(|verdict| println!("{}", sentence(verdict)));
+            verdicts.iter().for_each(|verdict| outln!("{}", sentence(verdict)));
             if verdicts.iter().any(|verdict| verdict.difference.is_some()) {
                 bail!("digests have changed. If that is meant: dynvox fixtures bless --reason \"why\"");
             }
         }
         Action::Bless { path, reason } => {
             for fixture in fixtures::all(path)? {
-                let what = match fixtures::bless(&fixture, reason, &Serial)? {
-                    Blessing::Unchanged => "is as it was",
+                let outcome = match fixtures::bless(&fixture, reason, &Serial)? {
+                    Blessing::Unchanged => "is unchanged",
                     Blessing::Written => "is blessed",
                 };
-                println!("{} {what}", fixture.display());
+                outln!("{} {outcome}", fixture.display());
             }
         }
         Action::Pack { fixture, out } => {
             let bytes = fixtures::pack(fixture)?;
             write_whole(out, |file| file.write_all(&bytes))?;
-            println!("{} bytes in {}", bytes.len(), out.display());
+            outln!("{} bytes in {}", bytes.len(), out.display());
         }
     }
     Ok(())
@@ -70,7 +70,7 @@ pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
 fn sentence(verdict: &Verdict) -> String {
     let name = verdict.fixture.display();
     match &verdict.difference {
-        None => format!("{name}: {} frames, every bit as it was", verdict.frames),
-        Some(difference) => format!("{name}: differs from frame {} on, first in {}", difference.frame, difference.column),
+        None => format!("{name}: {} frames, all digests equal", verdict.frames),
+        Some(difference) => format!("{name}: first divergence: frame {}, {}", difference.frame, difference.column),
     }
 }

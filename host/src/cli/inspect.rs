@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub struct InspectArgs {
-    /// Folder to look at
+    /// Folder to inspect
     path: PathBuf,
     /// Layout of the data set; guessed from the path unless given
     #[arg(long, value_enum)]
@@ -16,20 +16,20 @@ pub struct InspectArgs {
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     let (layout, found) = match input::survey(&args.path, args.dataset) {
-        // What cannot be mapped may be good for something else.
+        // A folder that cannot be mapped may be of another kind.
         Err(error @ InputError::Layout { .. }) => return other(&args.path).unwrap_or(Err(error.into())),
         survey => survey?,
     };
-    println!("{}: {} ({} sequence{})", args.path.display(), layout.name(), found.len(), if found.len() == 1 { "" } else { "s" });
-    println!("  {}", layout.describe(&args.path));
+    outln!("{}: {} ({} sequence{})", args.path.display(), layout.name(), found.len(), if found.len() == 1 { "" } else { "s" });
+    outln!("  {}", layout.describe(&args.path));
     for one in &found {
-        println!();
+        outln!("");
         if let Some(sequence) = &one.sequence {
-            println!("sequence {sequence}");
+            outln!("sequence {sequence}");
         }
         match &one.opened {
             Ok(dataset) => describe(dataset.as_ref(), &command(&args.path, one)),
-            Err(error) => println!("  cannot be used: {error}"),
+            Err(error) => outln!("  cannot be used: {error}"),
         }
     }
     if found.iter().all(|one| one.opened.is_err()) {
@@ -38,19 +38,19 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Says what a folder is that is no data set: a run's results, a stereo benchmark; `None` for neither.
+/// Describes a folder that is not a data set: a run's results, a stereo benchmark; `None` for neither.
 fn other(path: &Path) -> Option<anyhow::Result<()>> {
     let shown = path.display();
     if path.join("summary.json").is_file() {
-        println!("{shown}: the results of a run; report.html shows them in a browser");
-        println!("  hold its poses against others: dynvox evaluate trajectory {shown} TRUTH");
-        println!("  the same run again: dynvox run [PATH] --config {}", path.join("config.toml").display());
+        outln!("{shown}: the results of a run; report.html shows them in a browser");
+        outln!("  evaluate its trajectory: dynvox evaluate trajectory {shown} TRUTH");
+        outln!("  the same run again: dynvox run [PATH] --config {}", path.join("config.toml").display());
         return Some(Ok(()));
     }
     match find_stereo_set(path) {
         Ok(set) => {
-            println!("{shown}: {}, {} pairs with true disparity: single pairs, nothing to map", set.name, set.pairs.len());
-            println!("  hold the matcher against it: dynvox evaluate stereo {shown}");
+            outln!("{shown}: {}, {} pairs with true disparity: single pairs, nothing to map", set.name, set.pairs.len());
+            outln!("  evaluate the matcher: dynvox evaluate stereo {shown}");
             Some(Ok(()))
         }
         Err(error @ StereoSetError::NoTruth { .. }) => Some(Err(error.into())),
@@ -67,39 +67,42 @@ fn describe(dataset: &dyn FrameSource, command: &str) {
     let ((width, height), rig) = (dataset.size(), dataset.rig());
     let last = dataset.len().saturating_sub(1);
     let seconds = dataset.time_s(last) - dataset.time_s(0);
-    println!("  {} stereo pairs of {width} x {height} px, {seconds:.1} s", dataset.len());
-    println!(
+    outln!("  {} stereo pairs of {width} x {height} px, {seconds:.1} s", dataset.len());
+    outln!(
         "  focal length {:.2} px, principal point ({:.2}, {:.2}) px, baseline {:.4} m",
-        rig.focal_px, rig.center_u_px, rig.center_v_px, rig.baseline_m
+        rig.focal_px,
+        rig.center_u_px,
+        rig.center_v_px,
+        rig.baseline_m
     );
     let first = dataset.frame(0);
     match &first {
         Ok(frame) => {
-            println!("  {}", if frame.colour.is_some() { "colour images: the map has colours" } else { "grey images: the map is grey" })
+            outln!("  {}", if frame.colour.is_some() { "colour images: the map has colours" } else { "grey images: the map is grey" })
         }
-        Err(error) => println!("  the first frame cannot be read: {error}"),
+        Err(error) => outln!("  the first frame cannot be read: {error}"),
     }
-    println!(
+    outln!(
         "  {}",
         if dataset.truth().is_some() {
-            "true poses: the trajectory's errors are measured"
+            "ground-truth poses: the trajectory is evaluated"
         } else {
-            "no true poses: the trajectory's errors stay unknown"
+            "no ground-truth poses: the trajectory is not evaluated"
         }
     );
     if first.is_ok_and(|frame| frame.objects.is_some()) {
-        println!("  labels of what moves: motions, states and tracks are held against them");
+        outln!("  object labels: motions, states and tracks are evaluated");
     }
-    println!("  {}", masks(dataset));
+    outln!("  {}", masks(dataset));
     let evaluate = lidar(dataset);
     for note in dataset.notes() {
-        println!("  note: {note}");
+        outln!("  note: {note}");
     }
     match least_memory(width, height) {
-        Ok(least) => println!("  memory: 256 MiB unless --memory says otherwise; at least --memory {}MiB", least.div_ceil(1 << 20)),
-        Err(error) => println!("  cannot be mapped at this size: {error}. Shrink the images with --scale"),
+        Ok(least) => outln!("  memory: 256 MiB by default; at least --memory {}MiB", least.div_ceil(1 << 20)),
+        Err(error) => outln!("  cannot be mapped at this size: {error}. Shrink the images with --scale"),
     }
-    println!("  map it: {command}{}", if evaluate { " --evaluate lidar" } else { "" });
+    outln!("  map it: {command}{}", if evaluate { " --evaluate lidar" } else { "" });
 }
 
 /// Bytes of the least slab for images of a size.
@@ -117,26 +120,30 @@ fn masks(dataset: &dyn FrameSource) -> String {
             let has = |index: &usize| dataset.stem(*index).is_some_and(|stem| folder.join(format!("{stem}.png")).is_file());
             let there = (0..dataset.len()).filter(has).count();
             match there {
-                0 => format!("{} has no mask of any frame's name: cars go into the static map", folder.display()),
-                there if there == dataset.len() => format!("masks in {}: what moves is kept apart", folder.display()),
-                there => format!("masks in {} for {there} of {} frames: in the others nothing is seen", folder.display(), dataset.len()),
+                0 => format!("{} has no mask of any frame's name: objects go into the static map", folder.display()),
+                there if there == dataset.len() => format!("masks in {}: objects are separate from the static map", folder.display()),
+                there => format!(
+                    "masks in {} for {there} of {} frames: objects of the others go into the static map",
+                    folder.display(),
+                    dataset.len()
+                ),
             }
         }
-        AvailableMasks::Exact => "exact masks: what moves is kept apart".to_owned(),
-        AvailableMasks::Absent => "no masks: cars go into the static map, unless --instances names some".to_owned(),
+        AvailableMasks::Exact => "exact masks: objects are separate from the static map".to_owned(),
+        AvailableMasks::Absent => "no masks: objects go into the static map, unless --instances names some".to_owned(),
     }
 }
 
-/// Says whether there are scans; whether input and map can be held against them.
+/// Prints whether there are scans; returns whether input and map can be evaluated against them.
 fn lidar(dataset: &dyn FrameSource) -> bool {
     let scans: Vec<usize> = (0..dataset.len()).filter(|&index| dataset.has_lidar(index)).collect();
     let Some(&first) = scans.first() else {
-        println!("  no LiDAR scans (velodyne/): accuracy and completeness stay unknown");
+        outln!("  no LiDAR scans (velodyne/): accuracy and completeness stay unknown");
         return false;
     };
     match dataset.lidar(first) {
-        Ok(_) => println!("  LiDAR scans of {} frames: --evaluate lidar measures accuracy and completeness", scans.len()),
-        Err(error) => println!("  LiDAR scans of {} frames, but {error}", scans.len()),
+        Ok(_) => outln!("  LiDAR scans of {} frames: --evaluate lidar measures accuracy and completeness", scans.len()),
+        Err(error) => outln!("  LiDAR scans of {} frames, but {error}", scans.len()),
     }
     dataset.lidar(first).is_ok()
 }

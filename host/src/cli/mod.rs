@@ -1,5 +1,15 @@
 //! The command line. Errors become sentences here and nowhere else.
 
+/// Prints to standard output without a panic where it is closed.
+macro_rules! out {
+    ($($text:tt)*) => { $crate::cli::output::print(format_args!($($text)*)) };
+}
+
+/// `out` and a line's end.
+macro_rules! outln {
+    ($($text:tt)*) => { $crate::cli::output::print(format_args!("{}\n", format_args!($($text)*))) };
+}
+
 mod budget;
 mod calibration;
 mod capacity;
@@ -8,6 +18,7 @@ mod egomotion;
 mod evaluate;
 mod fixtures;
 mod inspect;
+mod output;
 mod run;
 mod settings;
 mod sweep;
@@ -19,7 +30,7 @@ use std::process::ExitCode;
 const EXAMPLES: &str = "\
 Examples:
   dynvox                                        map the synthetic street: no data set needed
-  dynvox inspect ~/kitti                        what is there, and the command that maps it
+  dynvox inspect ~/kitti                        its content, and the command that maps it
   dynvox run ~/kitti --sequence 06              map a KITTI odometry sequence
   dynvox run ~/tracking --sequence 0003 --frames 100 --threads 4
   dynvox run ~/my-rig                           a folder with left/, right/, calib.txt
@@ -27,7 +38,7 @@ Examples:
   dynvox run --set volume.voxel_size_m=0.1 --set street.seed=7 --out out/coarse
   dynvox run --config out/coarse/config.toml    the same again
   dynvox run ~/kitti --sequence 06 --snapshot-every 100 --out out/long
-  dynvox run --resume out/long                  what stopped goes on from its last snapshot
+  dynvox run --resume out/long                  resume an interrupted run from its last snapshot
   dynvox run ~/raw-rig --calibration camchain.yaml   images as the cameras deliver them
   dynvox calibration camchain.yaml              what a calibration means
   dynvox budget --profile small                 where the bytes of a profile go
@@ -38,11 +49,11 @@ Examples:
   dynvox evaluate stereo ~/kitti-stereo-2015        D1 and coverage of the matcher, by region
   dynvox sweep street ~/kitti:06 --out sweep    prune weights, frame rates and scales on one page
   dynvox synth --out street --set street.frames=50
-  dynvox diff out/a out/b                       the first frame and stage in which two runs part
+  dynvox diff out/a out/b                       the first frame and stage in which two runs diverge
 
 A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open the last in a browser.";
 
-/// Maps streets densely from a stereo camera, within a byte budget fixed in advance, with the same bits on every machine.
+/// Dense stereo mapping of dynamic scenes, within a fixed byte budget and bit-exact on every machine.
 #[derive(Debug, Parser)]
 #[command(name = "dynvox", version, after_help = EXAMPLES)]
 struct Cli {
@@ -52,21 +63,21 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Map a data set, or the synthetic street without one (this is also what `dynvox` alone does)
+    /// Map a data set, or the synthetic street without one (the default command)
     Run(Box<run::RunArgs>),
-    /// Say what a folder holds, what is missing, and the command that maps it
+    /// Describe a folder: what it has, what is missing, and the command that maps it
     Inspect(inspect::InspectArgs),
     /// Say what a calibration of raw cameras means, and write it as a file of our own
     Calibration(calibration::CalibrationArgs),
     /// Show where the bytes go: all profiles, or one region by region
     Budget(budget::BudgetArgs),
-    /// Hold files against the truth: trajectories, disparities
+    /// Evaluate files against ground truth: trajectories, disparities
     Evaluate(evaluate::EvaluateArgs),
-    /// Make many runs with one thing varied, and one page of them beside the original's numbers
+    /// Run many times with one setting varied, and compare the results with the original's numbers on one page
     Sweep(Box<sweep::SweepArgs>),
-    /// Write the synthetic street in KITTI's layout, with all its truth
+    /// Write the synthetic street in KITTI's layout, with its ground truth
     Synth(synth::SynthArgs),
-    /// Name the first frame and the first stage in which two runs part
+    /// Name the first frame and stage in which two runs diverge
     Diff(diff::DiffArgs),
     /// Replay small clips against the digests on file
     Fixtures(fixtures::FixturesArgs),
@@ -74,8 +85,6 @@ enum Command {
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
-    let filter = tracing_subscriber::EnvFilter::try_from_env("DYNVOX_LOG").unwrap_or_else(|_| "warn".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
     let done = match Cli::parse().command {
         None => run::run(&run::RunArgs::without_arguments()),
         Some(Command::Run(args)) => run::run(&args),
@@ -88,13 +97,22 @@ pub fn main() -> ExitCode {
         Some(Command::Diff(args)) => return diff::main(&args),
         Some(Command::Fixtures(args)) => fixtures::run(&args),
     };
-    match done {
+    match done.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", sentence(&error));
             ExitCode::FAILURE
         }
     }
+}
+
+/// An error with its causes. A cause that is a part of the text already is not repeated.
+fn sentence(error: &anyhow::Error) -> String {
+    error
+        .chain()
+        .skip(1)
+        .map(ToString::to_string)
+        .fold(error.to_string(), |text, cause| if text.contains(&cause) { text } else { format!("{text}: {cause}") })
 }
 
 /// The profile of that name, in any case, and its name.
@@ -111,6 +129,15 @@ fn profile(name: &str) -> anyhow::Result<(String, dynvox_core::Capacity)> {
 mod tests {
     use super::*;
     use clap::CommandFactory;
+
+    #[test]
+    fn a_cause_is_printed_once() {
+        let cause = || std::io::Error::other("no space");
+        let error = anyhow::Error::new(crate::run::FolderError::Write { path: "x".into(), source: cause() });
+        assert_eq!(sentence(&error).matches("no space").count(), 1);
+        let error = anyhow::Error::new(cause()).context("the map cannot be written");
+        assert_eq!(sentence(&error), "the map cannot be written: no space");
+    }
 
     #[test]
     fn the_command_line_is_well_formed_and_every_example_parses() {

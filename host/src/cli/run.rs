@@ -17,6 +17,8 @@ use anyhow::bail;
 use std::path::{Path, PathBuf};
 
 const MIB: u64 = 1 << 20;
+/// Threads at most.
+const MOST_THREADS: usize = 256;
 /// Where run folders go unless `--out` says otherwise.
 const DEFAULT_PARENT: &str = "out";
 
@@ -186,6 +188,9 @@ fn on_or_off(text: &str) -> Result<bool, String> {
 fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     let mut settings = Settings::resolve(args.config.as_deref(), &args.set)?;
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
+    if threads > MOST_THREADS {
+        bail!("--threads {threads} is more than {MOST_THREADS}. Give at most the number of processors");
+    }
     if threads == 0 || args.stride == 0 || args.frames == Some(0) {
         bail!("--threads, --stride and --frames must be at least 1. Give a larger number");
     }
@@ -270,9 +275,9 @@ fn finish(args: &RunArgs, plan: &Plan, folder: RunFolder, checkpoint: Option<Che
     let temporary: &[&str] = if record.keeps_blocks() { &[] } else { &[BLOCKS_FILE] };
     let target = folder.commit(temporary)?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&summary)?);
+        outln!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {
-        report::print_summary(&mut std::io::stdout().lock(), &record, &target)?;
+        out!("{}", report::summary_lines(&record, &target));
     }
     Ok(())
 }

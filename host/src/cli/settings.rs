@@ -115,17 +115,17 @@ impl Settings {
         self.tracking.frame_interval_s = interval_s as f32;
     }
 
-    /// Says where the camera's motion comes from.
+    /// Sets the source of the camera's motion.
     pub fn set_motion_source(&mut self, source: MotionSource) {
         self.mapper.egomotion = source;
     }
 
-    /// Says how many frames lie from one that is fused to the next.
+    /// Fuses every so many frames.
     pub fn set_fuse_every(&mut self, frames: u32) {
         self.mapper.fuse_every = frames;
     }
 
-    /// Says whether what moves is kept apart.
+    /// Sets whether objects are separate from the static map.
     pub fn set_dynamic(&mut self, dynamic: bool) {
         self.tracking.dynamic = dynamic;
     }

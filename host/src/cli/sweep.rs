@@ -22,13 +22,13 @@ pub struct SweepArgs {
     /// Sizes of the images, percent
     #[arg(long, value_delimiter = ',', default_values_t = [100, 75, 50, 25], value_name = "PERCENT,...")]
     scales: Vec<u32>,
-    /// Sources of depth, as `dynvox run --depth` takes them; exact is for the street alone
+    /// Sources of depth, as `dynvox run --depth` takes them; exact is for the street only
     #[arg(long, value_delimiter = ',', default_values_t = ["elas".to_owned(), "exact".to_owned()], value_name = "SOURCE,...")]
     depths: Vec<String>,
     /// Pruning lag of the first two sweeps, frames
     #[arg(long, default_value_t = 40, value_name = "N")]
     prune_lag: usize,
-    /// Frames after which the first two sweeps look at the map, when pruning has been there
+    /// Frames after which the first two sweeps evaluate the map, after pruning
     #[arg(long, default_value_t = 80, value_name = "N")]
     evaluation_delay: usize,
     /// Byte budget of every run
@@ -43,13 +43,13 @@ pub struct SweepArgs {
     /// One setting of every run; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Make part I of N parts alone: give each machine its own, then put the folders together with --merge
+    /// Run only part I of N, one on each machine; --merge combines the folders
     #[arg(long, value_name = "I/N", value_parser = part_of)]
     shard: Option<(usize, usize)>,
-    /// Put the folders of several parts together in --out, and make no run
+    /// Merge the folders of several parts into --out, without a run
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["data", "shard"])]
     merge: Vec<PathBuf>,
-    /// Folder for results, tables and report.html; a sweep that was interrupted goes on there
+    /// Folder for results, tables and report.html; an interrupted sweep continues there
     #[arg(long, default_value = "out/sweep", value_name = "DIR")]
     out: PathBuf,
     /// Show no progress
@@ -59,7 +59,7 @@ pub struct SweepArgs {
 
 fn part_of(text: &str) -> Result<(usize, usize), String> {
     let parts = text.split_once('/').and_then(|(part, parts)| Some((part.parse().ok()?, parts.parse().ok()?)));
-    parts.filter(|(part, parts)| (1..=*parts).contains(part)).ok_or_else(|| "say I/N with I from 1 to N, as in 2/3".to_owned())
+    parts.filter(|(part, parts)| (1..=*parts).contains(part)).ok_or_else(|| "must be I/N with I from 1 to N, as in 2/3".to_owned())
 }
 
 pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
@@ -71,7 +71,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     let data = if args.data.is_empty() { vec![Data { path: None, sequence: None }] } else { args.data.clone() };
     let labels: Vec<String> = data.iter().map(Data::label).collect();
     if let Some(twice) = labels.iter().enumerate().find_map(|(at, label)| labels[..at].contains(label).then_some(label)) {
-        bail!("two data sets are called {twice}. Sweep them into two folders");
+        bail!("two data sets have the name {twice}. Sweep them into two folders");
     }
     let plan = Plan::new(&SweepRequest {
         data: data.iter().map(|one| Ok((one.clone(), reference(one)?))).collect::<anyhow::Result<_>>()?,
@@ -98,7 +98,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         }
         let result = make(args, one, arguments, &folder.scratch_dir(key)).with_context(|| format!("run {key} ended"))?;
         result.write(&folder.result(key))?;
-        // The page grows with every run: an interrupted sweep has one, too.
+        // The page is written after every run, so that an interrupted sweep has one, too.
         folder.draw(&plan, &folder.results(&plan)?)?;
     }
     let results = folder.results(&plan)?;
@@ -118,7 +118,7 @@ impl SweepArgs {
     }
 }
 
-/// What the map of a data set can be held against.
+/// The reference that a data set has.
 fn reference(data: &Data) -> anyhow::Result<Option<&'static str>> {
     let Some(path) = &data.path else { return Ok(Some("exact")) };
     let dataset = input::open(path, &OpenOptions { sequence: data.sequence.clone(), ..OpenOptions::default() })?;
@@ -131,7 +131,7 @@ fn data_of(plan: &Plan, key: &str, labels: &[String]) -> Option<usize> {
     labels.iter().position(|label| *label == point.data)
 }
 
-/// Makes one run. Nothing of it stays but what is returned.
+/// Runs once. Only the result remains.
 fn make(args: &SweepArgs, data: &Data, arguments: &[String], scratch_dir: &Path) -> anyhow::Result<RunResult> {
     let mut line = vec!["dynvox".to_owned(), "--quiet".to_owned()];
     line.extend(data.path.iter().map(|path| path.display().to_string()));
@@ -144,8 +144,8 @@ fn make(args: &SweepArgs, data: &Data, arguments: &[String], scratch_dir: &Path)
 
 fn print_result(plan: &Plan, made: usize, page: &Path, quiet: bool) -> anyhow::Result<()> {
     if !quiet {
-        println!("{made} of {} runs made", plan.runs.len());
-        println!("{}", page.display());
+        outln!("{made} of {} runs finished", plan.runs.len());
+        outln!("{}", page.display());
     }
     Ok(())
 }

@@ -35,6 +35,6 @@ pub fn run(args: &SynthArgs) -> anyhow::Result<()> {
     bar.finish_and_clear();
     written?;
     let place = args.out.display();
-    println!("{} frames with their truth in {place}\nmap it: dynvox run {place} --images colour", street.config().frames);
+    outln!("{} frames with their truth in {place}\nmap it: dynvox run {place} --images colour", street.config().frames);
     Ok(())
 }

@@ -2,7 +2,7 @@
 //! seen.
 //!
 //! Every pixel of exact depth that lies on a true object while its object is fused is a point of its true surface, in the true object's own frame; those
-//! of one cell of `CELL_M` are one sample, their mean. So the seen side is known, whatever hides the rest. The mesh is carried into the
+//! of one cell of `CELL_M` are one sample, their mean. So the seen side is known, and hidden parts do not count. The mesh is carried into the
 //! true object's frame by where the object was in the frame in which the true object was nearest, and most of it is made: drift of the object's pose
 //! shows as distance.
 
@@ -20,10 +20,10 @@ const CELL_M: f64 = 0.03;
 const MARGIN_M: f64 = 0.03;
 /// How far above its foot a true object begins, m: what is lower is road.
 const FOOT_M: f64 = 0.05;
-/// Distance looked at, voxels: a sample this near to the mesh counts as there, a distance beyond it is not measured.
+/// Largest distance measured, voxels: a sample this near to the mesh counts as reconstructed.
 pub const REACH_VOXELS: f64 = 2.0;
 
-/// A frame as the renderer knows it.
+/// A frame as it was rendered.
 #[derive(Clone, Copy, Debug)]
 pub struct TrueView<'a> {
     /// The left camera.

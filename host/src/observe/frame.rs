@@ -37,7 +37,7 @@ pub struct FrameRow {
     pub depth_refused: u32,
     /// Wall time of the whole step, ms.
     pub step_ms: f64,
-    /// Resident memory of the process, where the machine tells.
+    /// Resident memory of the process, where the system reports it.
     pub rss_bytes: Option<u64>,
     /// Time by stage, in the order of `Stage::ALL`.
     pub stages: [StageTime; STAGES],

@@ -1,4 +1,4 @@
-//! What is measured while a run goes on. Each observer sees every frame after its step, keeps plain data that goes into checkpoints, and returns
+//! What is measured during a run. Each observer sees every frame after its step, keeps plain data that goes into checkpoints, and returns
 //! a section of the run's record in the end.
 
 mod blocks;
@@ -34,7 +34,7 @@ use dynvox_core::{Capacity, Config, Mapper};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Why an observer cannot go on.
+/// Why an observer cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum ObserveError {
     /// A file of the run folder.
@@ -42,7 +42,7 @@ pub enum ObserveError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the machine says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A file that an earlier part of the run wrote.
@@ -90,7 +90,7 @@ pub trait MapView<'s> {
 
 /// An object that left the mapper.
 pub struct RetiredVolume {
-    /// What the mapper says of it.
+    /// The mapper's summary of it.
     pub summary: ObjectSummary,
     /// Its blocks.
     pub volume: VolumeCopy,
@@ -102,7 +102,7 @@ pub struct FrameContext<'a, 's> {
     pub at: usize,
     /// What is recorded of it.
     pub row: &'a FrameRow,
-    /// The images, and what the data set knows of them.
+    /// The images and ground truth of the data set.
     pub images: &'a StereoImages,
     /// Objects that left the mapper in this step.
     pub retired: &'a [RetiredVolume],
@@ -138,7 +138,7 @@ pub struct Finished<'a> {
     pub store: StoreStats,
 }
 
-/// Sees every frame and sums up in the end. Its fields are what a checkpoint holds of it.
+/// Sees every frame and sums up in the end. Its fields are its part of a checkpoint.
 pub trait Observer {
     /// What it contributes to the record of the run.
     type Section;

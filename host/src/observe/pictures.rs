@@ -66,7 +66,7 @@ pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample
 pub const IGNORED: [u8; 3] = [110, 110, 110];
 /// Points without an estimate.
 pub const MISSING: [u8; 3] = [190, 60, 230];
-/// Points with an error of so many times what is allowed, and up to where each colour holds: blue is right, yellow to red wrong.
+/// Upper bounds of errors, as multiples of what is right, and their colours: blue is right, yellow to red wrong.
 pub const ERRORS: [(f32, [u8; 3]); 6] = [
     (0.25, [49, 84, 200]),
     (0.5, [84, 148, 224]),

@@ -1,4 +1,4 @@
-//! An object's mesh on three pictures, without perspective: as the camera looked at it first, from its left side, from above.
+//! An object's mesh on three pictures, orthographic: from the camera that saw it first, from its left side, from above.
 
 use dynvox_core::view::Triangle;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};

@@ -17,7 +17,7 @@ pub enum CompareError {
         path: PathBuf,
         /// The file that is missing.
         file: &'static str,
-        /// What the machine says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A column is missing: an older build wrote it.
@@ -60,7 +60,7 @@ pub struct Row {
 pub struct RunDigests {
     /// The frames, by number.
     pub rows: BTreeMap<usize, Row>,
-    /// The settings by dotted key, and what the summary says of the run: data set, profile.
+    /// The settings by dotted key, and data set and profile of the summary.
     pub settings: BTreeMap<String, String>,
 }
 

@@ -5,14 +5,10 @@ use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::TrajectoryErrors;
 use crate::observe::Sections;
 use crate::run::RunRecord;
-use std::io::{self, Write};
 use std::path::Path;
 
-/// Prints the figures of a run whose folder is `folder`.
-///
-/// # Errors
-/// The output is closed.
-pub fn print_summary(out: &mut impl Write, run: &RunRecord, folder: &Path) -> io::Result<()> {
+/// The figures of a run whose folder is `folder`, line by line.
+pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     let mut lines = vec![("frames", format!("{} at {:.1} fps", run.frames.len(), run.fps()))];
     let Sections { trajectory, reference, tracks, .. } = &run.sections;
     lines.extend(trajectory.errors.iter().flat_map(trajectory_lines));
@@ -28,7 +24,7 @@ pub fn print_summary(out: &mut impl Write, run: &RunRecord, folder: &Path) -> io
     lines.extend(pose_lines(run));
     lines.push(("digest", format!("{:016x}", run.digest())));
     lines.push(("results", folder.display().to_string()));
-    lines.iter().try_for_each(|(name, value)| writeln!(out, "{name:<22}{value}"))
+    lines.iter().map(|(name, value)| format!("{name:<22}{value}\n")).collect()
 }
 
 fn trajectory_lines(errors: &TrajectoryErrors) -> Vec<(&'static str, String)> {

@@ -8,6 +8,6 @@ pub mod html;
 mod summary;
 pub mod text;
 
-pub use console::print_summary;
+pub use console::summary_lines;
 pub use csv::{write_frames, write_reference, write_tracks, write_tracks_truth};
 pub use summary::Summary;

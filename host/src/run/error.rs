@@ -71,7 +71,7 @@ pub enum RunError {
     },
     /// No memory for the slab.
     #[error(
-        "the slab of {profile} needs {bytes} bytes, and this machine does not have them. Give fewer with --memory; `dynvox budget` shows what they hold"
+        "the slab of {profile} needs {bytes} bytes, and this machine does not have them. Give fewer with --memory; `dynvox budget` shows what fits into them"
     )]
     NoMemory {
         /// Bytes of the slab.
@@ -84,7 +84,7 @@ pub enum RunError {
     Slab {
         /// Name of the profile.
         profile: String,
-        /// What the core says.
+        /// The core's reason.
         reason: String,
     },
     /// The core refuses a frame.
@@ -92,7 +92,7 @@ pub enum RunError {
     Step {
         /// Number of the frame.
         frame: usize,
-        /// What the core says.
+        /// The core's reason.
         reason: String,
     },
     /// The block file.
@@ -133,7 +133,7 @@ pub enum RunError {
     Threads {
         /// Threads asked for.
         count: usize,
-        /// What the machine says.
+        /// The system's error.
         source: rayon::ThreadPoolBuildError,
     },
 }

@@ -4,7 +4,9 @@
 #[cfg(test)]
 mod tests;
 
-use std::path::{Path, PathBuf};
+use std::fs::{File, TryLockError};
+use std::io::ErrorKind;
+use std::path::{Component, Path, PathBuf};
 
 /// Why a run folder cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -16,7 +18,7 @@ pub enum FolderError {
         path: PathBuf,
     },
     /// What is there is not a run folder.
-    #[error("{path} is not a run folder (it holds no summary.json), so --overwrite leaves it alone. Give another --out")]
+    #[error("{path} is not a run folder (it has no summary.json), so --overwrite leaves it alone. Give another --out")]
     Foreign {
         /// The folder asked for.
         path: PathBuf,
@@ -35,12 +37,42 @@ pub enum FolderError {
         /// Why, and what to do.
         reason: &'static str,
     },
-    /// The machine refuses.
+    /// Another run writes there.
+    #[error("another run is writing to {path}. Wait for it, or give another --out")]
+    InUse {
+        /// The folder asked for.
+        path: PathBuf,
+    },
+    /// It is the current directory.
+    #[error("{path} is the current directory, which cannot be replaced. Give another --out")]
+    Current {
+        /// The folder asked for.
+        path: PathBuf,
+    },
+    /// The finished folder could not be renamed to it.
+    #[error("{path} cannot be replaced: {source}. Is it a mount point? Give a folder inside it as --out")]
+    Fixed {
+        /// The folder asked for.
+        path: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
+    },
+    /// The results are complete and not where they should be.
+    #[error("the results are complete in {partial}, but cannot be moved to {path}: {reason}. Move the folder yourself")]
+    NotMoved {
+        /// Where the results are.
+        partial: PathBuf,
+        /// The folder asked for.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The system refuses.
     #[error("{path} cannot be written: {source}. Check the disk and the permissions, or give another --out")]
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// What the machine says.
+        /// The system's error.
         source: std::io::Error,
     },
 }
@@ -48,34 +80,48 @@ pub enum FolderError {
 /// Name of the snapshot in a folder under construction.
 const SNAPSHOT: &str = "run.snapshot";
 
-/// A folder under construction. Unless [`RunFolder::commit`] is reached or there is a snapshot, nothing of it stays.
+/// A folder under construction, locked against other runs. Unless [`RunFolder::commit`] is reached or there is a snapshot, nothing of it
+/// remains.
 #[derive(Debug)]
 pub struct RunFolder {
     target: PathBuf,
     partial: PathBuf,
-    done: bool,
+    overwrite: bool,
+    /// Whether the folder stays when this is dropped.
+    keep: bool,
+    /// Locked while this exists; `None` where the system cannot lock a folder.
+    _lock: Option<File>,
 }
 
 impl RunFolder {
     /// Begins a folder that will become `target`.
+    ///
+    /// # Errors
+    /// The target is taken or cannot be replaced, another run writes to it, or the disk refuses.
     pub fn begin(target: &Path, overwrite: bool) -> Result<Self, FolderError> {
-        check_target(target, overwrite)?;
-        let partial = beside(target, "partial");
-        if partial.join(SNAPSHOT).is_file() && !overwrite {
-            return Err(FolderError::Interrupted { path: target.to_path_buf() });
-        }
+        let target = resolved(target)?;
+        check_target(&target, overwrite)?;
+        let partial = sibling(&target, "partial");
         let failed = |source| FolderError::Write { path: partial.clone(), source };
-        if partial.exists() {
-            std::fs::remove_dir_all(&partial).map_err(failed)?;
-        }
         std::fs::create_dir_all(&partial).map_err(failed)?;
-        Ok(Self { target: target.to_path_buf(), partial, done: false })
+        let lock = lock(&partial, &target)?;
+        if partial.join(SNAPSHOT).is_file() && !overwrite {
+            return Err(FolderError::Interrupted { path: target });
+        }
+        let folder = Self { partial, overwrite, keep: false, _lock: lock, target };
+        clear(&folder.partial)?;
+        folder.try_rename()?;
+        Ok(folder)
     }
 
     /// The folder of an interrupted run to `target` that left a snapshot. An incomplete snapshot next to it is removed.
+    ///
+    /// # Errors
+    /// There is no such run, or another process resumes it.
     pub fn reopen(target: &Path) -> Result<Self, FolderError> {
-        let partial = beside(target, "partial");
-        let nothing = |reason| FolderError::NothingToResume { path: target.to_path_buf(), reason };
+        let target = resolved(target)?;
+        let partial = sibling(&target, "partial");
+        let nothing = |reason| FolderError::NothingToResume { path: target.clone(), reason };
         if !partial.join(SNAPSHOT).is_file() {
             return Err(nothing(match (partial.is_dir(), target.join("summary.json").is_file()) {
                 (true, _) => "it was interrupted before its first snapshot. Start it again",
@@ -83,19 +129,32 @@ impl RunFolder {
                 (false, false) => "there is no such run. Give the --out of the interrupted run",
             }));
         }
-        let folder = Self { target: target.to_path_buf(), partial, done: false };
-        match std::fs::remove_file(beside(&folder.snapshot(), "partial")) {
-            Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(FolderError::Write { path: folder.snapshot(), source }),
+        let lock = lock(&partial, &target)?;
+        let folder = Self { target, partial, overwrite: false, keep: false, _lock: lock };
+        match std::fs::remove_file(sibling(&folder.snapshot(), "partial")) {
+            Err(source) if source.kind() != ErrorKind::NotFound => Err(FolderError::Write { path: folder.snapshot(), source }),
             _ => Ok(folder),
         }
     }
 
-    /// Refuses a target that is taken.
+    /// Tries the renaming of the end with what is at the target now.
+    fn try_rename(&self) -> Result<(), FolderError> {
+        if !self.target.exists() {
+            return Ok(());
+        }
+        let old = unused(&self.target, "replaced");
+        let there_and_back = std::fs::rename(&self.target, &old).and_then(|()| std::fs::rename(&old, &self.target));
+        there_and_back.map_err(|source| FolderError::Fixed { path: self.target.clone(), source })
+    }
+
+    /// Decides whether a resumed run may replace its target, and tries it.
     ///
     /// # Errors
-    /// It exists and may not be replaced.
-    pub fn check_target(&self, overwrite: bool) -> Result<(), FolderError> {
-        check_target(&self.target, overwrite)
+    /// The target exists and may not or cannot be replaced.
+    pub fn check_target(&mut self, overwrite: bool) -> Result<(), FolderError> {
+        self.overwrite = overwrite;
+        check_target(&self.target, overwrite)?;
+        self.try_rename()
     }
 
     /// Where the snapshot is, or will be.
@@ -110,7 +169,7 @@ impl RunFolder {
 
     /// The next free folder `parent/name-NNN`.
     pub fn next_name(parent: &Path, name: &str) -> PathBuf {
-        let taken = |path: &PathBuf| path.exists() || beside(path, "partial").exists();
+        let taken = |path: &PathBuf| path.exists() || sibling(path, "partial").exists();
         (1u32..).map(|number| parent.join(format!("{name}-{number:03}"))).find(|path| !taken(path)).unwrap_or_else(|| parent.join(name))
     }
 
@@ -140,22 +199,32 @@ impl RunFolder {
 
     /// Renames the folder to its target, which is returned. Snapshot and temporary files are removed only then, so that a run killed in its
     /// last moment can still be resumed.
+    ///
+    /// # Errors
+    /// It cannot be renamed, and stays where it is, complete; or a temporary file cannot be removed.
     pub fn commit(mut self, temporary: &[&str]) -> Result<PathBuf, FolderError> {
-        let failed = |source| FolderError::Write { path: self.target.clone(), source };
-        let old = beside(&self.target, "replaced");
+        self.keep = true;
+        let not_moved = |reason: String| FolderError::NotMoved { partial: self.partial.clone(), path: self.target.clone(), reason };
+        check_target(&self.target, self.overwrite).map_err(|error| not_moved(error.to_string()))?;
+        let old = unused(&self.target, "replaced");
         let replaced = self.target.exists();
         if replaced {
-            std::fs::rename(&self.target, &old).map_err(failed)?;
+            std::fs::rename(&self.target, &old).map_err(|source| not_moved(source.to_string()))?;
         }
-        std::fs::rename(&self.partial, &self.target).map_err(failed)?;
-        self.done = true;
+        if let Err(source) = std::fs::rename(&self.partial, &self.target) {
+            if replaced {
+                // Should this fail as well, the earlier results are in `old`.
+                let _ = std::fs::rename(&old, &self.target);
+            }
+            return Err(not_moved(source.to_string()));
+        }
         if replaced {
-            std::fs::remove_dir_all(&old).map_err(failed)?;
+            std::fs::remove_dir_all(&old).map_err(|source| FolderError::Write { path: old, source })?;
         }
         for name in temporary.iter().chain([&SNAPSHOT]) {
             let path = self.target.join(name);
             match std::fs::remove_file(&path) {
-                Err(source) if source.kind() != std::io::ErrorKind::NotFound => return Err(FolderError::Write { path, source }),
+                Err(source) if source.kind() != ErrorKind::NotFound => return Err(FolderError::Write { path, source }),
                 _ => {}
             }
         }
@@ -165,11 +234,46 @@ impl RunFolder {
 
 impl Drop for RunFolder {
     fn drop(&mut self) {
-        if !self.done && !self.snapshot().is_file() {
+        if !self.keep && !self.snapshot().is_file() {
             // A failure here changes nothing: the run has failed already.
             let _ = std::fs::remove_dir_all(&self.partial);
         }
     }
+}
+
+/// The target as a path whose last part is a name.
+fn resolved(target: &Path) -> Result<PathBuf, FolderError> {
+    let failed = |source| FolderError::Write { path: target.to_path_buf(), source };
+    let current = std::env::current_dir().map_err(failed)?;
+    let named = matches!(target.components().next_back(), Some(Component::Normal(_)));
+    let path = if named { target.to_path_buf() } else { target.canonicalize().map_err(failed)? };
+    let is_current = path.canonicalize().is_ok_and(|path| current.canonicalize().is_ok_and(|current| path == current));
+    if is_current || path.file_name().is_none() { Err(FolderError::Current { path: target.to_path_buf() }) } else { Ok(path) }
+}
+
+/// Locks a folder; the lock ends with the process. Systems that cannot lock a folder have no lock.
+fn lock(partial: &Path, target: &Path) -> Result<Option<File>, FolderError> {
+    let in_use = || FolderError::InUse { path: target.to_path_buf() };
+    let Ok(folder) = File::open(partial) else { return Ok(None) };
+    match folder.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(in_use()),
+        Err(TryLockError::Error(_)) => Ok(None),
+        // Another run may have renamed it in the meantime.
+        Ok(()) if !partial.is_dir() => Err(in_use()),
+        Ok(()) => Ok(Some(folder)),
+    }
+}
+
+/// Removes what an earlier run left.
+fn clear(folder: &Path) -> Result<(), FolderError> {
+    let failed = |source| FolderError::Write { path: folder.to_path_buf(), source };
+    for entry in folder.read_dir().map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let is_dir = entry.file_type().map_err(failed)?.is_dir();
+        let removed = if is_dir { std::fs::remove_dir_all(entry.path()) } else { std::fs::remove_file(entry.path()) };
+        removed.map_err(failed)?;
+    }
+    Ok(())
 }
 
 /// Refuses a target that is taken.
@@ -183,9 +287,16 @@ fn check_target(target: &Path, overwrite: bool) -> Result<(), FolderError> {
 }
 
 /// `a/b` becomes `a/.b.suffix`: on the same disk, so that renaming is one step.
-fn beside(target: &Path, suffix: &str) -> PathBuf {
+fn sibling(target: &Path, suffix: &str) -> PathBuf {
     let name = target.file_name().unwrap_or_default().to_string_lossy().into_owned();
     target.with_file_name(format!(".{name}.{suffix}"))
+}
+
+/// The first unused name among `a/.b.suffix`, `a/.b.suffix-2` and so on.
+fn unused(target: &Path, suffix: &str) -> PathBuf {
+    let first = sibling(target, suffix);
+    let numbered = (2u32..).map(|number| sibling(target, &format!("{suffix}-{number}")));
+    std::iter::once(first.clone()).chain(numbered).find(|path| path.symlink_metadata().is_err()).unwrap_or(first)
 }
 
 /// Writes a file atomically: under another name first, renamed when it is synced to the disk.
@@ -193,7 +304,7 @@ pub fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
 ) -> Result<(), FolderError> {
-    let draft = beside(path, "partial");
+    let draft = sibling(path, "partial");
     let written = std::fs::File::create(&draft).map(std::io::BufWriter::new).and_then(|mut file| {
         write(&mut file)?;
         file.into_inner()?.sync_all()?;

@@ -13,7 +13,7 @@ pub fn read_ahead<R>(
     consume: impl FnOnce(&Receiver<(usize, Result<StereoImages, InputError>)>) -> R,
 ) -> R {
     std::thread::scope(|scope| {
-        // The channel holds one less: one more waits in the sender's hand.
+        // One frame more is with the sender while it waits.
         let (sender, receiver) = sync_channel(AHEAD - 1);
         scope.spawn(move || {
             for &index in indices {

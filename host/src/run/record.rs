@@ -46,7 +46,7 @@ pub struct RunRecord {
     pub seconds: f64,
     /// Of it, mapping and waiting for images: without pictures, evaluation and files that only the report needs, s.
     pub mapping_seconds: f64,
-    /// Most bytes resident, where the machine tells.
+    /// Most bytes resident, where the system reports it.
     pub rss_peak_bytes: Option<u64>,
 }
 

@@ -1,6 +1,6 @@
-//! Memory the machine says this process holds. Linux tells it in `/proc`; elsewhere it is unknown.
+//! Resident memory of this process. Linux reports it in `/proc`; elsewhere it is unknown.
 
-/// Resident bytes now and at most, if the machine tells.
+/// Resident bytes now and at most, if the system reports them.
 pub fn resident_bytes() -> Option<(u64, u64)> {
     parse(&std::fs::read_to_string("/proc/self/status").ok()?)
 }

@@ -183,7 +183,7 @@ impl<'p, 's> Session<'p, 's> {
         }
     }
 
-    /// Ends the run where it may not go on.
+    /// Refuses a frame beyond the limits of the run.
     fn check_limits(&self, row: &FrameRow) -> Result<(), RunError> {
         if self.plan.strict && row.severity() >= Severity::MapAffected {
             return Err(RunError::Strict { frame: row.frame, cause: row.cause() });

@@ -1,4 +1,4 @@
-//! What a run holds next to its mapper, as plain data: all of it goes into a checkpoint.
+//! The state of a run next to its mapper, as plain data: all of it goes into a checkpoint.
 
 use crate::observe::{FrameRow, Observers};
 use serde::{Deserialize, Serialize};

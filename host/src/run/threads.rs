@@ -2,7 +2,7 @@
 //!
 //! CPU time is the threads' own clock, so it counts work, not waiting, and does not grow when others use the machine. Each thread knows
 //! the stage it works for; whenever that changes (a stage begins or ends, a piece of work is taken over from another thread) the time since the
-//! last change is charged to the stage before. So pieces that run elsewhere are charged once, to the right stage.
+//! last change is charged to the stage before. So work that runs elsewhere is charged once, to the right stage.
 
 use crate::observe::{STAGES, StageTime};
 use cpu_time::ThreadTime;

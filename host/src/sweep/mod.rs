@@ -29,13 +29,13 @@ pub enum SweepError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the machine says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] FolderError),
-    /// A file holds something else.
+    /// A file is not of a sweep.
     #[error("{path} is not a file of a sweep: {reason}. Remove it, or give another --out")]
     Foreign {
         /// The file.

@@ -10,15 +10,15 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// Voxels seen at most so often are pruned.
+    /// The weight up to which voxels are pruned.
     PruneWeight,
     /// Every k-th frame is fused.
     FrameRate,
     /// The images' size.
     Scale,
-    /// Where depth comes from.
+    /// The source of depth.
     Depth,
-    /// Whether what moves is kept apart.
+    /// Whether objects are separate from the static map.
     Dynamic,
     /// The three methods of Table I: depth tracker, stereo egomotion, stereo egomotion and objects.
     Methods,
@@ -57,7 +57,7 @@ impl FromStr for Data {
         if text == "street" {
             return Ok(Self { path: None, sequence: None });
         }
-        // A drive letter is no path with a sequence.
+        // The colon of a Windows drive does not separate a sequence.
         let split = text.rsplit_once(':').filter(|(path, name)| path.len() > 1 && !name.is_empty() && !name.contains(['/', '\\']));
         Ok(match split {
             Some((path, sequence)) => Self { path: Some(path.into()), sequence: Some(sequence.to_owned()) },
@@ -78,7 +78,7 @@ impl Data {
     }
 }
 
-/// What to vary, over what.
+/// What to vary, and its values.
 #[derive(Clone, Debug)]
 pub struct SweepRequest {
     /// Data sets, and what each is evaluated against: `lidar`, `exact` or nothing.
@@ -122,18 +122,18 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Spreads out what is request.
+    /// Lists points and runs of a request.
     pub fn new(request: &SweepRequest) -> Self {
         let mut plan = Self { points: Vec::new(), runs: BTreeMap::new() };
         for &kind in &request.kinds {
             for (data, reference) in &request.data {
-                for (value, more, late) in values(kind, request, data) {
+                for (value, more, delayed) in values(kind, request, data) {
                     let mut arguments = request.common.clone();
                     arguments.extend(more);
                     if let Some(reference) = reference {
                         arguments.extend(["--evaluate", reference].map(str::to_owned));
                     }
-                    if late {
+                    if delayed {
                         let [lag, delay] = request.lag_and_delay;
                         arguments.extend(["--set".to_owned(), format!("volume.prune_lag={lag}")]);
                         arguments.extend(["--evaluation-delay".to_owned(), delay.to_string()]);
@@ -181,12 +181,12 @@ impl Plan {
     }
 }
 
-/// Values of one sweep on one data set: as shown, as arguments, and whether the map is looked at late.
+/// Values of one sweep on one data set: as shown, as arguments, and whether the map is evaluated later.
 fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Vec<String>, bool)> {
-    let one = |value: &dyn std::fmt::Display, arguments: &[&str], late: bool| {
-        (value.to_string(), arguments.iter().map(|argument| (*argument).to_owned()).collect::<Vec<_>>(), late)
+    let one = |value: &dyn std::fmt::Display, arguments: &[&str], delayed: bool| {
+        (value.to_string(), arguments.iter().map(|argument| (*argument).to_owned()).collect::<Vec<_>>(), delayed)
     };
-    // The defaults are left unsaid, so that sweeps share the runs they have in common.
+    // Defaults are not listed as arguments, so that sweeps share the runs they have in common.
     match kind {
         Kind::PruneWeight => request
             .weights
@@ -228,7 +228,7 @@ fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Vec<S
         Kind::Methods => vec![
             one(&"depth tracker (ICP)", &["--dynamic", "off", "--egomotion", "icp"], false),
             one(&"stereo egomotion", &["--dynamic", "off"], false),
-            one(&"stereo egomotion, objects apart", &[], false),
+            one(&"stereo egomotion, separate objects", &[], false),
         ],
     }
 }

@@ -1,4 +1,4 @@
-//! The original's numbers, to be shown beside ours: printed or digitised (to .002) from the figures of its evaluation notebooks, KITTI's rule, depth up to
+//! The original's numbers, for comparison: printed or digitised (to .002) from the figures of its evaluation notebooks, KITTI's rule, depth up to
 //! 20 m. Other data, another machine and a decade of seconds lie between: shapes can be compared, values cannot.
 
 /// Prune weights, on odometry 09, 1000 frames.

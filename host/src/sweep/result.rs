@@ -61,7 +61,7 @@ impl RunResult {
     /// Reads a result; `None` where there is none.
     ///
     /// # Errors
-    /// The file cannot be read, or holds something else.
+    /// The file cannot be read, or is not a result.
     pub fn read(path: &Path) -> Result<Option<Self>, SweepError> {
         let text = match std::fs::read_to_string(path) {
             Ok(text) => text,

@@ -56,7 +56,7 @@ fn points_that_mean_the_same_run_share_it() {
     let run = |kind: Kind, value: &str| plan.of(kind, "street").find(|point| point.value == value).map(|point| point.run.clone());
     assert_eq!(run(Kind::PruneWeight, "1"), run(Kind::FrameRate, "1"), "both are the default, looked at late");
     assert_eq!(run(Kind::Scale, "100"), run(Kind::Dynamic, "on"));
-    assert_eq!(run(Kind::Depth, "elas"), run(Kind::Methods, "stereo egomotion, objects apart"));
+    assert_eq!(run(Kind::Depth, "elas"), run(Kind::Methods, "stereo egomotion, separate objects"));
     assert_ne!(run(Kind::FrameRate, "1"), run(Kind::Scale, "100"), "the one is looked at late");
     assert!(run(Kind::Depth, "exact").is_some() && plan.of(Kind::Depth, "06").count() == 1, "only the street has exact depth");
     // By hand: 3 weights and 1 rate late; default, 50 %, off, tracker; on the street exact depth as well.

@@ -6,20 +6,20 @@ mod trajectory;
 #[derive(Debug, clap::Args)]
 pub struct EvaluateArgs {
     #[command(subcommand)]
-    what: What,
+    subject: Subject,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
-    /// Hold a trajectory against the true one
+enum Subject {
+    /// Evaluate a trajectory against ground truth
     Trajectory(trajectory::TrajectoryArgs),
-    /// Hold disparity against a stereo benchmark: KITTI 2012 or 2015
+    /// Evaluate disparity against a stereo benchmark: KITTI 2012 or 2015
     Stereo(stereo::StereoArgs),
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
-    match &args.what {
-        What::Trajectory(args) => trajectory::run(args),
-        What::Stereo(args) => stereo::run(args),
+    match &args.subject {
+        Subject::Trajectory(args) => trajectory::run(args),
+        Subject::Stereo(args) => stereo::run(args),
     }
 }

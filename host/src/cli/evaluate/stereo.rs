@@ -57,14 +57,14 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
             Some(folder) => read_png_deep(&folder.join(format!("{}.png", pair.name)))?,
             None => threads.run(|| matched(pair, &config, &threads))?,
         };
-        judge(pair, &given, &mut counts)?;
+        count(pair, &given, &mut counts)?;
     }
     let regions = REGIONS.into_iter().zip(counts).filter_map(|(name, counts)| Some((name, counts.figures()?))).collect();
     let found = Found { benchmark: set.name, pairs: set.pairs.len(), regions };
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&found)?);
+        outln!("{}", serde_json::to_string_pretty(&found)?);
     } else {
-        tell(&found);
+        print_figures(&found);
     }
     Ok(())
 }
@@ -90,7 +90,7 @@ fn matched(pair: &StereoPair, config: &StereoConfig, threads: &Threads) -> anyho
 }
 
 /// Counts a pair in every region it has truth for.
-fn judge(pair: &StereoPair, given: &Image<u16>, counts: &mut [StereoCounts; REGIONS.len()]) -> anyhow::Result<()> {
+fn count(pair: &StereoPair, given: &Image<u16>, counts: &mut [StereoCounts; REGIONS.len()]) -> anyhow::Result<()> {
     let same = |path: &Path, image: &Image<u16>| {
         if (image.width(), image.height()) == (given.width(), given.height()) {
             return Ok(());
@@ -117,18 +117,19 @@ fn judge(pair: &StereoPair, given: &Image<u16>, counts: &mut [StereoCounts; REGI
     Ok(())
 }
 
-fn tell(found: &Found) {
-    println!(
+fn print_figures(found: &Found) {
+    outln!(
         "{}: {} pairs. Percent of the pixels with an estimate; after the bar of all, holes filled as the benchmark does",
-        found.benchmark, found.pairs
+        found.benchmark,
+        found.pairs
     );
-    print!("{:<16}{:>11}{:>10}{:>18}", "region", "pixels", "coverage", "D1");
-    BAD_PX.iter().for_each(|px| print!("{:>18}", format!("> {px} px")));
-    println!("{:>12}{:>10}", "mean |e|", "mean e");
+    out!("{:<16}{:>11}{:>10}{:>18}", "region", "pixels", "coverage", "D1");
+    BAD_PX.iter().for_each(|px| out!("{:>18}", format!("> {px} px")));
+    outln!("{:>12}{:>10}", "mean |e|", "mean e");
     for (name, of) in REGIONS.iter().filter_map(|name| Some((name, found.regions.get(name)?))) {
         let both = |given: f64, filled: f64| format!("{:.2} | {:.2}", 100.0 * given, 100.0 * filled);
-        print!("{name:<16}{:>11}{:>9.2}%{:>18}", of.pixels, 100.0 * of.coverage, both(of.d1, of.d1_filled));
-        of.bad.iter().zip(of.bad_filled).for_each(|(given, filled)| print!("{:>18}", both(*given, filled)));
-        println!("{:>9.3} px{:>7.3} px", of.mean_error_px, of.mean_signed_error_px);
+        out!("{name:<16}{:>11}{:>9.2}%{:>18}", of.pixels, 100.0 * of.coverage, both(of.d1, of.d1_filled));
+        of.bad.iter().zip(of.bad_filled).for_each(|(given, filled)| out!("{:>18}", both(*given, filled)));
+        outln!("{:>9.3} px{:>7.3} px", of.mean_error_px, of.mean_signed_error_px);
     }
 }

@@ -1,6 +1,6 @@
 //! `dynvox evaluate trajectory`.
 
-use crate::evaluate::trajectory::{self, TrajectoryErrors, read_trajectory, together};
+use crate::evaluate::trajectory::{self, TrajectoryErrors, matched, read_trajectory};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -15,25 +15,25 @@ pub struct TrajectoryArgs {
 }
 
 pub fn run(args: &TrajectoryArgs) -> anyhow::Result<()> {
-    let (estimate, truth) = together(&read_trajectory(&args.estimate)?, &read_trajectory(&args.truth)?)?;
+    let (estimate, truth) = matched(&read_trajectory(&args.estimate)?, &read_trajectory(&args.truth)?)?;
     let found = trajectory::errors(&truth, &estimate).ok_or_else(|| anyhow::anyhow!("two poses are needed. Give longer trajectories"))?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&found)?);
+        outln!("{}", serde_json::to_string_pretty(&found)?);
         return Ok(());
     }
     let length_m = trajectory::travelled_m(&truth).last().copied().unwrap_or_default();
-    println!("{:<28}{} over {length_m:.1} m", "poses", truth.len());
-    tell(&found);
+    outln!("{:<28}{} over {length_m:.1} m", "poses", truth.len());
+    print_figures(&found);
     Ok(())
 }
 
-fn tell(found: &TrajectoryErrors) {
-    println!("{:<28}{:.4} m, {:.4} deg", "frame to frame, RMS", found.rpe_t_m, found.rpe_r_deg);
-    println!("{:<28}{:.4} m", "after alignment (ATE), RMS", found.ate_m);
-    for (length_m, percent, deg_per_m, pieces) in &found.per_length {
-        println!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m, {pieces} pieces", format!("pieces of {length_m} m"));
+fn print_figures(found: &TrajectoryErrors) {
+    outln!("{:<28}{:.4} m, {:.4} deg", "frame to frame, RMS", found.rpe_t_m, found.rpe_r_deg);
+    outln!("{:<28}{:.4} m", "after alignment (ATE), RMS", found.ate_m);
+    for (length_m, percent, deg_per_m, segments) in &found.per_length {
+        outln!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m, {segments} segments", format!("segments of {length_m} m"));
     }
     if let (Some(percent), Some(deg_per_m)) = (found.t_err_percent, found.r_err_deg_per_m) {
-        println!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m", "all pieces (t_err, r_err)");
+        outln!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m", "all segments (t_err, r_err)");
     }
 }

@@ -51,7 +51,7 @@ pub fn checkpoints(plan: &Plan, every: usize) -> anyhow::Result<CheckpointPlan> 
 /// Resumes the interrupted run to `target`.
 pub fn run(args: &RunArgs, target: &Path) -> anyhow::Result<()> {
     let target = std::path::absolute(target)?;
-    let folder = RunFolder::reopen(&target)?;
+    let mut folder = RunFolder::reopen(&target)?;
     let checkpoint = Checkpoint::read(&folder)?;
     let manifest = checkpoint.manifest().clone();
     // Relative paths among the arguments start at the working directory of the run.

@@ -52,7 +52,7 @@ impl PendingFrame {
 
     /// Compares with a view of the map from the frame's pose; `focal_baseline_px_m` turns its depth into disparity. Also gives the map's
     /// disparity of each sample, 0 where it shows nothing. `enlarged` px of the stored images are one px of those compared: errors are
-    /// counted at full size, whatever the scale.
+    /// counted at full size, at every scale.
     pub fn compare(&self, map_depth_m: &View<'_, f32>, focal_baseline_px_m: f64, enlarged: f32) -> (EvaluatedFrame, Vec<f32>) {
         let mut regions = [Counts::default(); 3];
         let shown = |sample: &Sample| {

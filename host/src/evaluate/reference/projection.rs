@@ -24,7 +24,7 @@ pub struct Field {
 }
 
 impl Field {
-    fn holds(&self, depth_m: f64) -> bool {
+    fn contains(&self, depth_m: f64) -> bool {
         depth_m >= self.near_m && depth_m <= self.far_m
     }
 }
@@ -72,7 +72,7 @@ pub fn project_scan(scan: &LidarScan, field: &Field) -> ProjectedScan {
         let [[u, v, depth_m], [u_right, v_right, _]] = scan.cameras.map(|camera| seen(&camera, point));
         let disparity_px = u - u_right;
         // False for NaN.
-        let measures = field.holds(depth_m) && disparity_px > 0.0;
+        let measures = field.contains(depth_m) && disparity_px > 0.0;
         if !measures {
             projected.count.out_of_range += 1;
             continue;
@@ -104,7 +104,7 @@ pub fn sample_exact_depth(depth_m: &Image<f32>, rig: &StereoRig, field: &Field) 
         for u in (0..width).step_by(step) {
             let depth_m = f64::from(depth_m.get(u, v).unwrap_or_default());
             projected.count.points += 1;
-            if field.holds(depth_m) {
+            if field.contains(depth_m) {
                 let disparity_px = (rig.focal_baseline_px_m() / depth_m) as f32;
                 projected.points.push(ProjectedPoint { u: u as u16, v: v as u16, disparity_px });
             } else {

@@ -42,7 +42,7 @@ fn both_layouts_are_found_and_a_folder_without_truth_is_told() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, "").unwrap();
     };
-    assert!(find_stereo_set(root.path()).unwrap_err().to_string().contains("is no stereo benchmark"));
+    assert!(find_stereo_set(root.path()).unwrap_err().to_string().contains("is not a stereo benchmark"));
     touch("training/image_2/000000_10.png");
     touch("training/image_2/000000_11.png");
     touch("training/image_3/000000_10.png");

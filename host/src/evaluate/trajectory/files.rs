@@ -1,10 +1,10 @@
-//! Two trajectories, brought together: by time, or row by row.
+//! Two trajectories, matched: by time, or row by row.
 
 use crate::formats::{FormatError, Trajectory, read_poses};
 use dynvox_core::geometry::Transform;
 use std::path::Path;
 
-/// Two poses belong together when their times differ by at most this, s (as `evo` has it).
+/// Two poses are of the same frame when their times differ by at most this, s (as `evo` has it).
 const SAME_TIME_S: f64 = 0.01;
 /// File of a run folder that is read when a folder is given.
 const OF_A_RUN: &str = "trajectory_tum.txt";
@@ -15,9 +15,9 @@ pub enum TrajectoryError {
     /// A file cannot be read as poses.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// Lists that do not belong together.
+    /// Lists of different lengths.
     #[error(
-        "the first has {first} poses, the second {second}, and without times in both nobody knows which belong together. Give TUM files, or files of the same frames"
+        "the first has {first} poses, the second {second}, and they cannot be matched by time. Give TUM files, or files of the same frames"
     )]
     Lengths {
         /// Poses of the first.
@@ -26,7 +26,9 @@ pub enum TrajectoryError {
         second: usize,
     },
     /// Fewer than two pairs.
-    #[error("only {pairs} poses belong together: two are needed. Times must agree to {SAME_TIME_S} s; are both in the same clock?")]
+    #[error(
+        "only {pairs} poses have the same time: two are needed. Times must agree to {SAME_TIME_S} s; check that both use the same clock"
+    )]
     Few {
         /// Pairs found.
         pairs: usize,
@@ -42,11 +44,11 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     Ok(read_poses(&path)?)
 }
 
-/// The poses of both that belong together: by time where both have times, else row by row.
+/// The poses of both that are of the same frame: by time where both have times, otherwise row by row.
 ///
 /// # Errors
-/// They cannot be told to belong together, or fewer than two do.
-pub fn together(first: &Trajectory, second: &Trajectory) -> Result<(Vec<Transform>, Vec<Transform>), TrajectoryError> {
+/// They cannot be matched, or fewer than two can.
+pub fn matched(first: &Trajectory, second: &Trajectory) -> Result<(Vec<Transform>, Vec<Transform>), TrajectoryError> {
     let pairs: Vec<(Transform, Transform)> = match (&first.times_s, &second.times_s) {
         (Some(times), Some(others)) => {
             let nearest = |time: &f64| {

@@ -1,14 +1,14 @@
 //! Trajectory errors: KITTI's relative errors over sub-lengths, relative error per frame, absolute error after alignment.
 //!
-//! `E = (est_i^-1 est_j)^-1 (true_i^-1 true_j)` is the error of a piece from frame i to frame j. A piece of length L ends at the first
-//! frame whose distance travelled along the truth is at least L beyond frame i's; the errors of all pieces of all lengths are averaged
+//! `E = (est_i^-1 est_j)^-1 (true_i^-1 true_j)` is the error of a segment from frame i to frame j. A segment of length L ends at the first
+//! frame whose distance travelled along the truth is at least L beyond frame i's; the errors of all segments of all lengths are averaged
 //! (Geiger, Lenz, Urtasun, *Are we ready for autonomous driving?*, CVPR 2012: 100 to 800 m, from every tenth frame on). A path shorter than
-//! 200 m would give few pieces of few lengths: it is measured over 5 to 50 m from every frame on, and the result says so.
+//! 200 m would have few segments of few lengths: it is measured over 5 to 50 m from every frame on, and the result lists its lengths.
 
 mod align;
 mod files;
 
-pub use files::{TrajectoryError, read_trajectory, together};
+pub use files::{TrajectoryError, matched, read_trajectory};
 
 use align::aligned_error_m;
 use dynvox_core::geometry::Transform;
@@ -20,16 +20,16 @@ pub const LONG_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 8
 /// Sub-lengths for clips, m.
 pub const SHORT_M: [f64; 6] = [5.0, 10.0, 20.0, 30.0, 40.0, 50.0];
 
-/// Frames between two starts of the benchmark's pieces.
+/// Frames between two starts of the benchmark's segments.
 const LONG_STEP: usize = 10;
 
 /// Errors of a trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrajectoryErrors {
-    /// Mean translation error of the pieces, percent of their length; `None` where the path is shorter than every length.
+    /// Mean translation error of the segments, percent of their length; `None` where the path is shorter than every length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub t_err_percent: Option<f64>,
-    /// Mean rotation error of the pieces, degrees per metre.
+    /// Mean rotation error of the segments, degrees per metre.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub r_err_deg_per_m: Option<f64>,
     /// Root mean square translation error from frame to frame, m.
@@ -38,7 +38,7 @@ pub struct TrajectoryErrors {
     pub rpe_r_deg: f64,
     /// Root mean square distance of the positions after the best rigid alignment, m.
     pub ate_m: f64,
-    /// Each sub-length that fits at least once: length in m, translation in percent, rotation in deg/m, pieces.
+    /// Each sub-length that fits at least once: length in m, translation in percent, rotation in deg/m, segments.
     pub per_length: Vec<(f64, f64, f64, usize)>,
 }
 
@@ -50,29 +50,29 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
     let travelled = travelled_m(truth);
     let long = travelled.last()? >= &LONG_M[1];
     let (lengths, step): (&[f64], usize) = if long { (&LONG_M, LONG_STEP) } else { (&SHORT_M, 1) };
-    let piece = |from: usize, to: usize| {
+    let segment = |from: usize, to: usize| {
         let moved = estimate[from].inverse() * estimate[to];
         moved.inverse() * (truth[from].inverse() * truth[to])
     };
     let mut all = Vec::new();
     let mut per_length = Vec::new();
     for &length_m in lengths {
-        let pieces: Vec<(f64, f64)> = (0..truth.len())
+        let segments: Vec<(f64, f64)> = (0..truth.len())
             .step_by(step)
             .map_while(|from| {
                 let to = travelled.partition_point(|&at| at < travelled[from] + length_m);
                 (to < truth.len()).then(|| {
-                    let error = piece(from, to);
+                    let error = segment(from, to);
                     (error.distance_m() / length_m * 100.0, error.angle_rad().to_degrees() / length_m)
                 })
             })
             .collect();
-        if let Some((t, r)) = means(&pieces) {
-            per_length.push((length_m, t, r, pieces.len()));
+        if let Some((t, r)) = means(&segments) {
+            per_length.push((length_m, t, r, segments.len()));
         }
-        all.extend(pieces);
+        all.extend(segments);
     }
-    let steps: Vec<Transform> = (1..truth.len()).map(|to| piece(to - 1, to)).collect();
+    let steps: Vec<Transform> = (1..truth.len()).map(|to| segment(to - 1, to)).collect();
     let overall = means(&all);
     Some(TrajectoryErrors {
         t_err_percent: overall.map(|(t, _)| t),
@@ -95,10 +95,10 @@ pub fn travelled_m(poses: &[Transform]) -> Vec<f64> {
         .collect()
 }
 
-fn means(pieces: &[(f64, f64)]) -> Option<(f64, f64)> {
-    let count = pieces.len() as f64;
-    let sum = pieces.iter().fold((0.0, 0.0), |sum, piece| (sum.0 + piece.0, sum.1 + piece.1));
-    (!pieces.is_empty()).then_some((sum.0 / count, sum.1 / count))
+fn means(segments: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let count = segments.len() as f64;
+    let sum = segments.iter().fold((0.0, 0.0), |sum, segment| (sum.0 + segment.0, sum.1 + segment.1));
+    (!segments.is_empty()).then_some((sum.0 / count, sum.1 / count))
 }
 
 fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {

@@ -77,7 +77,7 @@ fn too_little_to_compare_is_none() {
 fn agrees_with_evo() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/evaluate/trajectory/evo");
     let [estimate, truth] = ["estimate.txt", "truth.txt"].map(|name| read_trajectory(&here.join(name)).unwrap());
-    let (estimate, truth) = together(&estimate, &truth).unwrap();
+    let (estimate, truth) = matched(&estimate, &truth).unwrap();
     let found = errors(&truth, &estimate).unwrap();
     let evo: serde_json::Value = serde_json::from_str(include_str!("evo/figures.json")).unwrap();
     let close = |name: &str, value: f64, expected: &serde_json::Value| {
@@ -114,7 +114,7 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
     let kitti = read_trajectory(&write("kitti.txt", &|out| write_kitti(out, &poses).unwrap())).unwrap();
     let tum = read_trajectory(&write("trajectory_tum.txt", &|out| write_tum(out, &times_ns, &poses).unwrap())).unwrap();
     assert_eq!((&kitti.times_s, tum.times_s.as_deref()), (&None, Some(&times[..])));
-    let (a, b) = together(&kitti, &tum).unwrap();
+    let (a, b) = matched(&kitti, &tum).unwrap();
     assert!(errors(&a, &b).unwrap().ate_m < 1e-9, "one trajectory in two formats");
     assert_eq!(read_trajectory(folder.path()).unwrap(), tum, "a run folder's own");
     // Every second pose, by another clock that is 4 ms late.
@@ -122,14 +122,14 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
         times_s: Some(times.iter().step_by(2).map(|time| time + 0.004).collect()),
         poses: poses.iter().step_by(2).copied().collect(),
     };
-    let (a, b) = together(&half, &tum).unwrap();
+    let (a, b) = matched(&half, &tum).unwrap();
     assert!(a.len() == 6 && errors(&a, &b).unwrap().ate_m < 1e-9);
-    assert!(together(&half, &kitti).unwrap_err().to_string().contains("has 6 poses, the second 12"));
+    assert!(matched(&half, &kitti).unwrap_err().to_string().contains("has 6 poses, the second 12"));
     let late = Trajectory {
         times_s: half.times_s.iter().map(|times| times.iter().map(|time| time + 5e3).collect()).next(),
         ..half
     };
-    assert!(together(&late, &tum).unwrap_err().to_string().contains("same clock"));
+    assert!(matched(&late, &tum).unwrap_err().to_string().contains("same clock"));
     let mixed = write("mixed.txt", &|out| {
         write_kitti(out, &poses[..1]).unwrap();
         write_tum(out, &times_ns, &poses[..1]).unwrap();

@@ -60,7 +60,7 @@ pub(super) fn x_label(x: f64, anchor: &str, label: &str) -> Markup {
     html! { text x=(px(x)) y=(HEIGHT - 8.0) text-anchor=(anchor) { (label) } }
 }
 
-/// Names of series beside their colours.
+/// Names of series and their colours.
 pub(super) fn legend<'a>(entries: impl Iterator<Item = (&'a str, &'a str)>) -> Markup {
     html! {
         div.legend {

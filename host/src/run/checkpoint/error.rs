@@ -6,12 +6,12 @@ use std::path::PathBuf;
 /// Why an interrupted run cannot be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum ResumeError {
-    /// The machine refuses.
+    /// The system refuses.
     #[error("{path} cannot be read: {source}. Check the disk and the permissions")]
     Read {
         /// The snapshot.
         path: PathBuf,
-        /// What the machine says.
+        /// The system's error.
         source: io::Error,
     },
     /// Something else is in its place.
@@ -32,7 +32,7 @@ pub enum ResumeError {
         /// The one taken.
         taken: u32,
     },
-    /// Another dynvox wrote it that says the same version.
+    /// Another dynvox of the same snapshot version wrote it.
     #[error("{path} was written by another dynvox: {reason}. Resume with that one, or start the run again with --overwrite")]
     Otherwise {
         /// The snapshot.

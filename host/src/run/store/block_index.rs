@@ -2,9 +2,9 @@
 //!
 //! Space is cut into tiles of 32 blocks a side. Each record names the one before it in its tile, so of a tile only the newest record is
 //! remembered; the places of all its blocks are read up along that chain when the camera comes back to it, and forgotten again when it has
-//! been away. A drive ahead never looks back, so it never reads.
+//! been away. A camera that only moves ahead never reads.
 //!
-//! Memory: about 20 bytes per tile of the drive (12.8 m a side at 5 cm), and 24 bytes or so per block of the [`OPEN_TILES`] read last.
+//! Memory: about 20 bytes per tile of the path (12.8 m a side at 5 cm), and 24 bytes or so per block of the [`OPEN_TILES`] read last.
 
 use dynvox_core::volume::BlockCoord;
 use hashbrown::HashMap;

@@ -42,14 +42,14 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// It existed at the checkpoint.
-    #[error("{path} is missing: it holds the blocks that had left the pool. Put it back, or begin the run again with --overwrite")]
+    #[error("{path} is missing: it has the evicted blocks of the run. Restore it, or start the run again with --overwrite")]
     Missing {
         /// The store.
         path: PathBuf,
     },
     /// It was changed after the checkpoint.
-    #[error("{path} is not as the run left it: its first {bytes} bytes were cut short or changed. Begin the run again with --overwrite")]
-    Parted {
+    #[error("{path} is not as the run left it: its first {bytes} bytes are truncated or changed. Start the run again with --overwrite")]
+    Changed {
         /// The store.
         path: PathBuf,
         /// Its length at the checkpoint, bytes.
@@ -60,7 +60,7 @@ pub enum StoreError {
         "{path} holds blocks of {found_voxel_m} m voxels with {found_truncation_m} m truncation, not {voxel_m} m with {truncation_m} m; \
          run with those settings, or name another file"
     )]
-    Otherwise {
+    OtherVoxels {
         /// The store.
         path: PathBuf,
         /// Its voxel size, m.
@@ -123,7 +123,7 @@ impl BlockFile<File> {
         let len = file.metadata().map_err(at)?.len();
         let mut store = Self::over(file);
         if len < PREAMBLE as u64 {
-            // New, or incomplete within its first bytes: it holds no record.
+            // New, or incomplete within its first bytes: it has no record.
             if !MAGIC.starts_with(&store.head(len.min(8)).map_err(at)?) {
                 return Err(StoreError::Foreign { path: path.to_owned() });
             }
@@ -147,7 +147,7 @@ impl BlockFile<File> {
             _ => at(source),
         })?;
         let mut store = Self::over(file);
-        let parted = || StoreError::Parted { path: path.to_owned(), bytes: position.bytes };
+        let parted = || StoreError::Changed { path: path.to_owned(), bytes: position.bytes };
         if store.file.metadata().map_err(at)?.len() < PREAMBLE as u64 {
             return Err(parted());
         }
@@ -183,7 +183,7 @@ impl BlockFile<File> {
         }
         if found != preamble(voxel_m, truncation_m) {
             let float = |at: usize| f32::from_le_bytes([found[at], found[at + 1], found[at + 2], found[at + 3]]);
-            return Err(StoreError::Otherwise {
+            return Err(StoreError::OtherVoxels {
                 path: path.to_owned(),
                 found_voxel_m: float(8),
                 found_truncation_m: float(12),

@@ -1,4 +1,4 @@
-//! A map on disk as triangles, piece by piece: what is in memory at once is a cube of 8 blocks a side and the layer behind it.
+//! A map on disk as triangles, cube by cube: in memory at once are a cube of 8 blocks a side and the layer behind it.
 
 use super::BlockFile;
 use dynvox_core::Capacity;
@@ -8,13 +8,13 @@ use dynvox_core::volume::{BlockCoord, NoStore, Volume, VolumeConfig};
 use hashbrown::HashSet;
 use std::io::{Read, Seek, Write};
 
-/// A piece's side in blocks is 2 to this power.
-const PIECE_BITS: u32 = 3;
-/// Blocks along a piece's side, with the layer behind it.
-const SIDE: i32 = (1 << PIECE_BITS) + 1;
+/// A cube's side in blocks is 2 to this power.
+const CUBE_BITS: u32 = 3;
+/// Blocks along a cube's side, with the layer behind it.
+const SIDE: i32 = (1 << CUBE_BITS) + 1;
 
-/// What a volume for one piece holds.
-const fn piece(colour: bool) -> Capacity {
+/// The capacity of a volume for one cube.
+const fn cube_capacity(colour: bool) -> Capacity {
     Capacity {
         blocks: (SIDE * SIDE * SIDE) as usize,
         visible_blocks: 1,
@@ -24,10 +24,10 @@ const fn piece(colour: bool) -> Capacity {
     }
 }
 
-const _: () = assert!(Volume::bytes(&piece(true)) < Capacity::TINY.bytes(), "any profile's slab has room for a piece");
+const _: () = assert!(Volume::bytes(&cube_capacity(true)) < Capacity::TINY.bytes(), "any profile's slab is large enough for a cube");
 
 /// Hands the triangles of all blocks in `store` but those in `without` to `sink`, in an order that depends on the blocks alone. `slab` holds
-/// a piece at a time: any profile's is large enough. How many triangles there were.
+/// a cube at a time: any profile's is large enough. Returns the number of triangles.
 ///
 /// # Errors
 ///
@@ -39,34 +39,34 @@ pub fn triangles<F: Read + Write + Seek>(
     without: &HashSet<BlockCoord>,
     sink: &mut impl FnMut(Triangle),
 ) -> Result<u64, SlabError> {
-    let capacity = piece(colour);
+    let capacity = cube_capacity(colour);
     let mut carver = Carver::new(slab, Volume::bytes(&capacity))?;
     let mut volume = Volume::new_in(&capacity, volume, &mut carver);
     carver.check()?;
     let mut count = 0;
     for tile in store.tiles() {
         let mut blocks = store.blocks_of(tile);
-        let piece_of = |coord: &BlockCoord| [coord.x, coord.y, coord.z].map(|c| c >> PIECE_BITS);
-        blocks.sort_unstable_by_key(|coord| (piece_of(coord), *coord));
-        for blocks in blocks.chunk_by(|a, b| piece_of(a) == piece_of(b)) {
-            let Some(piece) = blocks.first().map(piece_of) else { continue };
+        let cube_of = |coord: &BlockCoord| [coord.x, coord.y, coord.z].map(|c| c >> CUBE_BITS);
+        blocks.sort_unstable_by_key(|coord| (cube_of(coord), *coord));
+        for blocks in blocks.chunk_by(|a, b| cube_of(a) == cube_of(b)) {
+            let Some(cube) = blocks.first().map(cube_of) else { continue };
             for &coord in blocks {
                 volume.load(coord, store);
             }
-            for coord in behind(piece) {
+            for coord in behind(cube) {
                 volume.load(coord, store);
             }
-            count += volume.triangles_of(mesh, |coord| piece_of(&coord) == piece && !without.contains(&coord), sink);
-            // Empties the volume: what leaves is still in the store.
+            count += volume.triangles_of(mesh, |coord| cube_of(&coord) == cube && !without.contains(&coord), sink);
+            // Empties the volume: its blocks are still in the store.
             volume.stream_out(&mut NoStore);
         }
     }
     Ok(count)
 }
 
-/// The blocks behind a piece's last ones on each axis.
-fn behind(piece: [i16; 3]) -> impl Iterator<Item = BlockCoord> {
-    let first = piece.map(|c| i32::from(c) << PIECE_BITS);
+/// The blocks behind a cube's last ones on each axis.
+fn behind(cube: [i16; 3]) -> impl Iterator<Item = BlockCoord> {
+    let first = cube.map(|c| i32::from(c) << CUBE_BITS);
     (0..SIDE * SIDE * SIDE).filter_map(move |i| {
         let [x, y, z] = [i % SIDE, i / SIDE % SIDE, i / SIDE / SIDE];
         let is_behind = x == SIDE - 1 || y == SIDE - 1 || z == SIDE - 1;

@@ -194,11 +194,11 @@ fn a_store_is_reopened_where_it_was_marked_and_what_came_after_is_cut() {
         let mut changed = whole.clone();
         changed[at] ^= 1 << (at % 8);
         fs::write(&path, &changed).unwrap();
-        assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Parted { .. })), "byte {at}");
+        assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Changed { .. })), "byte {at}");
         assert!(fs::read(&path).unwrap() == changed, "it stays as it is");
     }
     fs::write(&path, &whole[..marked.bytes as usize - 1]).unwrap();
-    assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Parted { .. })));
+    assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Changed { .. })));
     fs::write(&path, &whole).unwrap();
     assert_eq!(BlockFile::reopen(&path, 0.05, 0.3, &empty).unwrap().records(), 0);
     fs::remove_file(&path).unwrap();
