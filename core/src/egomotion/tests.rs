@@ -7,7 +7,7 @@ use crate::{
     random::Random,
     scene_flow::{
         FlowMatcher, Match, SceneFlowConfig,
-        room::{HEIGHT, RIG, WIDTH, see},
+        test_scene::{HEIGHT, RIG, WIDTH, see},
         tests::{CAPACITY, slab},
     },
 };

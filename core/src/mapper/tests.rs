@@ -10,7 +10,7 @@ use crate::{
     Report, Serial,
     geometry::Transform,
     memory::SLAB_ALIGN,
-    scene_flow::room::{HEIGHT, RIG, WIDTH, see},
+    scene_flow::test_scene::{HEIGHT, RIG, WIDTH, see},
     tracking::{Class, Detection},
 };
 use nalgebra::Vector3;

@@ -117,8 +117,8 @@ impl<'s> Camera<'s> {
         let [a, b] = &mut self.frames;
         let frame = if self.current { b } else { a };
         let (width, height) = (image.width(), image.height());
-        for (kept, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
-            kept.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
+        for (copied, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
+            copied.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
         }
         self.describe(width, height, invalid, response_min)
     }

@@ -74,7 +74,7 @@ impl Corners<'_, '_> {
         (back == first).then_some([previous_right as u32, current_right as u32, current_left as u32])
     }
 
-    /// The closed circles as matches, in the order of the previous left features. Returns how many there were; those beyond the room
+    /// The closed circles as matches, in the order of the previous left features. Returns how many there were; those beyond the capacity
     /// in `out` are dropped.
     pub(super) fn gather(&self, traced: &[[u32; 3]], out: &mut [Match]) -> usize {
         let mut slots = out.iter_mut();
@@ -91,12 +91,12 @@ impl Corners<'_, '_> {
     }
 
     fn closed(&self, first: usize, [previous_right, current_right, current_left]: [u32; 3]) -> Option<Match> {
-        let place = |set: &Features<'_>, index: usize| set.at(index).map(|at| at.map(f32::from));
+        let position = |set: &Features<'_>, index: usize| set.at(index).map(|at| at.map(f32::from));
         Some(Match {
-            previous_left: place(self.previous_left, first)?,
-            previous_right: place(self.previous_right, previous_right as usize)?,
-            current_right: place(self.current_right, current_right as usize)?,
-            current_left: place(self.current_left, current_left as usize)?,
+            previous_left: position(self.previous_left, first)?,
+            previous_right: position(self.previous_right, previous_right as usize)?,
+            current_right: position(self.current_right, current_right as usize)?,
+            current_left: position(self.current_left, current_left as usize)?,
         })
     }
 }

@@ -52,7 +52,7 @@ pub(super) const fn table(capacity: &Capacity) -> usize {
 }
 
 impl<'s> Features<'s> {
-    /// An empty set; room for as many features as `at` and `descriptor` have entries, `start` has [`table`] of them.
+    /// An empty set with space for as many features as `at` and `descriptor` have entries, `start` has [`table`] of them.
     pub(super) fn new(at: &'s mut [[u16; 2]], descriptor: &'s mut [[u8; DESCRIPTOR]], start: &'s mut [u32]) -> Self {
         Self { at, descriptor, start, len: 0, bands: 0, cells: 0 }
     }
@@ -85,16 +85,16 @@ impl<'s> Features<'s> {
     ) -> usize {
         self.bands = height.div_ceil(CELL_V);
         self.cells = width.div_ceil(CELL_U);
-        let kept = candidates.clone().take(self.at.len());
+        let accepted = candidates.clone().take(self.at.len());
         let keys = CLASSES * self.bands * self.cells;
         let Some(start) = self.start.get_mut(..=keys) else {
             self.clear();
             return candidates.count();
         };
         let key = |c: Candidate| (usize::from(c.class) * self.bands + usize::from(c.v) / CELL_V) * self.cells + usize::from(c.u) / CELL_U;
-        // Count, turn counts into starts one place to the right, then place: each cell's cursor ends as the next one's start.
+        // Count, turn counts into starts one entry to the right, then insert: each cell's cursor ends as the next one's start.
         start.fill(0);
-        for candidate in kept.clone() {
+        for candidate in accepted.clone() {
             if let Some(count) = start.get_mut(key(candidate) + 1) {
                 *count += 1;
             }
@@ -105,7 +105,7 @@ impl<'s> Features<'s> {
             *entry = sum;
         }
         self.len = sum as usize;
-        for candidate in kept {
+        for candidate in accepted {
             let Some(cursor) = start.get_mut(key(candidate)) else { continue };
             let slot = *cursor as usize;
             *cursor += 1;

@@ -25,7 +25,7 @@ pub(super) struct Responses<'a> {
     pub corner: &'a mut [i16],
 }
 
-/// Filters a whole image. `sums` is room for [`COLUMN_SUMS`] rows. Does nothing below 5 x 5 px.
+/// Filters a whole image. `sums` holds [`COLUMN_SUMS`] rows. Does nothing below 5 x 5 px.
 pub(super) fn filter(image: View<'_, u8>, out: Responses<'_>, sums: &mut [i16]) {
     let (width, height) = (image.width(), image.height());
     let Responses { gradient, blob, corner } = out;

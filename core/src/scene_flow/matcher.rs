@@ -37,7 +37,7 @@ pub struct FlowMatcher<'s> {
     prior: Prior<'s>,
     cells: Cells<'s>,
     motion: &'s mut [Motion],
-    keep: &'s mut [u8],
+    supported: &'s mut [u8],
     sparse: &'s mut [Match],
     sparse_len: usize,
     refined: &'s mut [Match],
@@ -71,12 +71,12 @@ const RIGHT: Names = Names {
     candidate: "scene_flow.right.candidate",
 };
 
-/// Least response of a feature, as responses are kept.
+/// Least response of a feature, as responses are stored.
 fn response_min(config: &SceneFlowConfig) -> i16 {
     config.response_min.min(i16::MAX as u16) as i16
 }
 
-/// Sparse matches kept.
+/// Sparse matches stored.
 const fn sparse_matches(capacity: &Capacity) -> usize {
     capacity.matches / 4
 }
@@ -110,7 +110,7 @@ impl<'s> FlowMatcher<'s> {
             prior: Prior::new_in(capacity, carver),
             cells: Cells::new_in(capacity, carver),
             motion: carver.alloc("scene_flow.motion", matches),
-            keep: carver.alloc("scene_flow.keep", matches),
+            supported: carver.alloc("scene_flow.supported", matches),
             sparse: carver.alloc("scene_flow.sparse", sparse_matches(capacity)),
             sparse_len: 0,
             refined: carver.alloc("scene_flow.refined", matches),
@@ -147,8 +147,8 @@ impl<'s> FlowMatcher<'s> {
     pub fn find(&self, expected: &Match) -> Option<Match> {
         let [width, height] = self.last.filter(|_| self.matched)?;
         let inside = |at: [f32; 2]| at[0] >= 0.0 && at[1] >= 0.0 && at[0] < width as f32 && at[1] < height as f32;
-        let places = [expected.previous_left, expected.previous_right, expected.current_left, expected.current_right];
-        places.into_iter().all(inside).then(|| find_back(expected, images(&self.left, &self.right, [width, height])))?
+        let positions = [expected.previous_left, expected.previous_right, expected.current_left, expected.current_right];
+        positions.into_iter().all(inside).then(|| find_back(expected, images(&self.left, &self.right, [width, height])))?
     }
 
     #[cfg(test)]
@@ -188,7 +188,7 @@ impl<'s> FlowMatcher<'s> {
             prior: _,
             cells: _,
             motion: _,
-            keep: _,
+            supported: _,
             sparse: _,
             sparse_len: _,
             refined: _,
@@ -223,7 +223,7 @@ impl<'s> FlowMatcher<'s> {
         self.push_within(config, left, right, None, executor)
     }
 
-    /// As [`FlowMatcher::push`], for a frame of which some pixels show nothing: no feature is found there.
+    /// As [`FlowMatcher::push`], for a frame with invalid pixels: no feature is found there.
     pub fn push_within<E: Executor>(
         &mut self,
         config: &SceneFlowConfig,
@@ -276,17 +276,17 @@ impl<'s> FlowMatcher<'s> {
         self.sparse_len = closed.min(self.sparse.len());
         let matches = self.sparse.get(..self.sparse_len).unwrap_or(&[]);
         let shape = Shape::new(width, height, SPARSE_CELL_PX);
-        support(matches, shape, config, &mut self.cells, self.motion, self.keep);
-        let kept = matches.iter().zip(&*self.keep).filter(|&(_, &keep)| keep == 1).map(|(m, _)| *m);
-        self.prior.learn(kept.clone(), width, height, config);
+        support(matches, shape, config, &mut self.cells, self.motion, self.supported);
+        let supported = matches.iter().zip(&*self.supported).filter(|&(_, &supported)| supported == 1).map(|(m, _)| *m);
+        self.prior.learn(supported.clone(), width, height, config);
         PassCount {
             closed: closed as u32,
             dropped: (closed - self.sparse_len) as u32,
-            unsupported: (self.sparse_len - kept.count()) as u32,
+            unsupported: (self.sparse_len - supported.count()) as u32,
         }
     }
 
-    /// Matches all features within what the sparse pass learned; leaves the matches in `refined` and who is supported in `keep`.
+    /// Matches all features within what the sparse pass learned; leaves the matches in `refined` and who is supported in `supported`.
     /// Returns its counts and how many there are.
     fn dense_pass<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], executor: &E) -> (PassCount, usize) {
         let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
@@ -300,42 +300,42 @@ impl<'s> FlowMatcher<'s> {
         let prior = &self.prior;
         corners.trace(|at| prior.reach(at).unwrap_or(widest), self.traced, executor);
         let closed = corners.gather(self.traced, self.refined);
-        let kept = closed.min(self.refined.len());
-        let matches = self.refined.get(..kept).unwrap_or(&[]);
-        support(matches, Shape::new(width, height, CELL_MIN_PX), config, &mut self.cells, self.motion, self.keep);
-        let supported = self.keep.iter().take(kept).filter(|&&keep| keep == 1).count();
+        let stored = closed.min(self.refined.len());
+        let matches = self.refined.get(..stored).unwrap_or(&[]);
+        support(matches, Shape::new(width, height, CELL_MIN_PX), config, &mut self.cells, self.motion, self.supported);
+        let supported = self.supported.iter().take(stored).filter(|&&supported| supported == 1).count();
         let count = PassCount {
             closed: closed as u32,
-            dropped: (closed - kept) as u32,
-            unsupported: (kept - supported) as u32,
+            dropped: (closed - stored) as u32,
+            unsupported: (stored - supported) as u32,
         };
-        (count, kept)
+        (count, stored)
     }
 
     /// Refines the supported among the first `closed` matches and closes the gaps the others leave.
     fn refine_supported<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], closed: usize, executor: &E) {
         let images = images(&self.left, &self.right, [width, height]);
-        let band = |(matches, keep, score): (&mut [Match], &mut [u8], &mut [f32])| {
-            for ((m, keep), score) in matches.iter_mut().zip(keep).zip(score).filter(|((_, keep), _)| **keep == 1) {
+        let band = |(matches, supported, score): (&mut [Match], &mut [u8], &mut [f32])| {
+            for ((m, supported), score) in matches.iter_mut().zip(supported).zip(score).filter(|((_, supported), _)| **supported == 1) {
                 *score = 0.0;
                 match refine(m, images) {
                     Some(better) => (*m, *score) = better,
-                    None => *keep = 0,
+                    None => *supported = 0,
                 }
             }
         };
         if config.refine {
             let bands = Bands::of(closed);
-            let (matches, keep) = (bands.split_mut(self.refined, 1), bands.split_mut(self.keep, 1));
-            each(executor, zip3(matches, keep, bands.split_mut(self.score, 1)), band);
+            let (matches, supported) = (bands.split_mut(self.refined, 1), bands.split_mut(self.supported, 1));
+            each(executor, zip3(matches, supported, bands.split_mut(self.score, 1)), band);
         } else {
             self.score.fill(0.0);
         }
         let mut len = 0;
         for index in 0..closed {
-            if self.keep.get(index) == Some(&1) {
-                keep(self.refined, index, len);
-                keep(self.score, index, len);
+            if self.supported.get(index) == Some(&1) {
+                move_item(self.refined, index, len);
+                move_item(self.score, index, len);
                 len += 1;
             }
         }
@@ -355,10 +355,10 @@ fn images<'a>(left: &'a Camera<'_>, right: &'a Camera<'_>, [width, height]: [usi
     }
 }
 
-/// Copies an item to an earlier place.
-fn keep<T: Copy>(items: &mut [T], from: usize, to: usize) {
+/// Copies an item to an earlier position.
+fn move_item<T: Copy>(items: &mut [T], from: usize, to: usize) {
     let item = items.get(from).copied();
-    if let (Some(item), Some(place)) = (item, items.get_mut(to)) {
-        *place = item;
+    if let (Some(item), Some(slot)) = (item, items.get_mut(to)) {
+        *slot = item;
     }
 }

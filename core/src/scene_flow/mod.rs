@@ -51,6 +51,6 @@ pub use matches::Match;
 pub use report::{FlowReport, FlowStatus, PassCount};
 
 #[cfg(test)]
-pub(crate) mod room;
+pub(crate) mod test_scene;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -57,7 +57,7 @@ fn sum(a: &[[i16; SIDE]; SIDE]) -> i32 {
 
 impl Template {
     /// The patch centred on pixel (u, v); `None` too near the border or where nothing can be placed.
-    fn cut(image: Pixels<'_>, u: usize, v: usize) -> Option<Self> {
+    fn extract(image: Pixels<'_>, u: usize, v: usize) -> Option<Self> {
         let (left, top) = (u.checked_sub(SIDE / 2 + 1)?, v.checked_sub(SIDE / 2 + 1)?);
         if left + SIDE + 2 > image.width {
             return None;
@@ -114,20 +114,20 @@ impl Template {
             let error = self.error(image, corner)?;
             let step = self.step(&error);
             let next = [f64::from(corner[0]) / 16.0 + HALF - step[0], f64::from(corner[1]) / 16.0 + HALF - step[1]];
-            let moved = (next[0] - at[0]) * (next[0] - at[0]) + (next[1] - at[1]) * (next[1] - at[1]);
+            let step_squared = (next[0] - at[0]) * (next[0] - at[0]) + (next[1] - at[1]) * (next[1] - at[1]);
             let far = |i: usize| libm::fabs(next.get(i).copied().unwrap_or(0.0) - begin.get(i).copied().unwrap_or(0.0));
             if !(far(0) <= FARTHEST_PX && far(1) <= FARTHEST_PX) {
                 return None;
             }
             at = next;
-            if moved < small_step_px * small_step_px {
+            if step_squared < small_step_px * small_step_px {
                 return Some(at.map(|x| x as f32));
             }
         }
         None
     }
 
-    /// Whether another image shows the patch at a place: whether its pattern there is that of the template, whatever the light.
+    /// Whether another image shows the patch at a position: whether its pattern there is that of the template, independent of brightness and contrast.
     fn is_alike(&self, image: Pixels<'_>, at: [f32; 2]) -> bool {
         let corner = at.map(|x| libm::floor(16.0 * (f64::from(x) - HALF) + 0.5) as i32);
         let Some(error) = self.error(image, corner) else { return false };
@@ -185,7 +185,7 @@ impl Template {
 /// images; `None` where it is lost.
 pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
     let [u, v] = m.current_left.map(|x| x as usize);
-    let template = Template::cut(images.current_left, u, v)?;
+    let template = Template::extract(images.current_left, u, v)?;
     let find = |image, at| template.find(image, at, GUESSED_STEP_PX).filter(|&at| template.is_alike(image, at));
     let found = Match {
         previous_left: find(images.previous_left, m.previous_left)?,
@@ -193,8 +193,8 @@ pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
         current_left: m.current_left,
         current_right: find(images.current_right, m.current_right)?,
     };
-    let seen = found.previous_disparity_px() > 0.0 && found.current_disparity_px() > 0.0;
-    seen.then_some(found)
+    let valid = found.previous_disparity_px() > 0.0 && found.current_disparity_px() > 0.0;
+    valid.then_some(found)
 }
 
 /// The four images.
@@ -210,13 +210,13 @@ pub(super) struct Images<'a> {
 /// when the patch is lost in one of the images or loses its positive disparity.
 pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
     let [u, v] = m.previous_left.map(|x| x as usize);
-    let template = Template::cut(images.previous_left, u, v)?;
+    let template = Template::extract(images.previous_left, u, v)?;
     let refined = Match {
         previous_left: m.previous_left,
         previous_right: template.find(images.previous_right, m.previous_right, SMALL_STEP_PX)?,
         current_left: template.find(images.current_left, m.current_left, SMALL_STEP_PX)?,
         current_right: template.find(images.current_right, m.current_right, SMALL_STEP_PX)?,
     };
-    let seen = refined.previous_disparity_px() > 0.0 && refined.current_disparity_px() > 0.0;
-    seen.then_some((refined, template.texture as f32))
+    let valid = refined.previous_disparity_px() > 0.0 && refined.current_disparity_px() > 0.0;
+    valid.then_some((refined, template.texture as f32))
 }

@@ -1,9 +1,9 @@
 //! Outlier removal: a match without neighbours that move alike is none.
 //!
-//! The paper asks for agreement along the edges of a Delaunay triangulation, about six nearest neighbours of which four must agree.
+//! The paper asks for agreement along the edges of a Delaunay triangulation, where four of about six nearest neighbours must agree.
 //! Here a match's neighbours are those in the square of cells around it, which grows ring by ring until it holds [`NEIGHBOURS`] or
 //! reaches [`RINGS`]; a match is kept when at least `support_min` of them, and at least half of them, agree in disparity and flow.
-//! No mesh, bounded work, and where matches stand dense more witnesses than a triangulation would hear.
+//! No mesh, bounded work, and where matches stand dense more neighbours than a triangulation has.
 
 use super::{
     SceneFlowConfig,
@@ -19,14 +19,14 @@ const RINGS: usize = 4;
 /// What must agree: disparity and flow in u and v, px. The fourth keeps rows of four.
 pub(super) type Motion = [f32; 4];
 
-/// Writes 1 to `keep` for each supported match, else 0. `motion` is room for as many.
+/// Writes 1 to `supported` for each supported match, else 0. `motion` has space for as many.
 pub(super) fn support(
     matches: &[Match],
     shape: Shape,
     config: &SceneFlowConfig,
     cells: &mut Cells<'_>,
     motion: &mut [Motion],
-    keep: &mut [u8],
+    supported: &mut [u8],
 ) {
     let (start, order) = cells.sort(matches, shape);
     for (motion, m) in motion.iter_mut().zip(order.iter().filter_map(|&index| matches.get(index as usize))) {
@@ -35,8 +35,8 @@ pub(super) fn support(
     }
     let motion = motion.get(..matches.len()).unwrap_or(&[]);
     for (&index, own) in order.iter().zip(motion) {
-        if let (Some(m), Some(keep)) = (matches.get(index as usize), keep.get_mut(index as usize)) {
-            *keep = u8::from(is_supported(*own, shape.cell(m), shape, config, start, motion));
+        if let (Some(m), Some(supported)) = (matches.get(index as usize), supported.get_mut(index as usize)) {
+            *supported = u8::from(is_supported(*own, shape.cell(m), shape, config, start, motion));
         }
     }
 }
@@ -46,23 +46,23 @@ fn is_supported(own: Motion, [column, row]: [usize; 2], shape: Shape, config: &S
     if needed == 0 {
         return true;
     }
-    let (mut seen, mut agreeing) = (0, 0);
+    let (mut neighbours, mut agreeing) = (0, 0);
     for ring in 1..=RINGS {
-        (seen, agreeing) = (0, 0);
+        (neighbours, agreeing) = (0, 0);
         let (left, right) = (column.saturating_sub(ring), (column + ring).min(shape.columns - 1));
         for row in row.saturating_sub(ring)..=(row + ring).min(shape.rows - 1) {
             let (first, last) = (row * shape.columns + left, row * shape.columns + right);
             let (Some(&from), Some(&to)) = (start.get(first), start.get(last + 1)) else { continue };
             let run = motion.get(from as usize..to as usize).unwrap_or(&[]);
-            seen += run.len();
+            neighbours += run.len();
             agreeing += run.iter().map(|other| usize::from(agree(own, *other, config))).sum::<usize>();
         }
-        if seen > NEIGHBOURS {
+        if neighbours > NEIGHBOURS {
             break;
         }
     }
-    // It has seen itself, and agreed.
-    agreeing > needed && 2 * (agreeing - 1) >= seen - 1
+    // The match itself is among its neighbours, and agrees.
+    agreeing > needed && 2 * (agreeing - 1) >= neighbours - 1
 }
 
 fn agree(a: Motion, b: Motion, config: &SceneFlowConfig) -> bool {

@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 pub(super) const DENSE_RADIUS: usize = 3;
 /// Radius of the sparse pass, px.
 pub(super) const SPARSE_RADIUS: usize = 9;
-/// Distance features keep from the image's border, px: room for a descriptor and for refinement.
+/// Distance features keep from the image's border, px: space for a descriptor and for refinement.
 pub(super) const FEATURE_MARGIN: usize = 8;
 /// Classes of features: blob maximum, blob minimum, corner maximum, corner minimum. Only equals are compared.
 pub(super) const CLASSES: usize = 4;
@@ -41,7 +41,7 @@ pub(super) struct Field<'a> {
 }
 
 /// Finds the features of both filters and hands them to `emit`: block row by block row, there by filter, there from left to right.
-/// `extremes` is room for two rows.
+/// `extremes` holds two rows.
 pub(super) fn suppress(blob: Field<'_>, corner: Field<'_>, response_min: i16, extremes: &mut [i16], mut emit: impl FnMut(Candidate)) {
     let width = blob.width;
     if width <= 2 * FEATURE_MARGIN {
@@ -189,12 +189,12 @@ mod tests {
                 for (class, field, sign) in [(0, &blob, 1), (1, &blob, -1), (2, &corner, 1), (3, &corner, -1)] {
                     expected.extend(peaks(field, width, class, sign, radius, 5));
                 }
-                let kept = found.iter().filter(|c| !sparse || c.sparse == 1);
-                let mut kept: Vec<_> = kept.map(|c| (c.u, c.v, c.class)).collect();
-                kept.sort_unstable();
+                let accepted = found.iter().filter(|c| !sparse || c.sparse == 1);
+                let mut accepted: Vec<_> = accepted.map(|c| (c.u, c.v, c.class)).collect();
+                accepted.sort_unstable();
                 expected.sort_unstable();
                 assert!(!expected.is_empty());
-                assert_eq!(kept, expected);
+                assert_eq!(accepted, expected);
             }
         }
     }

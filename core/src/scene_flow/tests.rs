@@ -6,9 +6,9 @@ use super::{
     features::{DESCRIPTOR, Features, Window, table},
     prior::Prior,
     refine::{Images, Pixels, refine},
-    room::{HEIGHT, RIG, WIDTH, see},
     support::support,
     suppression::{CLASSES, Candidate},
+    test_scene::{HEIGHT, RIG, WIDTH, see},
 };
 use crate::{
     geometry::Transform,
@@ -53,7 +53,7 @@ fn cuts_exactly_the_bytes_it_names() {
 }
 
 #[test]
-fn matches_lie_where_the_room_says_and_two_threads_change_nothing() {
+fn matches_lie_where_the_scene_says_and_two_threads_change_nothing() {
     let (first, second) = (see(&Transform::IDENTITY), see(&forward(0.4, 0.01)));
     let mut slabs = [slab(), slab()];
     let [a, b] = &mut slabs;
@@ -127,22 +127,22 @@ fn full_lists_drop_and_count() {
     assert_eq!(report.dense.closed - report.dense.dropped, 40);
 }
 
-fn room_for<'s>(carver: &mut Carver<'s>, count: usize) -> Features<'s> {
+fn features_for<'s>(carver: &mut Carver<'s>, count: usize) -> Features<'s> {
     let start = carver.alloc("cell", table(&CAPACITY));
     Features::new(carver.alloc("position", count), carver.alloc("descriptor", count), start)
 }
 
 /// Features with random descriptors.
 fn scatter<'s>(carver: &mut Carver<'s>, random: &mut Random, count: usize) -> (Features<'s>, Vec<Candidate>) {
-    let mut features = room_for(carver, count);
+    let mut features = features_for(carver, count);
     let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|_| random.next_u32() as u16).collect();
-    let place = |random: &mut Random| Candidate {
+    let position = |random: &mut Random| Candidate {
         u: 8 + random.below(WIDTH as u32 - 16) as u16,
         v: 8 + random.below(HEIGHT as u32 - 16) as u16,
         class: random.below(CLASSES as u32) as u8,
         sparse: 0,
     };
-    let candidates: Vec<Candidate> = (0..count).map(|_| place(random)).collect();
+    let candidates: Vec<Candidate> = (0..count).map(|_| position(random)).collect();
     assert_eq!(features.fill(candidates.iter().copied(), &gradient, WIDTH, HEIGHT), 0);
     (features, candidates)
 }
@@ -182,13 +182,13 @@ fn only_circles_that_return_to_their_beginning_close() {
     let mut slab = slab();
     let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
     let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|i| (i as u16).wrapping_mul(40_503)).collect();
-    let mut place = |u: u16, v: u16, twin: bool| {
-        let mut features = room_for(&mut carver, 4);
+    let mut position = |u: u16, v: u16, twin: bool| {
+        let mut features = features_for(&mut carver, 4);
         let candidates = [Candidate { u, v, class: 2, sparse: 0 }, Candidate { u: u + 1, v, class: 2, sparse: 0 }];
         features.fill(candidates.into_iter().take(1 + usize::from(twin)), &gradient, WIDTH, HEIGHT);
         features
     };
-    let images = [place(200, 60, true), place(190, 60, false), place(196, 64, false), place(210, 64, false)];
+    let images = [position(200, 60, true), position(190, 60, false), position(196, 64, false), position(210, 64, false)];
     let [previous_left, previous_right, current_right, current_left] = &images;
     let corners = Corners { previous_left, previous_right, current_right, current_left };
     let mut traced = [[0; 3]; 4];
@@ -234,13 +234,13 @@ fn a_match_that_moves_unlike_its_neighbours_loses_their_support() {
     matches[17].current_left[0] += 6.0;
     matches[31].previous_right[0] -= 6.0;
     matches.push(Match { previous_left: [380.0, 150.0], previous_right: [371.0, 150.0], ..matches[0] });
-    let mut keep = vec![9; matches.len()];
-    support(&matches, Shape::new(WIDTH, HEIGHT, 16), &config, &mut cells, &mut vec![[0.0; 4]; 100], &mut keep);
-    let lost: Vec<usize> = (0..matches.len()).filter(|&i| keep[i] == 0).collect();
+    let mut supported = vec![9; matches.len()];
+    support(&matches, Shape::new(WIDTH, HEIGHT, 16), &config, &mut cells, &mut vec![[0.0; 4]; 100], &mut supported);
+    let lost: Vec<usize> = (0..matches.len()).filter(|&i| supported[i] == 0).collect();
     assert_eq!(lost, [17, 31, 60], "the two that disagree and the one that is alone");
     let all = SceneFlowConfig { support_min: 0, ..config };
-    support(&matches, Shape::new(WIDTH, HEIGHT, 16), &all, &mut cells, &mut vec![[0.0; 4]; 100], &mut keep);
-    assert!(keep.iter().all(|&keep| keep == 1));
+    support(&matches, Shape::new(WIDTH, HEIGHT, 16), &all, &mut cells, &mut vec![[0.0; 4]; 100], &mut supported);
+    assert!(supported.iter().all(|&supported| supported == 1));
 }
 
 #[test]

@@ -113,7 +113,7 @@ impl StereoConfig {
 
     /// Notes everything that is wrong.
     pub fn validate(&self, problems: &mut Problems) {
-        let mut check = |holds, key, rule| require(problems, holds, key, rule);
+        let mut check = |satisfied, key, rule| require(problems, satisfied, key, rule);
         let positive = |value: f32| value.is_finite() && value > 0.0;
         check((10..=DISPARITY_LIMIT).contains(&self.disparity_max), "stereo.disparity_max", "must be within 10..=255 px");
         check(positive(self.support_ratio) && self.support_ratio <= 1.0, "stereo.support_ratio", "must be above 0 and at most 1");

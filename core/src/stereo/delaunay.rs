@@ -81,7 +81,7 @@ impl<'s> Triangulation<'s> {
         region_bytes::<SupportPoint>(points) + 2 * region_bytes::<u32>(6 * points) + 3 * region_bytes::<u32>(points)
     }
 
-    /// Cuts room for `points` points.
+    /// Takes buffers for `points` points from the slab.
     pub fn new_in(points: usize, names: [&'static str; 3], carver: &mut Carver<'s>) -> Self {
         let [points_name, triangles_name, hull_name] = names;
         Self {
@@ -102,8 +102,8 @@ impl<'s> Triangulation<'s> {
         self.triangles = 0;
     }
 
-    /// Adds a point at its place in scan order; within a row points may come in any order. Of two points at one place the nearer, with
-    /// the larger disparity, stays. Says whether a point was dropped: this one, as there is no room, or the farther of the two.
+    /// Adds a point in scan order; within a row points may come in any order. Of two points at one pixel the nearer, with
+    /// the larger disparity, stays. Says whether a point was dropped: this one, as the buffer is full, or the farther of the two.
     pub fn add(&mut self, point: SupportPoint) -> bool {
         let key = |p: &SupportPoint| (p.v, p.u);
         let points = self.points.get_mut(..self.len).unwrap_or_default();
@@ -114,8 +114,8 @@ impl<'s> Triangulation<'s> {
         }
         let at = at.map_or(0, |i| i + 1);
         let Some(behind) = self.points.get_mut(at..self.len + 1) else { return true };
-        let mut moved = point;
-        behind.iter_mut().for_each(|place| core::mem::swap(place, &mut moved));
+        let mut carried = point;
+        behind.iter_mut().for_each(|slot| core::mem::swap(slot, &mut carried));
         self.len += 1;
         false
     }
@@ -300,9 +300,9 @@ mod tests {
         triangles.len()
     }
 
-    /// Twice the area of the hull, by Andrew's monotone chain.
+    /// Twice the area of the hull, by Andrew's monotone half_hull.
     fn hull_area(points: &[SupportPoint]) -> i64 {
-        let chain = |points: &mut dyn Iterator<Item = SupportPoint>| {
+        let half_hull = |points: &mut dyn Iterator<Item = SupportPoint>| {
             let mut hull: Vec<SupportPoint> = vec![];
             for p in points {
                 while hull.len() >= 2 && orientation(hull[hull.len() - 2], hull[hull.len() - 1], p) <= 0 {
@@ -313,8 +313,8 @@ mod tests {
             hull.pop();
             hull
         };
-        let mut hull = chain(&mut points.iter().copied());
-        hull.extend(chain(&mut points.iter().rev().copied()));
+        let mut hull = half_hull(&mut points.iter().copied());
+        hull.extend(half_hull(&mut points.iter().rev().copied()));
         (1..hull.len().saturating_sub(1)).map(|i| orientation(hull[0], hull[i], hull[i + 1])).sum()
     }
 

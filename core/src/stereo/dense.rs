@@ -63,7 +63,7 @@ impl DenseMatching<'_> {
         }
     }
 
-    /// Replaces the planes of one row by disparities, or [`NO_PLANE`] where there is none: in working units in the left image, whose
+    /// Replaces the planes of one row by disparities, or [`NO_PLANE`] where no plane lies: in working units in the left image, whose
     /// result is kept, in px in the right one, which is only compared with.
     fn match_row<const LEFT: bool>(&self, here: &[Descriptor], other: &[Descriptor], v: usize, planes: &mut [i16]) {
         let (first, end) = (MARGIN, here.len().saturating_sub(MARGIN));
@@ -120,7 +120,7 @@ fn fraction(point: &Descriptor, others: Candidates<'_>, d: usize) -> i16 {
     let Some([after, here, before]) = beside else { return 0 };
     let (before, here, after) = (distance(point, before) as i32, distance(point, here) as i32, distance(point, after) as i32);
     let (least, rise) = (before.min(after), before.max(after) - here);
-    // Divided first and judged later: a branch here is a coin toss.
+    // Divided first and compared later: a branch here is unpredictable.
     let offset = (i32::from(WORKING_ONE_PX / 2 - 1) * (before - after) / rise.max(1)) as i16;
     if least < here { 0 } else { offset }
 }

@@ -18,8 +18,8 @@ pub(super) fn flatten(invalid: &InvalidPixels<'_>, width: usize, plane: &mut [u8
 pub(super) fn remove(invalid: &InvalidPair<'_>, width: usize, disparity_q8: &mut [u16]) {
     for (v, row) in disparity_q8.chunks_exact_mut(width.max(1)).enumerate() {
         for (u, disparity) in row.iter_mut().enumerate().filter(|(_, disparity)| **disparity != 0) {
-            let whole = usize::from((*disparity + DISPARITY_ONE_PX / 2) / DISPARITY_ONE_PX);
-            let partner = u.checked_sub(whole).is_none_or(|partner| invalid.right.contains(partner, v));
+            let pixels = usize::from((*disparity + DISPARITY_ONE_PX / 2) / DISPARITY_ONE_PX);
+            let partner = u.checked_sub(pixels).is_none_or(|partner| invalid.right.contains(partner, v));
             if partner || invalid.left.contains(u, v) {
                 *disparity = 0;
             }

@@ -1,4 +1,4 @@
-//! The matcher: its rooms in the slab, and the steps from two images to disparities.
+//! The matcher: its buffers in the slab, and the steps from two images to disparities.
 
 use super::{
     MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, StereoConfig, StereoReport, StereoStatus, StereoStep,
@@ -6,9 +6,9 @@ use super::{
     delaunay::{SupportPoint, Triangulation},
     dense::{DenseBand, DenseMatching, NONE, WORKING_ONE_PX},
     descriptor::{Descriptor, Gradients},
-    gaps,
+    filter_support, gaps,
     gaps::Filling,
-    gradient, invalid, median, plausible, prior,
+    gradient, invalid, median, prior,
     prior::{CellGrid, DisparitySet, PlaneCost},
     smooth, speckle,
     speckle::Scratch,
@@ -26,7 +26,7 @@ use crate::{
 /// Descriptor rows per band: support points need two of each image.
 const ROWS: usize = 4;
 
-/// The matcher: its rooms in the slab and the disparities of the last pair.
+/// The matcher: its buffers in the slab and the disparities of the last pair.
 pub struct StereoMatcher<'s> {
     /// Four bytes a pixel: the gradients of both images, later the runs of the speckle filter.
     gradients: &'s mut [u32],
@@ -87,7 +87,7 @@ impl<'s> StereoMatcher<'s> {
             + region_bytes::<u32>(capacity.image_width)
     }
 
-    /// Cuts the matcher's rooms.
+    /// Takes the matcher's buffers from the slab.
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let (pixels, points, cells) = (most_pixels(capacity), most_points(capacity), most_cells(capacity));
         Self {
@@ -133,7 +133,7 @@ impl<'s> StereoMatcher<'s> {
         self.compute_observed(config, left, right, executor, |_| ())
     }
 
-    /// As [`StereoMatcher::compute`], for a pair of which some pixels show nothing: they get no disparity, nor do those whose partner in the
+    /// As [`StereoMatcher::compute`], for a pair with invalid pixels: they get no disparity, nor do those whose partner in the
     /// right image is one of them.
     pub fn compute_within<E: Executor>(
         &mut self,
@@ -146,7 +146,7 @@ impl<'s> StereoMatcher<'s> {
         self.compute_steps(config, [left, right], invalid, executor, |_| ())
     }
 
-    /// As [`StereoMatcher::compute`], calling `done` after each step: no clock enters the core, so whoever times the steps does it there.
+    /// As [`StereoMatcher::compute`], calling `done` after each step: no clock enters the core, so a caller that times the steps does it there.
     pub fn compute_observed<E: Executor>(
         &mut self,
         config: &StereoConfig,
@@ -175,7 +175,7 @@ impl<'s> StereoMatcher<'s> {
         done(StereoStep::Gradients);
         self.match_support(config, executor, &mut report);
         done(StereoStep::Support);
-        self.sift_support(config, &mut report);
+        self.filter_support_points(config, &mut report);
         done(StereoStep::Sifting);
         self.triangulate(config, executor, &mut report);
         done(StereoStep::Triangulation);
@@ -197,7 +197,7 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Takes disparities from elsewhere (1/256 px, 0 none) in place of a pair's own. Of an image larger than the capacity, which the mapper
-    /// refuses, as much is taken as there is room for.
+    /// refuses, what fits is taken.
     pub fn take(&mut self, disparity_q8: View<'_, u16>) -> StereoReport {
         self.width = disparity_q8.width().min(self.image_width).max(1);
         self.height = disparity_q8.height().min(self.image_height).max(1);
@@ -207,13 +207,13 @@ impl<'s> StereoMatcher<'s> {
             pixels: (self.width * self.height) as u32,
             ..StereoReport::default()
         };
-        // A match this far to the left lies outside the right image, whatever the column.
+        // A match this far to the left lies outside the right image at every column.
         let absurd = self.width as u32 * u32::from(DISPARITY_ONE_PX);
         for (to, from) in self.disparity.chunks_exact_mut(self.width.max(1)).zip(disparity_q8.rows()) {
             for (to, &given) in to.iter_mut().zip(from) {
-                let taken = u32::from(given) < absurd;
-                *to = if taken { given } else { 0 };
-                report.refused += u32::from(!taken);
+                let accepted = u32::from(given) < absurd;
+                *to = if accepted { given } else { 0 };
+                report.refused += u32::from(!accepted);
                 report.valid += u32::from(*to != 0);
             }
         }
@@ -267,19 +267,19 @@ impl<'s> StereoMatcher<'s> {
         report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
     }
 
-    fn sift_support(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+    fn filter_support_points(&mut self, config: &StereoConfig, report: &mut StereoReport) {
         let step = config.candidate_step;
         let (columns, rows) = (support::candidates(self.width, step), support::candidates(self.height, step));
         let Some(grid) = self.support.get_mut(..columns * rows) else { return };
-        report.implausible = plausible::remove_implausible(config, grid, columns, self.support_before);
-        report.redundant = plausible::remove_redundant(config, grid, columns);
+        report.implausible = filter_support::remove_implausible(config, grid, columns, self.support_before);
+        report.redundant = filter_support::remove_redundant(config, grid, columns);
         self.left_mesh.clear();
         self.right_mesh.clear();
         for (j, row) in grid.chunks_exact(columns.max(1)).enumerate() {
             for (i, &disparity) in row.iter().enumerate().filter(|(_, d)| **d != NO_MATCH) {
                 let (u, v, disparity) = ((i * step) as u16, (j * step) as u16, disparity as u16);
                 self.left_mesh.add(SupportPoint { u, v, disparity });
-                report.hidden_right += u32::from(self.right_mesh.add(SupportPoint { u: u - disparity, v, disparity }));
+                report.occluded_right += u32::from(self.right_mesh.add(SupportPoint { u: u - disparity, v, disparity }));
             }
         }
         report.support_points = self.left_mesh.points().len() as u32;
@@ -316,8 +316,8 @@ impl<'s> StereoMatcher<'s> {
         let (left_mesh, right_mesh) = (&self.left_mesh, &self.right_mesh);
         each(executor, jobs.each_mut(), |band| {
             if let Some(band) = band {
-                prior::draw_planes(left_mesh, config.plane_slope_max, band.first, width, band.left);
-                prior::draw_planes(right_mesh, config.plane_slope_max, band.first, width, band.right);
+                prior::rasterise_planes(left_mesh, config.plane_slope_max, band.first, width, band.left);
+                prior::rasterise_planes(right_mesh, config.plane_slope_max, band.first, width, band.right);
                 matching.match_band(band);
             }
         });

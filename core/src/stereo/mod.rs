@@ -6,7 +6,7 @@
 //! disparity of least energy for each pixel of both images (3.3), and the check that both agree. Small segments are then removed, gaps
 //! filled, and the result is smoothed without blurring edges. Parameters: [`StereoConfig`].
 //!
-//! Own choices, where the paper leaves one: which 16 gradient samples make a descriptor (`descriptor.rs`); support points are judged
+//! Own choices, where the paper leaves one: which 16 gradient samples make a descriptor (`descriptor.rs`); support points are filtered
 //! implausible all at once; disparities are refined to fractions of a pixel ([`StereoConfig::subpixel`], measured there); the mean is
 //! centred. Pixels outside the hull of the support points get no disparity.
 //!
@@ -17,7 +17,7 @@
 //! No array on the stack exceeds 600 bytes.
 //!
 //! **Bounds.** Support points: one per candidate, at least 5 px apart ([`MIN_CANDIDATE_STEP`]), so they always fit, as do their
-//! triangles, at most two a point. Two that meet at one place of the right image become one, counted. Larger images than the capacity's
+//! triangles, at most two a point. Two that meet at one pixel of the right image become one, counted. Larger images than the capacity's
 //! are refused.
 //!
 //! **Time.** Pixels x (5 + disparities in the grid cell, typically 15) descriptor distances for each image, and candidates x disparities
@@ -53,12 +53,12 @@ mod config;
 mod delaunay;
 mod dense;
 mod descriptor;
+mod filter_support;
 mod gaps;
 mod gradient;
 mod invalid;
 mod matcher;
 mod median;
-mod plausible;
 mod prior;
 mod report;
 mod smooth;
@@ -73,5 +73,5 @@ pub use report::{StereoReport, StereoStatus, StereoStep};
 
 /// Least width and height of an image, px.
 pub const MIN_IMAGE_SIZE: usize = 16;
-/// Greatest width and height of an image, px, whatever the capacity: the triangulation is exact up to here.
+/// Greatest width and height of an image, px, for every capacity: the triangulation is exact up to here.
 pub const MAX_IMAGE_SIZE: usize = 8_192;

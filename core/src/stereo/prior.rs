@@ -1,7 +1,7 @@
 //! What the support points say about every pixel (Geiger et al., section 3.2): the plane of its triangle, and the disparities of the
 //! support points near it.
 //!
-//! Planes are drawn, triangle by triangle, into the image that will receive the disparities: no memory of their own. The grid prior is a
+//! Planes are rasterised, triangle by triangle, into the image that will receive the disparities: no memory of their own. The grid prior is a
 //! set of 256 bits per cell.
 
 use super::{
@@ -15,9 +15,9 @@ pub(super) const NO_PLANE: i16 = -1;
 /// Added to the plane's disparity where its triangle is too steep to be a surface.
 pub(super) const STEEP: i16 = 256;
 
-/// Draws the planes into image rows `first..` of `out`, `width` wide: the disparity in whole px, plus [`STEEP`], or [`NO_PLANE`].
-/// Triangles are drawn to the pixels beyond their edges; the later one wins.
-pub(super) fn draw_planes(mesh: &Triangulation<'_>, slope_max: f32, first: usize, width: usize, out: &mut [i16]) {
+/// Rasterises the planes into image rows `first..` of `out`, `width` wide: the disparity in whole px, plus [`STEEP`], or [`NO_PLANE`].
+/// Triangles are rasterised to the pixels beyond their edges; the later one wins.
+pub(super) fn rasterise_planes(mesh: &Triangulation<'_>, slope_max: f32, first: usize, width: usize, out: &mut [i16]) {
     out.fill(NO_PLANE);
     let width = width.max(1);
     let rows = out.len() / width;
@@ -33,13 +33,13 @@ pub(super) fn draw_planes(mesh: &Triangulation<'_>, slope_max: f32, first: usize
         let Some(plane) = Plane::through(corners) else { continue };
         let mark = if plane.slope_u.abs() > slope_max || plane.slope_v.abs() > slope_max { STEEP } else { 0 };
         let (long, upper, lower) = (Edge::new(top, bottom), Edge::new(top, middle), Edge::new(middle, bottom));
-        let drawn = out.chunks_exact_mut(width).enumerate().take(to - first).skip(from - first);
-        for (v, row) in drawn.map(|(i, row)| ((first + i) as i64, row)) {
+        let covered = out.chunks_exact_mut(width).enumerate().take(to - first).skip(from - first);
+        for (v, row) in covered.map(|(i, row)| ((first + i) as i64, row)) {
             let (a, b) = (long.column(v), if v < i64::from(middle.v) { upper.column(v) } else { lower.column(v) });
             let (left, right) = (a.min(b) >> SHIFT, (a.max(b) >> SHIFT) + 1);
             let end = width.min(right as usize + 1);
             if let Some(span) = row.get_mut(left as usize..end) {
-                plane.draw(left, v, mark, span);
+                plane.rasterise(left, v, mark, span);
             }
         }
     }
@@ -89,7 +89,7 @@ impl Plane {
     }
 
     /// Fills a run of row `v` from column `left`.
-    fn draw(&self, left: i64, v: i64, mark: i16, span: &mut [i16]) {
+    fn rasterise(&self, left: i64, v: i64, mark: i16, span: &mut [i16]) {
         let offset = self.slope_u * (left - i64::from(self.origin.u)) + self.slope_v * (v - i64::from(self.origin.v));
         let start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
         let slope = self.slope_u as i32;
@@ -160,12 +160,12 @@ impl PlaneCost {
             let density = libm::expf(-0.5 * deviation * deviation);
             libm::logf(1.0 + density / config.gamma) / config.beta * 16.0
         };
-        // Extreme parameters overflow to infinity or to nothing: both are held at what the energies can bear.
-        let held = |cost: f32| if cost < Self::MOST { libm::roundf(cost) as u32 } else { Self::MOST as u32 };
-        let (radius, elsewhere) = (config.plane_radius().min(MAX_PLANE_RADIUS), held(preference(0)));
+        // Extreme parameters overflow to infinity or to nothing: both are clamped at what the energies can bear.
+        let clamped = |cost: f32| if cost < Self::MOST { libm::roundf(cost) as u32 } else { Self::MOST as u32 };
+        let (radius, elsewhere) = (config.plane_radius().min(MAX_PLANE_RADIUS), clamped(preference(0)));
         let mut about_plane = [elsewhere; 2 * MAX_PLANE_RADIUS + 1];
         for (i, cost) in about_plane.iter_mut().enumerate() {
-            *cost = elsewhere - held(preference(i.abs_diff(radius))).min(elsewhere);
+            *cost = elsewhere - clamped(preference(i.abs_diff(radius))).min(elsewhere);
         }
         Self {
             about_plane,

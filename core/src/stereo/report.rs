@@ -38,7 +38,7 @@ pub struct StereoReport {
     /// Support points left.
     pub support_points: u32,
     /// Of these, dropped in the right image as another lies at the same place.
-    pub hidden_right: u32,
+    pub occluded_right: u32,
     /// Triangles in the left image.
     pub triangles_left: u32,
     /// Triangles in the right image.

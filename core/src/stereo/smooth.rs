@@ -94,9 +94,9 @@ mod tests {
             numerator += weight * difference;
             denominator += weight;
         }
-        let (whole, rest) = (numerator.div_euclid(denominator), numerator.rem_euclid(denominator));
-        let up = 2 * rest > denominator || (2 * rest == denominator && whole % 2 != 0);
-        image[i] + (whole + i64::from(up)) as i16
+        let (quotient, rest) = (numerator.div_euclid(denominator), numerator.rem_euclid(denominator));
+        let up = 2 * rest > denominator || (2 * rest == denominator && quotient % 2 != 0);
+        image[i] + (quotient + i64::from(up)) as i16
     }
 
     #[test]

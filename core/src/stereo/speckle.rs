@@ -47,9 +47,9 @@ impl Runs<'_> {
     fn unite(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
-            let (keep, drop) = (a.min(b), a.max(b));
-            self.set(keep, self.get(keep) + self.get(drop));
-            self.set(drop, keep as i32);
+            let (root, child) = (a.min(b), a.max(b));
+            self.set(root, self.get(root) + self.get(child));
+            self.set(child, root as i32);
         }
     }
 }
@@ -161,20 +161,20 @@ mod tests {
     /// The twin: flood fill from each pixel.
     fn plain(disparity: &[i16], width: usize, similarity: i16, smallest: usize) -> Vec<i16> {
         let mut out = disparity.to_vec();
-        let mut seen = vec![false; out.len()];
+        let mut visited = vec![false; out.len()];
         for start in 0..out.len() {
-            if seen[start] || disparity[start] == NONE {
+            if visited[start] || disparity[start] == NONE {
                 continue;
             }
             let (mut segment, mut next) = (vec![start], 0);
-            seen[start] = true;
+            visited[start] = true;
             while let Some(&i) = segment.get(next) {
                 next += 1;
                 let u = i % width;
                 let beside = [(u > 0).then(|| i - 1), (u + 1 < width).then_some(i + 1), i.checked_sub(width), Some(i + width)];
                 for j in beside.into_iter().flatten().filter(|&j| j < disparity.len()) {
-                    if !seen[j] && disparity[j] != NONE && disparity[i].abs_diff(disparity[j]) <= similarity as u16 {
-                        seen[j] = true;
+                    if !visited[j] && disparity[j] != NONE && disparity[i].abs_diff(disparity[j]) <= similarity as u16 {
+                        visited[j] = true;
                         segment.push(j);
                     }
                 }
@@ -197,8 +197,8 @@ mod tests {
             let scratch = Scratch { runs: &mut runs, ends: &mut ends, flags: &mut flags };
             let blanked = remove_speckles(&mut fast, width, 64, smallest, scratch);
             assert!(fast == plain(&image, width, 64, smallest as usize));
-            let gone = image.iter().zip(&fast).filter(|(a, b)| a != b).count();
-            assert_eq!(blanked as usize, gone);
+            let removed = image.iter().zip(&fast).filter(|(a, b)| a != b).count();
+            assert_eq!(blanked as usize, removed);
         }
     }
 }

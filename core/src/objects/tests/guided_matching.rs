@@ -1,16 +1,16 @@
 //! A closer look, at a wall of a textured room that a detector takes for a car.
 
 use super::*;
-use crate::scene_flow::{FlowMatcher, SceneFlowConfig, room};
+use crate::scene_flow::{FlowMatcher, SceneFlowConfig, test_scene};
 
 /// Depth of the room's far wall at the origin, m.
 const WALL_M: f64 = 14.0;
 /// A piece of it.
 const PIECE: PixelBox = PixelBox { left: 150, top: 60, width: 90, height: 40 };
-const SIZE: [usize; 2] = [room::WIDTH, room::HEIGHT];
+const SIZE: [usize; 2] = [test_scene::WIDTH, test_scene::HEIGHT];
 
 fn capacity() -> Capacity {
-    Capacity { image_width: room::WIDTH, image_height: room::HEIGHT, ..CAPACITY }
+    Capacity { image_width: test_scene::WIDTH, image_height: test_scene::HEIGHT, ..CAPACITY }
 }
 
 /// Drives towards the wall at 3 m/s, says that the camera did `camera_m_s`, and looks on the piece with or without images. No match of the scene
@@ -35,12 +35,12 @@ fn drive(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
         (0..6)
             .map(|frame| {
                 let at_m = 0.3 * f64::from(frame);
-                let images = room::see(&shift(0.0, 0.0, at_m));
-                let [left, right] = [0, 1].map(|side| View::new(&images[side], room::WIDTH, room::HEIGHT).unwrap());
+                let images = test_scene::see(&shift(0.0, 0.0, at_m));
+                let [left, right] = [0, 1].map(|side| View::new(&images[side], test_scene::WIDTH, test_scene::HEIGHT).unwrap());
                 matcher.push(&SceneFlowConfig::default(), left, right, &Serial);
-                let q8 = (room::RIG.focal_px * room::RIG.baseline_m / (WALL_M - at_m) * 256.0) as u16;
-                let disparity = vec![q8; room::WIDTH * room::HEIGHT];
-                let disparity = View::new(&disparity, room::WIDTH, room::HEIGHT).unwrap();
+                let q8 = (test_scene::RIG.focal_px * test_scene::RIG.baseline_m / (WALL_M - at_m) * 256.0) as u16;
+                let disparity = vec![q8; test_scene::WIDTH * test_scene::HEIGHT];
+                let disparity = View::new(&disparity, test_scene::WIDTH, test_scene::HEIGHT).unwrap();
                 instances.ingest(frame, &[detection], SIZE);
                 instances.assign_matches(&[], &[]);
                 let camera = CameraMotion {
@@ -49,7 +49,7 @@ fn drive(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
                 };
                 let search = with_images.then_some(GuidedMatching { matcher: &matcher, disparity_q8: disparity });
                 let none = FrameMatches { refined: &[], sparse: &[] };
-                instances.tracker.test_estimate_motions(&room::RIG, &camera, none, search, estimator);
+                instances.tracker.test_estimate_motions(&test_scene::RIG, &camera, none, search, estimator);
                 instances.reconstruct(None, &mut NoSink);
                 instances.tracks().next().unwrap()
             })

@@ -62,7 +62,7 @@ fn both_presets_are_as_true_as_published_on_kitti_2012() {
     }
 }
 
-/// Another implementation's disparities of the same pairs: not truth, but whoever disagrees with them everywhere has a mistake.
+/// Another implementation's disparities of the same pairs: not truth, but a matcher that disagrees with them everywhere is wrong.
 #[test]
 fn agrees_with_the_published_implementation_where_both_see() {
     let clip = |folder: &str, frame: usize| format!("kitti-odometry/sequences/06/{folder}/{frame:06}.png");

@@ -84,9 +84,9 @@ fn finds_slanted_surfaces_and_their_fractions() {
 fn a_right_image_moved_by_five_pixels_moves_the_result_by_five() {
     let truth = |u: f32, v: f32| 20.0 + 0.03 * u + 0.1 * v;
     let (left, right) = surface(400, 120, 3, truth);
-    let (_, moved) = surface(400, 120, 3, |u, v| truth(u, v) + 5.0);
+    let (_, shifted) = surface(400, 120, 3, |u, v| truth(u, v) + 5.0);
     let (_, before) = disparity(&StereoConfig::default(), &left, &right, &Serial);
-    let (_, after) = disparity(&StereoConfig::default(), &left, &moved, &Serial);
+    let (_, after) = disparity(&StereoConfig::default(), &left, &shifted, &Serial);
     let mut differences: Vec<i32> =
         before.iter().zip(&after).filter(|(a, b)| **a > 0 && **b > 0).map(|(a, b)| i32::from(*b) - i32::from(*a)).collect();
     differences.sort_unstable();

@@ -34,7 +34,7 @@ fn a_matcher_remembers_nothing_of_the_pair_before() {
             matcher.compute(&config, noise(333, 100, seed).view(), noise(333, 100, seed).view(), &Serial);
             let report = matcher.compute(&config, left.view(), right.view(), &Serial);
             let disparity: Vec<u16> = matcher.disparity_q8().rows().flatten().copied().collect();
-            assert!((report, disparity) == fresh, "a larger room and another pair before");
+            assert!((report, disparity) == fresh, "a larger buffer and another pair before");
         }
     });
 }
@@ -73,7 +73,7 @@ fn refused_pairs_are_named_and_leave_no_disparity() {
 }
 
 #[test]
-fn a_room_without_width_or_height_refuses_every_pair() {
+fn a_buffer_without_width_or_height_refuses_every_pair() {
     for (width, height) in [(0, 0), (40, 0), (0, 40)] {
         with_matcher(&capacity(width, height), |matcher| {
             let report = matcher.compute(&StereoConfig::default(), noise(40, 40, 1).view(), noise(40, 40, 1).view(), &Serial);

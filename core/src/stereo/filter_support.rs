@@ -2,7 +2,7 @@
 
 use super::{StereoConfig, support::NO_MATCH};
 
-/// Removes the points with fewer than `plausible_min` alike ones in the window about them, all judged before any is removed. `scratch`
+/// Removes the points with fewer than `plausible_min` alike ones in the window about them, all tested before any is removed. `scratch`
 /// is as long as `grid`. Returns how many were removed.
 pub(super) fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, scratch: &mut [i16]) -> u32 {
     let (Some(before), window) = (scratch.get_mut(..grid.len()), config.plausible_window) else { return 0 };
@@ -30,7 +30,7 @@ pub(super) fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width:
     removed
 }
 
-/// Removes the points that lie between two alike ones on their column, then on their row; in scan order, each judged by what is left.
+/// Removes the points that lie between two alike ones on their column, then on their row; in scan order, each tested against what is left.
 /// Returns how many were removed.
 pub(super) fn remove_redundant(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 {
     let height = grid.len() / width.max(1);

@@ -1,4 +1,4 @@
-//! A textured room seen by a stereo camera: the analytic scene of the tests.
+//! A textured box seen from within by a stereo camera: the analytic scene of the tests.
 
 use crate::geometry::{StereoRig, Transform};
 use nalgebra::{Point3, Vector3};
@@ -8,7 +8,7 @@ pub(crate) const WIDTH: usize = 400;
 pub(crate) const HEIGHT: usize = 160;
 pub(crate) const RIG: StereoRig = StereoRig { focal_px: 240.0, center_u_px: 198.3, center_v_px: 81.2, baseline_m: 0.5 };
 
-/// Corners of the room; the camera's world origin is inside.
+/// Corners of the box; the camera's world origin is inside.
 const LOW: [f64; 3] = [-4.0, -2.0, -6.0];
 const HIGH: [f64; 3] = [5.0, 1.7, 14.0];
 
