@@ -13,6 +13,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod audit;
 pub mod digest;
 pub mod egomotion;
 pub mod geometry;

@@ -13,6 +13,7 @@ type Layers = &'static [(&'static str, &'static [&'static str])];
 /// The core: leaves first.
 const CORE: Layers = &[
     ("problem", &[]),
+    ("audit", &[]),
     ("digest", &[]),
     ("memory", &[]),
     ("image", &[]),
@@ -22,16 +23,17 @@ const CORE: Layers = &[
     ("random", &["state"]),
     ("rectify", &["digest", "geometry", "image", "memory", "parallel", "problem"]),
     ("stereo", &["digest", "geometry", "image", "memory", "parallel", "problem"]),
-    ("scene_flow", &["digest", "geometry", "image", "memory", "parallel", "problem", "state"]),
+    ("scene_flow", &["audit", "digest", "geometry", "image", "memory", "parallel", "problem", "state"]),
     ("egomotion", &["digest", "geometry", "image", "memory", "problem", "random", "scene_flow", "state"]),
     ("masks", &["digest", "image", "memory", "state"]),
-    ("tracking", &["digest", "egomotion", "geometry", "image", "masks", "memory", "problem", "random", "scene_flow", "state"]),
-    ("volume", &["digest", "geometry", "image", "memory", "parallel", "problem", "state"]),
+    ("tracking", &["audit", "digest", "egomotion", "geometry", "image", "masks", "memory", "problem", "random", "scene_flow", "state"]),
+    ("volume", &["audit", "digest", "geometry", "image", "memory", "parallel", "problem", "state"]),
     ("view", &["geometry", "image", "memory", "parallel", "problem", "volume"]),
-    ("objects", &["digest", "geometry", "image", "masks", "memory", "parallel", "problem", "state", "tracking", "volume"]),
+    ("objects", &["audit", "digest", "geometry", "image", "masks", "memory", "parallel", "problem", "state", "tracking", "volume"]),
     (
         "mapper",
         &[
+            "audit",
             "digest",
             "egomotion",
             "geometry",

@@ -102,6 +102,8 @@ pub struct Report {
     pub prune: PruneReport,
     /// The static map's pool.
     pub blocks: BlockCount,
+    /// Contradictions in what the core itself keeps: always 0, or the core has a fault.
+    pub internal_faults: u32,
     /// Digests of what went in and of what each stage made of it.
     pub digests: StageDigests,
     /// One digest for all stages: [`StageDigests::whole`], and with it that of the rectified images where there are any.
@@ -109,11 +111,12 @@ pub struct Report {
 }
 
 impl Report {
-    /// The worst thing that happened in this step.
+    /// The worst event of this step. The map is affected where anything that belongs in a map was refused or
+    /// lost: blocks of any map, detections, tracks, objects, masks and crops.
     pub fn severity(&self) -> Severity {
         let allocation = &self.allocation;
-        let dropped = allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
-        if self.pose == PoseOrigin::Held || dropped > 0 {
+        let blocks = allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
+        if self.pose == PoseOrigin::Held || blocks + self.instances.refused() + self.internal_faults > 0 {
             Severity::MapAffected
         } else if self.dropped_features() + self.prune.early > 0 {
             Severity::Recovered

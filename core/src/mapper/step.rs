@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     Executor, Stage,
+    audit::Audit,
     egomotion::MotionEstimate,
     image::InvalidPair,
     objects::{InstancesReport, NoSink, ObjectFrame, ObjectSink, Picture},
@@ -135,11 +136,23 @@ impl Mapper<'_> {
             allocation,
             prune,
             blocks: self.block_count(),
+            internal_faults: self.audit(),
             digests,
             digest: digests.whole(self.frame),
         };
         self.frame += 1;
         report
+    }
+
+    /// How much of what must hold after a frame does not.
+    fn audit(&self) -> u32 {
+        let mut audit = Audit::default();
+        audit.require(self.camera.t_world_camera().is_finite(), "the camera's pose is finite");
+        self.scene_flow.audit(&mut audit);
+        self.tracker.audit(&mut audit);
+        self.objects.audit(&mut audit);
+        self.background.audit(&mut audit);
+        audit.faults()
     }
 
     fn block_count(&self) -> BlockCount {

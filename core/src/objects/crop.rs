@@ -8,6 +8,7 @@
 //! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of 152 bytes.
 
 use crate::{
+    audit::Audit,
     digest::Digest,
     geometry::{StereoRig, Transform},
     image::View,
@@ -247,6 +248,15 @@ impl<'s> Crops<'s> {
         };
         let grey = View::new(self.grey.get(span.clone())?, width, height)?;
         Some((self.disparity_q8.get(span)?, Picture { grey, colour }))
+    }
+
+    /// Says what must hold of the ring after a frame.
+    pub fn audit(&self, audit: &mut Audit) {
+        audit.require(self.len <= self.entries.len(), "no more crops wait than there are entries");
+        let pixels = self.disparity_q8.len();
+        for crop in self.entries.iter().take(self.len) {
+            audit.require(crop.start as usize + crop.len as usize <= pixels, "a crop's pixels lie in the ring");
+        }
     }
 
     /// Visits the crops, with their pixels.

@@ -50,9 +50,10 @@ impl InstancesReport {
         Self { detections, tracks, objects, matches_excluded, pixels_masked }
     }
 
-    /// What should have been used and was not.
+    /// What should have been used and was not: detections, tracks, masks, objects, their blocks and crops.
     pub fn refused(&self) -> u32 {
-        self.detections.refused() + self.tracks.refused + self.objects.refused + self.objects.blocks_refused
+        let ObjectsReport { refused, blocks_refused, crops_dropped, .. } = self.objects;
+        self.detections.refused() + self.tracks.refused + self.tracks.masks_lost + refused + blocks_refused + crops_dropped
     }
 }
 

@@ -2,12 +2,23 @@
 
 use super::{Object, ObjectSummary, Objects};
 use crate::{
+    audit::Audit,
     geometry::Transform,
     state::Visitor,
     tracking::{Class, MotionState},
 };
 
 impl Objects<'_> {
+    /// Says what must hold of crops and volumes after a frame.
+    pub(crate) fn audit(&self, audit: &mut Audit) {
+        self.crops.audit(audit);
+        for object in &self.volumes.objects {
+            audit.require(object.summary.is_none_or(|summary| summary.id != 0), "an object belongs to a track");
+            audit.require(object.summary.is_some() || object.volume.pool().is_empty(), "a volume without an object is empty");
+            object.volume.audit(audit);
+        }
+    }
+
     /// Visits all that outlives a frame; [`Objects::rebuild`] must follow a reading.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { crops, volumes, config: _, report: _ } = self;

@@ -13,6 +13,7 @@ use super::{
     support::{Motion, support},
 };
 use crate::{
+    audit::Audit,
     digest::Digest,
     image::{InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
@@ -173,6 +174,14 @@ impl<'s> FlowMatcher<'s> {
     pub fn reset(&mut self) {
         self.last = None;
         self.clear();
+    }
+
+    /// Says what must hold of the matches after a frame.
+    pub(crate) fn audit(&self, audit: &mut Audit) {
+        audit.require(self.sparse_len <= self.sparse.len(), "no more sparse matches than there is memory for");
+        audit.require(self.refined_len <= self.refined.len(), "no more refined matches than there is memory for");
+        let selected = |&index: &u32| (index as usize) < self.refined_len;
+        audit.require(self.selection().iter().all(selected), "every selected match is a refined one");
     }
 
     /// Visits the last pair; [`FlowMatcher::rebuild`] must follow a reading.

@@ -12,6 +12,7 @@
 
 use super::{TrackingConfig, config::Overlap, index::OptionalIndex, instance::Instance, track::Track};
 use crate::{
+    audit::Audit,
     masks::{MaskStore, TwoFrames},
     memory::{Capacity, Carver, region_bytes},
     state::Visitor,
@@ -57,6 +58,16 @@ impl<'s> TrackTable<'s> {
             len: 0,
             next_id: 1,
             scores: carver.alloc("tracking.affinity", capacity.tracks * capacity.detections),
+        }
+    }
+
+    /// Says what must hold of the tracks after frame `frame`, in which there were so many instances.
+    pub fn audit(&self, frame: u32, instances: usize, audit: &mut Audit) {
+        audit.require(self.len <= self.tracks.len(), "the table has no more tracks than its capacity");
+        for track in self.all() {
+            audit.require(track.id != 0, "a track has a number");
+            audit.require(track.first_frame <= track.last_frame && track.last_frame <= frame, "a track was seen before it was seen last");
+            audit.require(track.instance.get().is_none_or(|index| index < instances), "a track's instance is one of this frame");
         }
     }
 

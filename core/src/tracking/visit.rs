@@ -1,9 +1,14 @@
 //! Tracks and masks as state.
 
 use super::Tracker;
-use crate::state::Visitor;
+use crate::{audit::Audit, state::Visitor};
 
 impl Tracker<'_> {
+    /// Says what must hold of the tracks after a frame.
+    pub(crate) fn audit(&self, audit: &mut Audit) {
+        self.tracks.audit(self.frame, self.instances.all().len(), audit);
+    }
+
     /// Visits all that outlives a frame. Of the two mask stores that is this frame's: the next frame empties the other one.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self {

@@ -1,7 +1,7 @@
 //! A volume as state: slots as they were given out, what the blocks in use hold, and who was seen when.
 
 use super::Volume;
-use crate::state::Visitor;
+use crate::{audit::Audit, state::Visitor};
 
 impl Volume<'_> {
     /// Visits every field; [`Volume::rebuild`] must follow a reading.
@@ -29,6 +29,15 @@ impl Volume<'_> {
         visible.visit(slots, visitor);
         history.visit(slots, visitor);
         recency.visit(slots, visitor);
+    }
+
+    /// Says what must hold of the volume after a frame.
+    pub(crate) fn audit(&self, audit: &mut Audit) {
+        audit.require(self.pool.len() <= self.pool.capacity(), "no more blocks are in use than the pool has");
+        audit.require(self.pool.is_empty() == self.recency.oldest().is_none(), "every block in use is in the list of recency");
+        audit.require(self.history.len() <= self.history.capacity(), "the window has no more frames than it can hold");
+        let end = self.pool.high_water();
+        audit.require(self.visible.slots().iter().all(|slot| slot.index() < end), "every visible slot was given out");
     }
 
     /// Enters the blocks that were read into the index, in slot order, and sums their digests. Whether they can be: no place twice, room for all. Nothing that

@@ -196,9 +196,9 @@ fn whatever_could_not_be_used_is_in_the_sum_of_refusals() {
     for detections in detections {
         assert_eq!(InstancesReport { detections, ..InstancesReport::default() }.refused(), 1, "{detections:?}");
     }
-    let tracks = TrackCount { refused: 2, ..TrackCount::default() };
-    let objects = ObjectsReport { refused: 4, blocks_refused: 8, ..ObjectsReport::default() };
-    assert_eq!(InstancesReport { tracks, objects, ..InstancesReport::default() }.refused(), 14);
+    let tracks = TrackCount { refused: 2, masks_lost: 16, ..TrackCount::default() };
+    let objects = ObjectsReport { refused: 4, blocks_refused: 8, crops_dropped: 32, ..ObjectsReport::default() };
+    assert_eq!(InstancesReport { tracks, objects, ..InstancesReport::default() }.refused(), 62);
     let fine = DetectionCount {
         given: 9,
         accepted: 1,

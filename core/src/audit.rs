@@ -1,0 +1,43 @@
+//! Contradictions in what the software itself controls.
+//!
+//! What the world sends is checked and refused; what the core keeps must be right. Each owner of state
+//! has an `audit` that says what must hold after a frame. Where it does not hold, a test stops, and every
+//! other build counts it into [`crate::Report::internal_faults`]: nothing wrong goes on unseen.
+
+/// Counts what does not hold.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Audit {
+    faults: u32,
+}
+
+impl Audit {
+    /// Notes whether `what` holds.
+    #[track_caller]
+    pub fn require(&mut self, holds: bool, what: &'static str) {
+        debug_assert!(holds, "internal fault: {what}");
+        self.faults = self.faults.saturating_add(u32::from(!holds));
+    }
+
+    /// What did not hold.
+    pub fn faults(self) -> u32 {
+        self.faults
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_holds_is_no_fault() {
+        let mut audit = Audit::default();
+        audit.require(true, "one is one");
+        assert_eq!(audit.faults(), 0);
+    }
+
+    #[test]
+    #[should_panic(expected = "internal fault: the pool is no larger than its capacity")]
+    fn a_fault_stops_a_test() {
+        Audit::default().require(false, "the pool is no larger than its capacity");
+    }
+}
