@@ -12,6 +12,8 @@ mod lidar;
 mod names;
 mod open;
 mod pairing;
+#[cfg(test)]
+mod raw_tests;
 mod sequence;
 mod stacked;
 mod street;
