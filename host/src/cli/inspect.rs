@@ -1,6 +1,7 @@
 //! `dynvox inspect`.
 
 use crate::evaluate::stereo::{StereoSetError, find_stereo_set};
+use crate::input::diagnosis;
 use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout};
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use std::path::{Path, PathBuf};
@@ -95,6 +96,14 @@ fn describe(dataset: &dyn FrameSource, command: &str) {
     }
     outln!("  {}", masks(dataset));
     let evaluate = lidar(dataset);
+    match diagnosis::examine(dataset, &(0..dataset.len()).collect::<Vec<_>>()) {
+        Ok(findings) => {
+            for finding in findings {
+                println!("  {}: {}", if finding.refused { "refused" } else { "warning" }, finding.message);
+            }
+        }
+        Err(error) => println!("  the images cannot be examined: {error}"),
+    }
     for note in dataset.notes() {
         outln!("  note: {note}");
     }

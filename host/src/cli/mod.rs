@@ -83,6 +83,9 @@ enum Command {
     Fixtures(fixtures::FixturesArgs),
 }
 
+/// Exit code of a run whose images would give a meaningless map.
+const REFUSED_INPUT: u8 = 3;
+
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
@@ -101,7 +104,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", sentence(&error));
-            ExitCode::FAILURE
+            if error.is::<crate::input::diagnosis::RefusedInput>() { ExitCode::from(REFUSED_INPUT) } else { ExitCode::FAILURE }
         }
     }
 }

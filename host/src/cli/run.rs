@@ -7,6 +7,7 @@ use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
 use crate::formats;
 use crate::input::depth::{self, DepthChoice};
+use crate::input::diagnosis::{self, RefusedInput};
 use crate::input::masks::{self, MaskChoice};
 use crate::input::{self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking};
 use crate::observe::Reference;
@@ -105,6 +106,9 @@ pub struct RunArgs {
     /// Fail at the first frame that affects the map: an extrapolated pose, anything refused or lost
     #[arg(long)]
     strict: bool,
+    /// Map images that are refused as exchanged, unrectified, out of order, black or the same in both cameras
+    #[arg(long)]
+    force: bool,
     /// Fail when the process uses more than so many MiB [default: the slab and 256]
     #[arg(long, value_name = "MIB")]
     rss_limit_mib: Option<u64>,
@@ -184,6 +188,19 @@ fn on_or_off(text: &str) -> Result<bool, String> {
     }
 }
 
+/// Examines the images of a recording: what is doubtful about them.
+fn examined(args: &RunArgs, dataset: &dyn FrameSource, indices: &[usize]) -> anyhow::Result<Vec<String>> {
+    if args.path.is_none() {
+        // The synthetic street knows what it renders.
+        return Ok(Vec::new());
+    }
+    let findings = diagnosis::examine(dataset, indices)?;
+    if findings.iter().any(|finding| finding.refused) && !args.force {
+        return Err(RefusedInput { findings }.into());
+    }
+    Ok(findings.into_iter().map(|finding| finding.message).collect())
+}
+
 /// The plan of a run.
 fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     let mut settings = Settings::resolve(args.config.as_deref(), &args.set)?;
@@ -212,6 +229,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         None => None,
     };
     Ok(Plan {
+        warnings: examined(args, dataset.as_ref(), &indices)?,
         indices,
         poses,
         profile,
@@ -308,5 +326,8 @@ fn print_header(plan: &Plan) {
     eprintln!("{name}: {frames} frames of {width} x {height} px, profile {}, {threads}", plan.profile);
     for note in plan.dataset.notes() {
         eprintln!("note: {note}");
+    }
+    for warning in &plan.warnings {
+        eprintln!("warning: {warning}");
     }
 }

@@ -34,6 +34,13 @@ pub struct Summary {
     prune: PruneSummary,
     evict: EvictSummary,
     health: HealthSummary,
+    input: InputSummary,
+}
+
+#[derive(Debug, Serialize)]
+struct InputSummary {
+    /// Sentences that say what is doubtful about the images.
+    warnings: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -194,6 +201,7 @@ impl Summary {
             prune: PruneSummary::of(&sections.blocks.totals),
             evict: EvictSummary::of(&sections.blocks),
             health: HealthSummary::of(run),
+            input: InputSummary { warnings: run.header.warnings.clone() },
         }
     }
 }

@@ -74,6 +74,7 @@ fn header(plan: &Plan) -> RunHeader {
     RunHeader {
         name: plan.dataset.name().to_owned(),
         notes: plan.dataset.notes().to_vec(),
+        warnings: plan.warnings.clone(),
         profile: plan.profile.clone(),
         capacity: plan.capacity,
         threads: plan.threads,

@@ -43,6 +43,8 @@ pub struct Plan {
     pub evaluate: Option<Reference>,
     /// Frames after which the map is evaluated against a frame's reference, from the frame's pose.
     pub evaluation_delay: usize,
+    /// What is doubtful about the images.
+    pub warnings: Vec<String>,
     /// Whether to show no progress.
     pub quiet: bool,
 }

@@ -13,6 +13,8 @@ pub struct RunHeader {
     pub name: String,
     /// Assumptions of the data set's loader.
     pub notes: Vec<String>,
+    /// What is doubtful about the images.
+    pub warnings: Vec<String>,
     /// Name of the profile.
     pub profile: String,
     /// Its bounds.

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 29] = [
+pub const FIXED_ARGUMENTS: [&str; 30] = [
     "path",
     "sequence",
     "dataset",
@@ -34,6 +34,7 @@ pub const FIXED_ARGUMENTS: [&str; 29] = [
     "evaluate",
     "evaluation_delay",
     "strict",
+    "force",
     "out",
     "overwrite",
 ];

@@ -1,0 +1,233 @@
+//! Examining images before the first is mapped: rectification, exchanged or identical cameras, order, exposure.
+//!
+//! Ten pairs spread over the sequence are matched patch by patch without the rule that rows agree ([`patches`]), and a run of consecutive left
+//! images is compared as thumbnails ([`order`]). What makes a map meaningless is refused, what is doubtful is a warning. Too few matches give
+//! no verdict.
+
+mod order;
+mod patches;
+mod rectified;
+#[cfg(test)]
+mod tests;
+
+use crate::formats::Image;
+use crate::input::source::{FrameSource, InputError};
+use patches::PatchMatch;
+use rectified::RectifiedSource;
+
+/// Pairs that are matched.
+const PAIRS: usize = 10;
+/// Fewest matches, over all pairs, that allow a verdict.
+const FEWEST_MATCHES: usize = 60;
+/// Median distance of matched rows that is still called rectified, px.
+const ROWS_PX: f64 = 0.5;
+/// The same above which a map is meaningless, px.
+const REFUSED_ROWS_PX: f64 = 1.0;
+/// Roll that is still called rectified, degrees.
+const ROLL_DEG: f64 = 0.15;
+/// Exposures that differ by less are equal.
+const EXPOSURE: f64 = 1.2;
+/// Longest baseline, m.
+const BASELINE_M: f64 = 10.0;
+/// Mean difference of two images below which they are the same, grey levels.
+const SAME: f64 = 0.5;
+/// Mean grey level of a black image.
+const BLACK: f64 = 4.0;
+/// Share of saturated pixels of a usable image.
+const SATURATED_SHARE: f64 = 0.4;
+/// Contrast over one pixel, as a share of that over four, of an image in focus.
+const FOCUS: f64 = 0.3;
+
+/// What is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Fault {
+    /// Matches do not lie in one row.
+    NotRectified,
+    /// The left images are the right camera's.
+    Exchanged,
+    /// Both cameras show the same image.
+    SameImage,
+    /// The baseline is in another unit.
+    Baseline,
+    /// Frames do not follow each other.
+    Order,
+    /// One step between frames is much longer than the others.
+    Jump,
+    /// One camera is brighter.
+    Exposure,
+    /// Images are black.
+    Black,
+    /// Images are white.
+    Saturated,
+    /// Images are out of focus.
+    Focus,
+}
+
+/// One fault, in a sentence with the next action.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// What is wrong.
+    pub fault: Fault,
+    /// The sentence.
+    pub message: String,
+    /// Whether a map would be meaningless.
+    pub refused: bool,
+}
+
+/// Images that would give a meaningless map.
+#[derive(Debug, thiserror::Error)]
+#[error("{}. --force maps them nevertheless", messages(.findings))]
+pub struct RefusedInput {
+    /// What is wrong.
+    pub findings: Vec<Finding>,
+}
+
+fn messages(findings: &[Finding]) -> String {
+    findings.iter().filter(|finding| finding.refused).map(|finding| finding.message.as_str()).collect::<Vec<_>>().join(". ")
+}
+
+/// Examines the frames with these numbers. Images that cannot be read are left to the run.
+///
+/// # Errors
+/// A raw source that cannot be rectified.
+pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Finding>, InputError> {
+    let mut findings = Vec::new();
+    let rig = source.rig();
+    if rig.baseline_m > BASELINE_M {
+        findings.push(finding(
+            Fault::Baseline,
+            true,
+            format!("the cameras are {} m apart. Is the calibration in millimetres? Give the baseline in metres", rig.baseline_m),
+        ));
+    }
+    let mut rectified = RectifiedSource::new(source)?;
+    let step = indices.len().div_ceil(PAIRS).max(1);
+    let mut pairs = Vec::new();
+    for &index in indices.iter().step_by(step) {
+        if let Ok(Some([left, right])) = rectified.pair(index) {
+            pairs.push(Pair::of(&left, &right));
+        }
+    }
+    findings.extend(judge(&pairs));
+    let thumbnails = order::window(indices).iter().map_while(|&index| Some(order::thumbnail(&source.frame(index).ok()?.left)));
+    findings.extend(order::judge(&thumbnails.collect::<Vec<_>>(), indices.first().copied().unwrap_or(0)));
+    Ok(findings)
+}
+
+fn finding(fault: Fault, refused: bool, message: String) -> Finding {
+    Finding { fault, message, refused }
+}
+
+/// What is measured of one pair.
+struct Pair {
+    matches: Vec<PatchMatch>,
+    difference: f64,
+    mean: f64,
+    saturated: f64,
+    focus: [f64; 2],
+}
+
+impl Pair {
+    fn of(left: &Image<u8>, right: &Image<u8>) -> Self {
+        let count = left.pixels().len().max(1) as f64;
+        let sum = |image: &Image<u8>| image.pixels().iter().map(|&grey| u64::from(grey)).sum::<u64>() as f64 / count;
+        let differences = left.pixels().iter().zip(right.pixels()).map(|(a, b)| u64::from(a.abs_diff(*b)));
+        Self {
+            matches: patches::matches(left, right),
+            difference: differences.sum::<u64>() as f64 / count,
+            mean: 0.5 * (sum(left) + sum(right)),
+            saturated: left.pixels().iter().filter(|grey| **grey >= 252).count() as f64 / count,
+            focus: [left, right].map(focus),
+        }
+    }
+}
+
+/// Mean contrast over one pixel as a share of that over four.
+fn focus(image: &Image<u8>) -> f64 {
+    let contrast = |apart: usize| -> u64 {
+        let row = |row: &[u8]| row.iter().zip(row.iter().skip(apart)).map(|(a, b)| u64::from(a.abs_diff(*b))).sum::<u64>();
+        image.pixels().chunks_exact(image.width().max(1)).map(row).sum()
+    };
+    contrast(1) as f64 / contrast(4).max(1) as f64
+}
+
+/// The middle of some numbers.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn judge(pairs: &[Pair]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let most = |holds: &dyn Fn(&Pair) -> bool| !pairs.is_empty() && 2 * pairs.iter().filter(|pair| holds(pair)).count() > pairs.len();
+    if most(&|pair| pair.mean < BLACK) {
+        findings.push(finding(
+            Fault::Black,
+            true,
+            "the images are black. Check exposure, lens caps and the bits of 16-bit images (--bits)".to_owned(),
+        ));
+        return findings;
+    }
+    if most(&|pair| pair.difference < SAME) {
+        let message = "both cameras show the same image. Give the left camera's images and the right one's".to_owned();
+        findings.push(finding(Fault::SameImage, true, message));
+        return findings;
+    }
+    if most(&|pair| pair.saturated > SATURATED_SHARE) {
+        findings.push(finding(
+            Fault::Saturated,
+            false,
+            "much of the images is saturated: nothing can be matched there. Lower the exposure".to_owned(),
+        ));
+    }
+    for (camera, name) in ["left", "right"].into_iter().enumerate() {
+        if most(&|pair| pair.focus.get(camera).is_some_and(|focus| *focus < FOCUS)) {
+            let message =
+                format!("the {name} images are out of focus or enlarged: disparities will be coarse. Focus the lens, or give --scale 0.5");
+            findings.push(finding(Fault::Focus, false, message));
+        }
+    }
+    let matches: Vec<&PatchMatch> = pairs.iter().flat_map(|pair| &pair.matches).collect();
+    if matches.len() >= FEWEST_MATCHES {
+        findings.extend(judge_matches(&matches));
+    }
+    findings
+}
+
+fn judge_matches(matches: &[&PatchMatch]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let share = |holds: &dyn Fn(&PatchMatch) -> bool| matches.iter().filter(|one| holds(one)).count() as f64 / matches.len() as f64;
+    if share(&|one| one.disparity_px < -1.0) > 0.6 {
+        let message = "left and right are exchanged: what is near lies further left in the left images. Exchange the two folders or files";
+        findings.push(finding(Fault::Exchanged, true, message.to_owned()));
+    }
+    let rows_px = median(matches.iter().map(|one| one.rows_px.abs()).collect());
+    let roll_deg = roll_deg(matches);
+    if rows_px > ROWS_PX || roll_deg.abs() > ROLL_DEG {
+        let message = format!(
+            "these images are not rectified: matches lie {rows_px:.1} px apart in height (median), with a roll of {roll_deg:.2} degrees between \
+             the cameras. Give the raw images with their calibration: --calibration FILE"
+        );
+        findings.push(finding(Fault::NotRectified, rows_px > REFUSED_ROWS_PX, message));
+    }
+    let exposure = median(matches.iter().map(|one| one.brightness).collect());
+    if !(1.0 / EXPOSURE..=EXPOSURE).contains(&exposure) {
+        let message = format!("the left images are {exposure:.2} times as bright as the right ones. Let both cameras expose alike");
+        findings.push(finding(Fault::Exposure, false, message));
+    }
+    findings
+}
+
+/// Roll of the right camera against the left: how the distance of rows grows from the left third of the image to the right one.
+fn roll_deg(matches: &[&PatchMatch]) -> f64 {
+    let mut columns: Vec<f64> = matches.iter().map(|one| one.u_px).collect();
+    columns.sort_by(f64::total_cmp);
+    let (Some(&low), Some(&high)) = (columns.get(columns.len() / 3), columns.get(2 * columns.len() / 3)) else { return 0.0 };
+    let side = |holds: &dyn Fn(f64) -> bool| {
+        let of = |value: fn(&PatchMatch) -> f64| median(matches.iter().filter(|one| holds(one.u_px)).map(|one| value(one)).collect());
+        [of(|one| one.u_px), of(|one| one.rows_px)]
+    };
+    let ([u0, rows0], [u1, rows1]) = (side(&|u| u < low), side(&|u| u > high));
+    if u1 - u0 < 20.0 { 0.0 } else { ((rows1 - rows0) / (u1 - u0)).atan().to_degrees() }
+}

@@ -1,0 +1,138 @@
+//! Patches of a left image found again in the right one, whatever the row: first at half size over a wide window, then at full size about it,
+//! and below the pixel by a parabola. Similarity is normalised, so that exposure does not matter.
+
+use crate::formats::Image;
+
+/// Pixels from one patch to the next.
+const STEP_PX: usize = 28;
+/// Half sides of patches, at half and at full size, px.
+const COARSE: i32 = 3;
+const FINE: i32 = 5;
+/// How far a match is looked for to either side, as a share of the width.
+const REACH: f64 = 0.12;
+/// How far above and below, px.
+const REACH_ROWS_PX: i32 = 10;
+/// Least similarity of a match.
+const SIMILAR: f64 = 0.9;
+/// How much better a match must be than the second best place.
+const CLEAR: f64 = 0.05;
+/// Least contrast of a patch along rows and columns, grey levels squared.
+const TEXTURE: f64 = 60.0;
+
+/// A patch that was found again.
+pub struct PatchMatch {
+    /// Column in the left image, px.
+    pub u_px: f64,
+    /// How much further left it lies in the right image, px.
+    pub disparity_px: f64,
+    /// How much lower it lies in the right image, px.
+    pub rows_px: f64,
+    /// Brightness in the left image over that in the right one.
+    pub brightness: f64,
+}
+
+/// The image at half size: means of four pixels.
+fn half(image: &Image<u8>) -> Option<Image<u8>> {
+    let (width, height) = (image.width() / 2, image.height() / 2);
+    let mean = |u: usize, v: usize| {
+        let at = |du: usize, dv: usize| u16::from(image.get(2 * u + du, 2 * v + dv).unwrap_or(0));
+        ((at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1) + 2) / 4) as u8
+    };
+    Image::new(width, height, (0..height).flat_map(|v| (0..width).map(move |u| (u, v))).map(|(u, v)| mean(u, v)).collect())
+}
+
+/// A patch less its mean, and its length.
+struct Patch {
+    values: Vec<f32>,
+    length: f32,
+    mean: f32,
+}
+
+/// The patch about a pixel; `None` where it is not within the image.
+fn patch(image: &Image<u8>, u: i32, v: i32, half: i32) -> Option<Patch> {
+    let within = |at: i32, side: usize| at >= half && at + half < side as i32;
+    if !(within(u, image.width()) && within(v, image.height())) {
+        return None;
+    }
+    let columns = (u - half) as usize..(u + half + 1) as usize;
+    let rows = (v - half) as usize..(v + half + 1) as usize;
+    let values: Vec<f32> = rows
+        .flat_map(|row| image.pixels().get(row * image.width() + columns.start..row * image.width() + columns.end).unwrap_or(&[]))
+        .map(|&grey| f32::from(grey))
+        .collect();
+    let mean = values.iter().sum::<f32>() / values.len() as f32;
+    let values: Vec<f32> = values.iter().map(|value| value - mean).collect();
+    let length = values.iter().map(|value| value * value).sum::<f32>().sqrt();
+    Some(Patch { values, length, mean })
+}
+
+/// Cosine of two patches; -1 where one is flat or outside.
+fn similarity(a: &Patch, b: Option<&Patch>) -> f64 {
+    let Some(b) = b.filter(|b| a.length > 1.0 && b.length > 1.0) else { return -1.0 };
+    f64::from(a.values.iter().zip(&b.values).map(|(a, b)| a * b).sum::<f32>() / (a.length * b.length))
+}
+
+/// Whether a patch has edges along rows and along columns.
+fn has_corners(image: &Image<u8>, u: i32, v: i32) -> bool {
+    let at = |du: i32, dv: i32| f64::from(image.get((u + du) as usize, (v + dv) as usize).unwrap_or(0));
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (du, dv) in (-COARSE..=COARSE).flat_map(|du| (-COARSE..=COARSE).map(move |dv| (du, dv))) {
+        let (x, y) = (at(du + 1, dv) - at(du - 1, dv), at(du, dv + 1) - at(du, dv - 1));
+        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+    }
+    let count = f64::from((2 * COARSE + 1) * (2 * COARSE + 1));
+    let smaller = 0.5 * (xx + yy - ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt());
+    smaller / count > TEXTURE
+}
+
+/// The matches of a pair.
+pub fn matches(left: &Image<u8>, right: &Image<u8>) -> Vec<PatchMatch> {
+    let (Some(small_left), Some(small_right)) = (half(left), half(right)) else { return Vec::new() };
+    let places = (STEP_PX..left.height()).step_by(STEP_PX).flat_map(|v| (STEP_PX..left.width()).step_by(STEP_PX).map(move |u| (u, v)));
+    places.filter_map(|(u, v)| find([left, right], [&small_left, &small_right], u as i32, v as i32)).collect()
+}
+
+fn find([left, right]: [&Image<u8>; 2], [small_left, small_right]: [&Image<u8>; 2], u: i32, v: i32) -> Option<PatchMatch> {
+    let (small_u, small_v) = (u / 2, v / 2);
+    let coarse = patch(small_left, small_u, small_v, COARSE)?;
+    if small_u < 5 || small_v < 5 || !has_corners(small_left, small_u, small_v) {
+        return None;
+    }
+    let reach = (REACH * small_left.width() as f64) as i32;
+    let rows = REACH_ROWS_PX / 2;
+    let mut scores: Vec<(f64, i32, i32)> = Vec::new();
+    for (du, dv) in (-reach..=reach).flat_map(|du| (-rows..=rows).map(move |dv| (du, dv))) {
+        scores.push((similarity(&coarse, patch(small_right, small_u + du, small_v + dv, COARSE).as_ref()), du, dv));
+    }
+    let &(best, du, dv) = scores.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let apart = |other: &&(f64, i32, i32)| (other.1 - du).abs() > 2 || (other.2 - dv).abs() > 2;
+    let second = scores.iter().filter(apart).map(|score| score.0).fold(-1.0, f64::max);
+    if best < SIMILAR || best - second < CLEAR || dv.abs() == rows || du.abs() == reach {
+        return None;
+    }
+    refined(left, right, [u, v], [u + 2 * du, v + 2 * dv])
+}
+
+/// The place at full size, below the pixel.
+fn refined(left: &Image<u8>, right: &Image<u8>, [u, v]: [i32; 2], [near_u, near_v]: [i32; 2]) -> Option<PatchMatch> {
+    let sought = patch(left, u, v, FINE)?;
+    let score = |du: i32, dv: i32| similarity(&sought, patch(right, near_u + du, near_v + dv, FINE).as_ref());
+    let around = (-3..=3).flat_map(|du| (-3..=3).map(move |dv| (du, dv)));
+    let (best, du, dv) = around.map(|(du, dv)| (score(du, dv), du, dv)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    if best < SIMILAR || du.abs() == 3 || dv.abs() == 3 {
+        return None;
+    }
+    let vertex = |before: f64, after: f64| {
+        let bend = before + after - 2.0 * best;
+        if bend < -1e-9 { 0.5 * (before - after) / bend } else { 0.0 }
+    };
+    let sub_u = vertex(score(du - 1, dv), score(du + 1, dv));
+    let sub_v = vertex(score(du, dv - 1), score(du, dv + 1));
+    let found = patch(right, near_u + du, near_v + dv, FINE)?;
+    Some(PatchMatch {
+        u_px: f64::from(u),
+        disparity_px: f64::from(u - near_u - du) - sub_u,
+        rows_px: f64::from(near_v + dv - v) + sub_v,
+        brightness: f64::from((sought.mean + 1.0) / (found.mean + 1.0)),
+    })
+}

@@ -1,0 +1,118 @@
+//! A clean pair gives no finding; each planted fault is named.
+
+use super::*;
+use crate::input::{OpenOptions, open};
+use std::path::PathBuf;
+
+const WIDTH: usize = 480;
+const HEIGHT: usize = 200;
+
+/// Smooth noise of several scales about a place in the world.
+fn texture(x: f64, y: f64) -> f64 {
+    let hash = |i: i64, j: i64, seed: u64| {
+        let mixed = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (j as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F) ^ seed;
+        ((mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 40) as f64 / (1u64 << 24) as f64
+    };
+    let layer = |scale: f64, seed: u64| {
+        let (x, y) = (x / scale, y / scale);
+        let (i, j) = (x.floor(), y.floor());
+        let (s, t) = (x - i, y - j);
+        let at = |di: i64, dj: i64| hash(i as i64 + di, j as i64 + dj, seed);
+        (at(0, 0) * (1.0 - s) + at(1, 0) * s) * (1.0 - t) + (at(0, 1) * (1.0 - s) + at(1, 1) * s) * t
+    };
+    20.0 + 90.0 * layer(3.0, 1) + 70.0 * layer(11.0, 2) + 50.0 * layer(60.0, 3)
+}
+
+fn image(at: impl Fn(f64, f64) -> f64) -> Image<u8> {
+    let pixels = (0..WIDTH * HEIGHT).map(|i| at((i % WIDTH) as f64, (i / WIDTH) as f64).clamp(0.0, 255.0) as u8);
+    Image::new(WIDTH, HEIGHT, pixels.collect()).unwrap()
+}
+
+/// Pairs of a wall 12 px of disparity away; `right` says where a right pixel looks in the left image, and how bright it is.
+fn faults(right: impl Fn(f64, f64) -> ([f64; 2], f64)) -> Vec<Fault> {
+    let pairs: Vec<Pair> = (0..3)
+        .map(|frame| {
+            let shift = 400.0 * f64::from(frame);
+            let left = image(|u, v| texture(u + shift, v));
+            let seen = image(|u, v| {
+                let ([u, v], gain) = right(u, v);
+                gain * texture(u + shift, v)
+            });
+            Pair::of(&left, &seen)
+        })
+        .collect();
+    assert!(pairs.iter().all(|pair| pair.difference < SAME || pair.mean < BLACK || pair.matches.len() > 20));
+    judge(&pairs).into_iter().map(|finding| finding.fault).collect()
+}
+
+#[test]
+fn a_clean_pair_gives_no_finding_and_each_fault_is_named() {
+    assert_eq!(faults(|u, v| ([u + 12.0, v], 1.0)), []);
+    assert_eq!(faults(|u, v| ([u - 12.0, v], 1.0)), [Fault::Exchanged]);
+    assert_eq!(faults(|u, v| ([u + 12.0, v - 3.0], 1.0)), [Fault::NotRectified]);
+    let roll = 0.6f64.to_radians();
+    assert_eq!(faults(|u, v| ([u + 12.0, v + roll * (u - 240.0)], 1.0)), [Fault::NotRectified]);
+    assert_eq!(faults(|u, v| ([u + 12.0, v], 0.6)), [Fault::Exposure]);
+    assert_eq!(faults(|u, v| ([u, v], 1.0)), [Fault::SameImage]);
+}
+
+#[test]
+fn the_size_of_the_fault_stands_in_the_sentence_and_decides_on_refusal() {
+    let left = image(texture);
+    let said = |rows: f64| {
+        let pair = Pair::of(&left, &image(|u, v| texture(u + 12.0, v - rows)));
+        let findings = judge(&[pair]);
+        (findings[0].refused, findings[0].message.clone())
+    };
+    let (refused, message) = said(3.0);
+    assert!(refused && message.contains("3.0 px apart in height") && message.contains("--calibration"), "{message}");
+    assert!(!said(0.8).0, "a warning");
+}
+
+#[test]
+fn black_images_are_refused_and_few_matches_give_no_verdict() {
+    let black = image(|_, _| 0.0);
+    assert_eq!(judge(&[Pair::of(&black, &black)])[0].fault, Fault::Black);
+    let grey = image(|u, _| 100.0 + u / 10.0);
+    let other = image(|u, _| 90.0 + u / 10.0);
+    assert!(judge(&[Pair::of(&grey, &other)]).iter().all(|finding| finding.fault == Fault::Focus), "nothing can be matched");
+}
+
+#[test]
+fn shuffled_frames_are_out_of_order_and_a_gap_is_a_jump() {
+    let thumbnails = |places: &[f64]| places.iter().map(|place| order::thumbnail(&image(|u, v| texture(u + place, v)))).collect::<Vec<_>>();
+    let drive: Vec<f64> = (0..16).map(|frame| 6.0 * f64::from(frame)).collect();
+    assert!(order::judge(&thumbnails(&drive), 0).is_none());
+    let shuffled: Vec<f64> = (0..16).map(|frame| drive[frame * 7 % 16]).collect();
+    assert_eq!(order::judge(&thumbnails(&shuffled), 0).unwrap().fault, Fault::Order);
+    assert!(order::judge(&thumbnails(&[5.0; 16]), 0).is_none(), "a standing camera");
+}
+
+#[test]
+fn real_clips_give_no_false_alarm() {
+    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let clips: [(&str, Option<&str>); 5] = [
+        ("kitti-odometry", Some("06")),
+        ("kitti-odometry", Some("r1405")),
+        ("kitti-tracking", Some("0003")),
+        ("kitti-tracking", Some("0005")),
+        ("kitti-raw/2011_09_26/2011_09_26_drive_1405_extract", None),
+    ];
+    for (path, sequence) in clips {
+        let path = data.join(path);
+        if !path.is_dir() {
+            eprintln!("left out: {} is not beside the checkout", path.display());
+            continue;
+        }
+        let options = OpenOptions { sequence: sequence.map(str::to_owned), ..OpenOptions::default() };
+        let source = open(&path, &options).unwrap();
+        let indices: Vec<usize> = (0..source.len()).collect();
+        let findings = examine(source.as_ref(), &indices).unwrap();
+        let mut rectified = RectifiedSource::new(source.as_ref()).unwrap();
+        let [left, right] = rectified.pair(0).unwrap().unwrap();
+        let pair = Pair::of(&left, &right);
+        let rows = median(pair.matches.iter().map(|one| one.rows_px.abs()).collect());
+        println!("{sequence:?}: {} matches, rows {rows:.2} px, focus {:?}, {findings:?}", pair.matches.len(), pair.focus);
+        assert!(findings.is_empty(), "{sequence:?}: {findings:?}");
+    }
+}
