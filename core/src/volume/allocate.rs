@@ -58,6 +58,11 @@ impl<'s> Seen<'s> {
         self.entries.fill(0);
     }
 
+    /// Its memory, for whoever needs some between two allocations.
+    pub(super) fn scratch(&mut self) -> &mut [f32] {
+        bytemuck::cast_slice_mut(self.entries)
+    }
+
     /// Enters a block; `true` when it was entered last at its place. A street is wide and long, hardly high: hence the split of bits.
     #[inline]
     fn enter(&mut self, [x, y, z]: [i32; 3]) -> bool {

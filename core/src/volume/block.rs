@@ -13,6 +13,11 @@ pub const BLOCK_SIDE: usize = 8;
 /// Lattice points in a block.
 pub const BLOCK_VOXELS: usize = BLOCK_SIDE * BLOCK_SIDE * BLOCK_SIDE;
 
+/// Lattice points of a block with one z.
+pub(crate) const LAYER_VOXELS: usize = BLOCK_SIDE * BLOCK_SIDE;
+/// One value for each of them.
+pub(crate) type Layer<T> = [T; LAYER_VOXELS];
+
 /// A block's place: it holds the lattice points `8 * coord ..= 8 * coord + 7` on each axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BlockCoord {
@@ -54,6 +59,32 @@ pub(crate) struct Voxels {
     pub sdf: [i16; BLOCK_VOXELS],
     /// Observations, up to `max_weight`; 0 is never observed.
     pub weight: [u8; BLOCK_VOXELS],
+}
+
+impl Voxels {
+    /// Distances and weights by layer, z ascending.
+    pub fn layers_mut(&mut self) -> impl Iterator<Item = (&mut Layer<i16>, &mut Layer<u8>)> {
+        self.sdf.as_chunks_mut().0.iter_mut().zip(self.weight.as_chunks_mut().0)
+    }
+}
+
+/// The colour planes of layer `z`, which is below [`BLOCK_SIDE`].
+#[inline]
+pub(super) fn colour_layer_mut(colour: &mut Colour, z: usize) -> Option<[&mut Layer<u8>; 3]> {
+    let [red, green, blue] = colour.each_mut().map(|plane| plane.as_chunks_mut().0.get_mut(z));
+    Some([red?, green?, blue?])
+}
+
+/// 64 bytes of 0 or 1 as bits, the first lowest.
+#[inline]
+pub(crate) fn packed(flags: &Layer<u8>) -> u64 {
+    let mut bits = 0;
+    for (row, flags) in (0u32..).zip(flags.as_chunks::<BLOCK_SIDE>().0) {
+        // The factor moves byte i to bit 56 + i; no two products meet in one bit, so nothing carries.
+        let byte = u64::from_le_bytes(*flags).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+        bits |= byte << (8 * row);
+    }
+    bits
 }
 
 /// Red, green and blue planes of a block; all three 0 is no colour yet.

@@ -8,7 +8,7 @@
 mod allocate;
 #[cfg(test)]
 pub(crate) mod analytic;
-mod block;
+pub(crate) mod block;
 mod config;
 mod fuse;
 mod history;

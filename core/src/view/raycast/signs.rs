@@ -2,14 +2,15 @@
 //!
 //! A layer (one z) of a block is a 64-bit word: bit `x + 8 y`.
 
-use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS};
+use crate::volume::{
+    BLOCK_SIDE, BLOCK_VOXELS,
+    block::{LAYER_VOXELS, packed},
+};
 use bytemuck::{Pod, Zeroable};
 
 /// One bit per lattice point or cell of a block, a word per layer.
 pub(super) type Layers = [u64; BLOCK_SIDE];
 
-/// Voxels in a layer.
-const LAYER: usize = BLOCK_SIDE * BLOCK_SIDE;
 /// The points of a layer with x = 0, and those with x = 0 to 6.
 const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
 const BUT_LAST_COLUMN: u64 = 0x7F7F_7F7F_7F7F_7F7F;
@@ -18,9 +19,9 @@ const BUT_LAST_COLUMN: u64 = 0x7F7F_7F7F_7F7F_7F7F;
 pub(super) fn of_block(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS], min_weight: u8) -> [Layers; 2] {
     let mut signs = [[0; BLOCK_SIDE]; 2];
     let [before, behind] = &mut signs;
-    let layers = sdf.as_chunks::<LAYER>().0.iter().zip(weight.as_chunks::<LAYER>().0);
+    let layers = sdf.as_chunks::<LAYER_VOXELS>().0.iter().zip(weight.as_chunks::<LAYER_VOXELS>().0);
     for ((sdf, weight), (before, behind)) in layers.zip(before.iter_mut().zip(behind)) {
-        let (mut is_before, mut is_seen) = ([0u8; LAYER], [0u8; LAYER]);
+        let (mut is_before, mut is_seen) = ([0u8; LAYER_VOXELS], [0u8; LAYER_VOXELS]);
         for (((is_before, is_seen), &sdf), &weight) in is_before.iter_mut().zip(&mut is_seen).zip(sdf).zip(weight) {
             *is_seen = u8::from(weight >= min_weight);
             *is_before = u8::from(sdf > 0);
@@ -30,18 +31,6 @@ pub(super) fn of_block(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS], m
         *behind = seen & !*before;
     }
     signs
-}
-
-/// 64 bytes of 0 or 1 as bits, the first lowest.
-#[inline]
-fn packed(flags: &[u8; LAYER]) -> u64 {
-    let mut bits = 0;
-    for (row, flags) in (0u32..).zip(flags.as_chunks::<BLOCK_SIDE>().0) {
-        // The factor moves byte i to bit 56 + i; no two products meet in one bit, so nothing carries.
-        let byte = u64::from_le_bytes(*flags).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-        bits |= byte << (8 * row);
-    }
-    bits
 }
 
 /// For each cell, its corners combined by `join` (or, and), given the points of the block (0) and of those after it in x (1), y (2), z (4).

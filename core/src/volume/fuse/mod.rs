@@ -9,16 +9,24 @@
 //! where `v / (w + v)` is a 15-bit fraction from a table. Colour is averaged likewise within `colour_band` of the surface, with a weight
 //! of at most 5, so that its 8 bits keep following.
 //!
+//! Blocks behind all that is observed where they can fall are left out (`horizon`); of the others 64 voxels are fused at a time (`layer`).
+//!
 //! Time: linear in visible blocks. Blocks are taken in slot order in four fixed bands; no block's result depends on another's.
 
 mod band;
-mod row;
+mod horizon;
+mod layer;
 
-use self::band::Band;
-use super::block::{Colour, Voxels, least_weight};
+use self::{
+    band::Band,
+    horizon::Horizon,
+    layer::{Scratch, Shares},
+};
+use super::block::{Colour, Voxels, colour_layer_mut, least_weight};
 use super::{BLOCK_SIDE, BlockCoord, CLASS_COUNT, ObservationWeight, Viewpoint, Volume, VolumeConfig};
 use crate::{
     digest::Digest,
+    geometry::scalar::{floor_i32, max_f32, min_f32},
     image::View,
     parallel::{Executor, each},
 };
@@ -28,6 +36,9 @@ use nalgebra::{Point3, Rotation3, Vector3};
 const MAX_OBSERVATION_WEIGHT: i32 = 255;
 /// Sums of a voxel's weight and an observation's run below this.
 const SHARES: usize = 512;
+
+/// Blocks nearer than this are never left out, m.
+const NEAREST_CULLED_M: f32 = 0.1;
 
 /// What a camera saw, as the map takes it.
 #[derive(Clone, Copy, Debug)]
@@ -43,10 +54,9 @@ pub struct Observation<'a> {
 }
 
 impl Observation<'_> {
-    /// The colour to fuse at a pixel, counted row by row.
-    fn colour_at(&self, pixel: usize) -> [u8; 3] {
-        let width = self.grey.width().max(1);
-        let (u, v) = (pixel % width, pixel / width);
+    /// The colour to fuse at a pixel.
+    #[inline]
+    fn colour_at(&self, u: usize, v: usize) -> [u8; 3] {
         let colour = match self.colour {
             Some(image) => image.get(u, v).unwrap_or_default(),
             None => [self.grey.get(u, v).unwrap_or_default(); 3],
@@ -64,11 +74,13 @@ struct Fusion<'a> {
     camera: Point3<f64>,
     /// Change of the camera coordinates per lattice step along x, y, z, m.
     steps: [Vector3<f32>; 3],
+    /// The change of each coordinate from a row's first voxel to each of its voxels, m.
+    along_x: [[f32; BLOCK_SIDE]; 3],
+    horizon: Option<Horizon<'a>>,
     focal_px: f32,
     center_u_px: f32,
     center_v_px: f32,
-    /// Share of a new observation by the sum of weights, times 2^23: `round(2^23 / sum)`.
-    shares: [i32; SHARES],
+    shares: Shares,
     plain_weights: bool,
     /// The depth image, without padding.
     depth_m: &'a [f32],
@@ -77,42 +89,37 @@ struct Fusion<'a> {
     /// Units of signed distance per metre.
     scale: f32,
     colour_band_m: f32,
-    max_weight: i32,
 }
 
 impl<'a> Fusion<'a> {
-    fn new(config: &'a VolumeConfig, view: &Viewpoint, seen: Observation<'a>) -> Self {
+    fn new(config: &'a VolumeConfig, view: &Viewpoint, seen: Observation<'a>, horizon: Option<Horizon<'a>>) -> Self {
         let (camera_from_world, camera) = view.camera_from_world();
         let voxel_m = f64::from(config.voxel_size_m);
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let mut shares = [0; SHARES];
-        for (sum, share) in (0i32..).zip(&mut shares) {
-            *share = ((1i32 << 23) + sum / 2).checked_div(sum).unwrap_or(0);
-        }
+        let steps = axes.map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>());
         Self {
             seen,
             config,
             camera_from_world,
             camera,
-            steps: axes.map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>()),
+            steps,
+            along_x: [steps[0].x, steps[0].y, steps[0].z].map(|step| core::array::from_fn(|x| step * x as f32)),
+            horizon,
             focal_px: view.rig.focal_px as f32,
             center_u_px: view.rig.center_u_px as f32,
             center_v_px: view.rig.center_v_px as f32,
-            shares,
+            shares: Shares::new(),
             plain_weights: config.observation_weight == ObservationWeight::One && seen.class.is_none(),
             depth_m: seen.depth_m.pixels(),
             width: seen.depth_m.width() as u32,
             height: seen.depth_m.height() as u32,
             scale: 32_767.0 / config.truncation_m,
             colour_band_m: config.colour_band * config.truncation_m,
-            max_weight: i32::from(config.max_weight),
         }
     }
 
-    /// Weight of an observation at a pixel, counted row by row, of that depth; 0 keeps it out.
-    fn observation_weight(&self, pixel: usize, depth_m: f32) -> i32 {
-        let width = self.seen.grey.width().max(1);
-        let (u, v) = (pixel % width, pixel / width);
+    /// Weight of an observation at a pixel, of that depth; 0 keeps it out.
+    fn observation_weight(&self, u: usize, v: usize, depth_m: f32) -> i32 {
         let by_depth = match self.config.observation_weight {
             ObservationWeight::One => 1,
             ObservationWeight::Depth => ((100.0 / depth_m) as i32).clamp(1, 10),
@@ -126,7 +133,8 @@ impl<'a> Fusion<'a> {
 impl Volume<'_> {
     /// Averages an observation from `view` into every visible block.
     pub fn fuse<E: Executor>(&mut self, view: &Viewpoint, seen: Observation<'_>, executor: &E) {
-        let fusion = Fusion::new(&self.config, view, seen);
+        let horizon = Horizon::new(seen.depth_m, self.seen.scratch());
+        let fusion = Fusion::new(&self.config, view, seen, horizon);
         let (low, high) = Band::whole(self.visible.slots(), &mut self.blocks).halves();
         let ((a, b), (c, d)) = (low.halves(), high.halves());
         let changes = each(executor, [a, b, c, d], |band| fusion.band(band));
@@ -138,11 +146,12 @@ impl Fusion<'_> {
     /// Fuses one band and returns by how much the sum of block digests changes.
     fn band(&self, band: Band<'_>) -> u64 {
         let mut change = 0u64;
+        let mut scratch = Scratch::new();
         for &slot in band.slots {
             let at = slot.index().wrapping_sub(band.first);
             let (Some(header), Some(voxels)) = (band.header.get_mut(at), band.voxels.get_mut(at)) else { continue };
             let mut colour = band.colour.get_mut(at);
-            if self.block(header.coord(), voxels, colour.as_deref_mut()) {
+            if self.block(header.coord(), &mut scratch, voxels, colour.as_deref_mut()) {
                 let new = block_digest(header.coord(), voxels, colour.as_deref());
                 change = change.wrapping_add(new).wrapping_sub(header.digest);
                 header.digest = new;
@@ -153,22 +162,53 @@ impl Fusion<'_> {
     }
 
     /// Fuses one block. Whether any voxel changed.
-    fn block(&self, coord: BlockCoord, Voxels { sdf, weight }: &mut Voxels, mut colour: Option<&mut Colour>) -> bool {
+    fn block(&self, coord: BlockCoord, scratch: &mut Scratch, voxels: &mut Voxels, mut colour: Option<&mut Colour>) -> bool {
         let voxel_m = f64::from(self.config.voxel_size_m);
         let origin_m = Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m));
         let corner = (self.camera_from_world * (origin_m - self.camera.coords)).cast::<f32>();
-        let [_, step_y, step_z] = self.steps;
+        if self.is_hidden(corner) {
+            return false;
+        }
         let mut changed = false;
-        let rows = sdf.as_chunks_mut::<BLOCK_SIDE>().0.iter_mut().zip(weight.as_chunks_mut::<BLOCK_SIDE>().0);
-        for (row, (sdf, weight)) in rows.enumerate() {
-            let first = corner + step_y * (row % BLOCK_SIDE) as f32 + step_z * (row / BLOCK_SIDE) as f32;
-            let (hits, near) = self.row(first, sdf, weight);
-            changed |= hits;
-            if let (Some(near), Some(planes)) = (near, colour.as_deref_mut()) {
-                self.colour_row(row, &near, planes, weight);
+        for (z, (sdf, weight)) in voxels.layers_mut().enumerate() {
+            if self.layer((corner, z), scratch, sdf, weight) {
+                changed = true;
+                if let Some(planes) = colour.as_deref_mut().and_then(|colour| colour_layer_mut(colour, z)) {
+                    self.colour_layer(scratch, planes, weight);
+                }
             }
         }
         changed
+    }
+
+    /// Whether no voxel of the block whose first one lies at `corner` can be observed: it is outside the image, or behind all that is
+    /// observed where it can fall.
+    fn is_hidden(&self, corner: Vector3<f32>) -> bool {
+        let Some(horizon) = self.horizon else { return false };
+        let across = self.steps.map(|step| step * (BLOCK_SIDE - 1) as f32);
+        let mut bounds = [[f32::MAX, f32::MIN]; 3];
+        for n in 0..8u8 {
+            let ends = (0u8..).zip(across).filter(|(axis, _)| n >> axis & 1 == 1);
+            let end = ends.fold(corner, |end, (_, across)| end + across);
+            let scale = self.focal_px / end.z;
+            let seen = [end.x * scale + self.center_u_px, end.y * scale + self.center_v_px, end.z];
+            for ([low, high], seen) in bounds.iter_mut().zip(seen) {
+                (*low, *high) = (min_f32(*low, seen), max_f32(*high, seen));
+            }
+        }
+        let [columns, rows, [nearest_m, _]] = bounds;
+        // So near, what is between the corners need not be seen between them.
+        if nearest_m < NEAREST_CULLED_M {
+            return false;
+        }
+        // A pixel more, so that no rounding hides what is seen.
+        let span = |[low, high]: [f32; 2], size: u32| {
+            let (first, last) = (floor_i32(low) - 1, floor_i32(high) + 2);
+            (last >= 0 && first < size as i32).then(|| [first.max(0) as usize, last.min(size as i32 - 1) as usize])
+        };
+        let (Some(columns), Some(rows)) = (span(columns, self.width), span(rows, self.height)) else { return true };
+        // A twentieth of a voxel more, for the same reason.
+        horizon.greatest_m(columns, rows) + self.config.truncation_m < nearest_m - 0.05 * self.config.voxel_size_m
     }
 }
 

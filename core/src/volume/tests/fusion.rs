@@ -1,7 +1,7 @@
 //! Allocation and fusion.
 
 use super::*;
-use crate::volume::block::Voxels;
+use crate::volume::block::{Colour, Voxels};
 use nalgebra::Point3;
 use std::collections::BTreeSet;
 
@@ -52,19 +52,23 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
     });
 }
 
-/// Fusion as its module states it, one voxel after the other.
+/// Fusion as its module states it, one voxel after the other, and as plainly.
 fn fuse_slowly(
     config: &VolumeConfig,
     view: &Viewpoint,
     seen: &Observation<'_>,
     coord: BlockCoord,
-    sdf: &mut [i16; BLOCK_VOXELS],
-    weight: &mut [u8; BLOCK_VOXELS],
+    Voxels { sdf, weight }: &mut Voxels,
+    colour: &mut Colour,
 ) {
     let (camera_from_world, camera) = view.camera_from_world();
     let voxel_m = f64::from(config.voxel_size_m);
     let corner = (camera_from_world * (Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m)) - camera.coords)).cast::<f32>();
     let step = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>());
+    let averaged = |old: i32, new: i32, gain: i32, sum: i32| {
+        let share = (gain * (((1 << 23) + sum / 2) / sum) + 128) >> 8;
+        old + (((new - old) * share + (1 << 14)) >> 15)
+    };
     for voxel in 0..BLOCK_VOXELS {
         let (x, y, z) = (voxel & 7, voxel >> 3 & 7, voxel >> 6);
         let first = corner + step[1] * y as f32 + step[2] * z as f32;
@@ -78,7 +82,8 @@ fn fuse_slowly(
         if column < 0.0 || row < 0.0 || column >= WIDTH as f32 || row >= HEIGHT as f32 {
             continue;
         }
-        let depth = seen.depth_m.get(column as usize, row as usize).unwrap();
+        let (u, v) = (column as usize, row as usize);
+        let depth = seen.depth_m.get(u, v).unwrap();
         let distance = depth - at.z;
         if depth <= 0.0 || distance < -config.truncation_m {
             continue;
@@ -86,34 +91,56 @@ fn fuse_slowly(
         let observed =
             if distance < config.truncation_m { libm::rintf(distance * (32_767.0 / config.truncation_m)) as i32 } else { 32_767 };
         let w = i32::from(weight[voxel]);
-        let share = (((1 << 23) + (w + 1) / 2) / (w + 1) + 128) >> 8;
-        let old = i32::from(sdf[voxel]);
-        sdf[voxel] = (old + (((observed - old) * share + (1 << 14)) >> 15)) as i16;
-        weight[voxel] = (w + 1).min(i32::from(config.max_weight)) as u8;
+        let gain = seen.class.map_or(1, |class| i32::from(config.class_weight[usize::from(class.get(u, v).unwrap())]));
+        if gain == 0 {
+            continue;
+        }
+        sdf[voxel] = averaged(i32::from(sdf[voxel]), observed, gain, w + gain) as i16;
+        weight[voxel] = (w + gain).min(i32::from(config.max_weight)) as u8;
+        if distance.abs() > config.colour_band * config.truncation_m {
+            continue;
+        }
+        let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
+        let sum = if is_blank { 1 } else { i32::from(weight[voxel]).clamp(2, 6) };
+        let target = seen.colour.map_or_else(|| [seen.grey.get(u, v).unwrap(); 3], |image| image.get(u, v).unwrap());
+        for (plane, target) in colour.iter_mut().zip(target) {
+            plane[voxel] = averaged(i32::from(plane[voxel]), i32::from(target.max(1)), 1, sum) as u8;
+        }
     }
 }
 
 #[test]
 fn equals_the_plain_twin_bit_for_bit() {
-    let config = VolumeConfig { max_weight: 3, ..VolumeConfig::default() };
-    let (depth_m, grey) = (bumpy_depth(), vec![50; WIDTH * HEIGHT]);
+    let mut config = VolumeConfig { max_weight: 7, ..VolumeConfig::default() };
+    config.class_weight[..3].copy_from_slice(&[0, 1, 3]);
+    let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i % 251) as u8).collect();
+    let rgb: Vec<[u8; 3]> = grey.iter().map(|&grey| [grey, 255 - grey, grey / 3]).collect();
+    let class: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i / 5 % 4) as u8).collect();
     with_volume(&CAPACITY, &config, |volume| {
-        for i in 0..5 {
+        let mut unchanged = 0;
+        for i in 0..8 {
+            // Every other frame shows a wall that hides most of what the one before showed.
+            let depth_m: Vec<f32> = bumpy_depth().iter().map(|depth| if i % 2 == 1 { 0.5 * depth } else { *depth }).collect();
             let view = view([0.02 * f64::from(i), 0.1, -0.3], [0.1 * f64::from(i), 0.0, 0.2]);
-            let seen = observation(&depth_m, &grey);
+            let seen = Observation {
+                colour: if i % 4 < 2 { View::new(&rgb, WIDTH, HEIGHT) } else { None },
+                class: if i % 3 < 2 { View::new(&class, WIDTH, HEIGHT) } else { None },
+                ..observation(&depth_m, &grey)
+            };
             volume.allocate(&view, seen.depth_m, &mut NoStore);
-            let mut twins: Vec<_> = volume
-                .visible()
-                .slots()
-                .iter()
-                .map(|&slot| (slot, *volume.blocks().sdf(slot).unwrap(), *volume.blocks().weight(slot).unwrap()))
-                .collect();
+            let blocks = &volume.blocks;
+            let slots = volume.visible().slots().iter();
+            let twins: Vec<_> = slots.map(|&slot| (slot, blocks.voxels[slot.index()], *blocks.colour(slot).unwrap())).collect();
             volume.fuse(&view, seen, &Serial);
-            for (slot, sdf, weight) in &mut twins {
-                fuse_slowly(&config, &view, &seen, volume.blocks().coord(*slot).unwrap(), sdf, weight);
-                assert!(volume.blocks().sdf(*slot).unwrap() == sdf && volume.blocks().weight(*slot).unwrap() == weight);
+            for (slot, mut voxels, mut colour) in twins {
+                let before = voxels;
+                fuse_slowly(&config, &view, &seen, volume.blocks().coord(slot).unwrap(), &mut voxels, &mut colour);
+                let fused = &volume.blocks.voxels[slot.index()];
+                assert!(fused.sdf == voxels.sdf && fused.weight == voxels.weight && *volume.blocks().colour(slot).unwrap() == colour);
+                unchanged += usize::from(before.weight == voxels.weight && before.sdf == voxels.sdf);
             }
         }
+        assert!(unchanged > 100, "{unchanged} blocks were hidden");
     });
 }
 

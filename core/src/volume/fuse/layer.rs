@@ -1,0 +1,252 @@
+//! The kernel: 64 voxels at a time, those of a block with one z.
+//!
+//! Each loop does one thing to all of them and has no branches: that is what becomes vector
+//! instructions. Loops over eight voxels are unrolled before they can.
+
+use super::{Fusion, SHARES};
+use crate::{
+    geometry::scalar::clamp_f32,
+    volume::{
+        BLOCK_SIDE,
+        block::{LAYER_VOXELS, Layer, packed},
+    },
+};
+use nalgebra::Vector3;
+
+/// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
+const COLOUR_WEIGHT: usize = 5;
+/// No pixel of the image.
+const OUTSIDE: u32 = u32::MAX;
+
+/// Shares of an average, by the sum of weights.
+pub(super) struct Shares {
+    /// Share of a new observation of weight 1, times 2^23: `round(2^23 / sum)`.
+    units: [i32; SHARES],
+    /// Share of one observation, times -32,768: so it fits its type even where it is all.
+    ones: [i16; SHARES],
+    /// Share of a new colour, times 32,768.
+    colour: [i32; COLOUR_WEIGHT + 2],
+}
+
+impl Shares {
+    pub fn new() -> Self {
+        let mut shares = Self { units: [0; SHARES], ones: [0; SHARES], colour: [0; COLOUR_WEIGHT + 2] };
+        for (sum, (unit, one)) in (0i32..).zip(shares.units.iter_mut().zip(&mut shares.ones)) {
+            *unit = ((1i32 << 23) + sum / 2).checked_div(sum).unwrap_or(0);
+            *one = -((*unit + 128) >> 8) as i16;
+        }
+        for (colour, unit) in shares.colour.iter_mut().zip(&shares.units) {
+            *colour = (unit + 128) >> 8;
+        }
+        shares
+    }
+
+    /// Share of an observation of weight `gain`, times -32,768.
+    #[inline]
+    fn of(&self, sum: i32, gain: i32) -> i16 {
+        let unit = self.units.get(sum as usize).copied().unwrap_or(0);
+        -((gain * unit + 128) >> 8) as i16
+    }
+}
+
+/// Rounds to the nearest integer, ties to even, by the float format itself: exact for magnitudes below 2^22, and any bits at all beyond.
+#[inline]
+fn rounded(value: f32) -> i32 {
+    const MAGIC: f32 = 12_582_912.0;
+    ((value + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)
+}
+
+/// What is computed of a layer on the way.
+pub(super) struct Scratch {
+    /// Camera coordinates of each voxel, m.
+    x_m: Layer<f32>,
+    y_m: Layer<f32>,
+    z_m: Layer<f32>,
+    /// The pixel it falls on.
+    column: Layer<i32>,
+    row: Layer<i32>,
+    /// The same as an index into the depth image, or [`OUTSIDE`].
+    pixel: Layer<u32>,
+    /// Depth observed there, m; 0 none.
+    observed_m: Layer<f32>,
+    /// How far the voxel lies before what is observed, m.
+    distance_m: Layer<f32>,
+    /// That, limited to the truncation, in its units.
+    target: Layer<i16>,
+    /// -1 where the voxel is observed, else 0.
+    hit: Layer<i16>,
+    /// Weight of the observation.
+    gain: Layer<i16>,
+    /// Its share of the average, times -32,768.
+    share: Layer<i16>,
+}
+
+impl Scratch {
+    pub const fn new() -> Self {
+        Self {
+            x_m: [0.0; LAYER_VOXELS],
+            y_m: [0.0; LAYER_VOXELS],
+            z_m: [0.0; LAYER_VOXELS],
+            column: [0; LAYER_VOXELS],
+            row: [0; LAYER_VOXELS],
+            pixel: [0; LAYER_VOXELS],
+            observed_m: [0.0; LAYER_VOXELS],
+            distance_m: [0.0; LAYER_VOXELS],
+            target: [0; LAYER_VOXELS],
+            hit: [0; LAYER_VOXELS],
+            gain: [1; LAYER_VOXELS],
+            share: [0; LAYER_VOXELS],
+        }
+    }
+}
+
+impl Fusion<'_> {
+    /// Fuses layer `z` of a block whose first voxel lies at `corner` in the camera. Whether any voxel changed; then `scratch` tells
+    /// [`Fusion::colour_layer`] which.
+    #[inline]
+    pub(super) fn layer(
+        &self,
+        (corner, z): (Vector3<f32>, usize),
+        scratch: &mut Scratch,
+        sdf: &mut Layer<i16>,
+        weight: &mut Layer<u8>,
+    ) -> bool {
+        self.project(corner, z, scratch);
+        if !self.observe(scratch) || !self.measure(scratch) {
+            return false;
+        }
+        self.share(scratch, weight);
+        average(scratch, sdf);
+        self.count(scratch, weight);
+        true
+    }
+
+    /// Where the voxels fall in the image.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer; axes are below 3")]
+    fn project(&self, corner: Vector3<f32>, z: usize, scratch: &mut Scratch) {
+        let starts = core::array::from_fn(|y| corner + self.steps[1] * y as f32 + self.steps[2] * z as f32);
+        let layers = [&mut scratch.x_m, &mut scratch.y_m, &mut scratch.z_m];
+        for (axis, layer) in layers.into_iter().enumerate() {
+            fill(layer, &starts, axis, &self.along_x[axis]);
+        }
+        for i in 0..LAYER_VOXELS {
+            let scale = self.focal_px / scratch.z_m[i];
+            scratch.column[i] = rounded(scratch.x_m[i] * scale + self.center_u_px);
+            scratch.row[i] = rounded(scratch.y_m[i] * scale + self.center_v_px);
+        }
+        for i in 0..LAYER_VOXELS {
+            let (column, row) = (scratch.column[i] as u32, scratch.row[i] as u32);
+            // A voxel behind the camera, or so near that its column is nonsense, is outside.
+            let inside = (scratch.z_m[i] > 0.0) & (column < self.width) & (row < self.height);
+            let pixel = row.wrapping_mul(self.width).wrapping_add(column);
+            scratch.pixel[i] = if inside { pixel } else { OUTSIDE };
+        }
+    }
+
+    /// Reads the depths observed. Whether there is any.
+    #[inline]
+    fn observe(&self, scratch: &mut Scratch) -> bool {
+        let mut any = 0;
+        for (observed_m, &pixel) in scratch.observed_m.iter_mut().zip(&scratch.pixel) {
+            *observed_m = self.depth_m.get(pixel as usize).copied().unwrap_or(0.0);
+            any |= observed_m.to_bits();
+        }
+        any != 0
+    }
+
+    /// Compares voxels with what is observed. Whether any is neither unobserved nor hidden.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
+    fn measure(&self, scratch: &mut Scratch) -> bool {
+        let (truncation_m, scale) = (self.config.truncation_m, self.scale);
+        for i in 0..LAYER_VOXELS {
+            let distance_m = scratch.observed_m[i] - scratch.z_m[i];
+            scratch.distance_m[i] = distance_m;
+            scratch.hit[i] = -i16::from((scratch.observed_m[i] > 0.0) & (distance_m >= -truncation_m));
+            scratch.target[i] = rounded(clamp_f32(distance_m, -truncation_m, truncation_m) * scale) as i16;
+        }
+        scratch.hit.iter().fold(0, |any, hit| any | hit) != 0
+    }
+
+    /// What each observation weighs, and its share of the average.
+    #[inline]
+    fn share(&self, scratch: &mut Scratch, weight: &Layer<u8>) {
+        if self.plain_weights {
+            for (share, &weight) in scratch.share.iter_mut().zip(weight) {
+                *share = self.shares.ones.get(usize::from(weight) + 1).copied().unwrap_or(0);
+            }
+            return;
+        }
+        let pixels = scratch.column.iter().zip(&scratch.row).zip(&scratch.observed_m);
+        let gains = scratch.gain.iter_mut().zip(&mut scratch.share).zip(weight);
+        for (((&column, &row), &observed_m), ((gain, share), &weight)) in pixels.zip(gains) {
+            let observation = if observed_m > 0.0 { self.observation_weight(column as usize, row as usize, observed_m) } else { 0 };
+            *gain = observation as i16;
+            *share = self.shares.of(i32::from(weight) + observation, observation);
+        }
+    }
+
+    /// Counts the observations.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
+    fn count(&self, scratch: &Scratch, weight: &mut Layer<u8>) {
+        let most = i16::from(self.config.max_weight);
+        for i in 0..LAYER_VOXELS {
+            let sum = i16::from(weight[i]) + (scratch.gain[i] & scratch.hit[i]);
+            weight[i] = if sum < most { sum } else { most } as u8;
+        }
+    }
+
+    /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is that after this observation.
+    #[expect(clippy::indexing_slicing, reason = "masks keep voxels below 64; sums are at most COLOUR_WEIGHT + 1")]
+    pub(super) fn colour_layer(&self, scratch: &Scratch, planes: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
+        let mut flags = [0u8; LAYER_VOXELS];
+        let band_m = self.colour_band_m;
+        for i in 0..LAYER_VOXELS {
+            let is_near = (scratch.distance_m[i] <= band_m) & (scratch.distance_m[i] >= -band_m);
+            flags[i] = u8::from(is_near & (scratch.hit[i] & scratch.gain[i] != 0));
+        }
+        let mut near = packed(&flags);
+        let [red, green, blue] = planes;
+        while near != 0 {
+            let i = near.trailing_zeros() as usize & (LAYER_VOXELS - 1);
+            near &= near - 1;
+            let target = self.seen.colour_at(scratch.column[i] as usize, scratch.row[i] as usize);
+            let current = [red[i], green[i], blue[i]];
+            let sum = if current == [0; 3] { 1 } else { usize::from(weight[i]).clamp(2, COLOUR_WEIGHT + 1) };
+            let share = self.shares.colour[sum];
+            let blend = |c: usize| {
+                let (current, target) = (i32::from(current[c]), i32::from(target[c]));
+                (current + (((target - current) * share + (1 << 14)) >> 15)) as u8
+            };
+            (red[i], green[i], blue[i]) = (blend(0), blend(1), blend(2));
+        }
+    }
+}
+
+/// Sets a coordinate of all voxels, from those of the first voxels of its rows on.
+#[inline]
+#[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+fn fill(layer: &mut Layer<f32>, starts: &[Vector3<f32>; BLOCK_SIDE], axis: usize, along: &[f32; BLOCK_SIDE]) {
+    for (row, start) in layer.as_chunks_mut::<BLOCK_SIDE>().0.iter_mut().zip(starts) {
+        let start = start[axis];
+        for (coordinate, along) in row.iter_mut().zip(along) {
+            *coordinate = start + along;
+        }
+    }
+}
+
+/// Moves distances towards what is observed: `old + round((target - old) * share)`, as a sum of two products of 16 bits.
+#[inline]
+#[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
+fn average(scratch: &Scratch, sdf: &mut Layer<i16>) {
+    for i in 0..LAYER_VOXELS {
+        let share = scratch.share[i];
+        // Both shares are negative, and add up to -32,768.
+        let rest = i16::MIN.wrapping_sub(share);
+        let sum = i32::from(sdf[i]) * i32::from(rest) + i32::from(scratch.target[i]) * i32::from(share);
+        let new = (((1 << 14) - sum) >> 15) as i16;
+        sdf[i] = (new & scratch.hit[i]) | (sdf[i] & !scratch.hit[i]);
+    }
+}
