@@ -50,7 +50,7 @@ fn bench(criterion: &mut Criterion) {
     let fuse = |volume: &mut Volume<'_>, shift_m: f32| {
         let depth_m = canyon(shift_m);
         let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
-        volume.allocate(&view, depth_m, &mut NoStore);
+        volume.allocate(&view, depth_m, &mut NoStore, &Serial);
         let seen = Observation {
             depth_m,
             grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),

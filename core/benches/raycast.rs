@@ -81,7 +81,7 @@ fn fill(volume: &mut Volume<'_>) {
             *grey = 40 + (at % 200) as u8;
         }
         let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
-        volume.allocate(&view, depth_m, &mut NoStore);
+        volume.allocate(&view, depth_m, &mut NoStore, &Serial);
         volume.fuse(
             &view,
             Observation {

@@ -101,7 +101,7 @@ fn bench(criterion: &mut Criterion) {
                     let grey = View::new(&frame.grey, frame.view.width, frame.view.height).unwrap();
                     let seen = Observation { depth_m, grey, colour: None, class: None };
                     let begin = std::time::Instant::now();
-                    volume.allocate(&frame.view, depth_m, &mut NoStore);
+                    volume.allocate(&frame.view, depth_m, &mut NoStore, &Serial);
                     let middle = std::time::Instant::now();
                     volume.fuse(&frame.view, seen, &Serial);
                     spent += if only_fuse { middle.elapsed() } else { middle - begin };

@@ -42,7 +42,7 @@ impl StaticMap<'_, '_> {
             colour: frame.colour,
             class: frame.class,
         };
-        let allocation = executor.stage(Stage::Allocate, || self.background.allocate(&view, observation.depth_m, store));
+        let allocation = executor.stage(Stage::Allocate, || self.background.allocate(&view, observation.depth_m, store, executor));
         executor.stage(Stage::Fuse, || self.background.fuse(&view, observation, executor));
         allocation
     }

@@ -214,7 +214,7 @@ fn fuse_crop<E: Executor>(
         colour: picture.colour,
         class: None,
     };
-    let allocation = object.volume.allocate(&view, observation.depth_m, &mut NoStore);
+    let allocation = object.volume.allocate(&view, observation.depth_m, &mut NoStore, executor);
     object.volume.fuse(&view, observation, executor);
     allocation.refused + allocation.beyond + allocation.unlisted
 }

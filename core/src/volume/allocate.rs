@@ -1,25 +1,27 @@
 //! Making the blocks that a depth image runs through, and finding which are visible.
 //!
-//! Along the ray of every pixel with depth, each block between `depth - truncation` and `depth + truncation` is visited exactly once, by
-//! walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray Tracing*, 1987). A point belongs to the block of its
+//! Along the ray of every second pixel of every second row, staggered, each block between `depth - truncation` and `depth + truncation` is
+//! visited exactly once, by walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray Tracing*, 1987). Which pixels
+//! are taken changes from frame to frame (docs/decisions/0018-allocation-from-every-fourth-pixel.md). A point belongs to the block of its
 //! nearest lattice point: a block's lattice points are its centre of mass, so nothing is shifted by half a voxel.
 //!
-//! Memory: 128 KiB for the blocks seen in this frame, a direct-mapped cache that spares the index most look-ups. Time: linear in pixels
-//! times blocks per ray, at most [`MAX_BLOCKS_PER_RAY`].
+//! Rows are walked in four fixed bands; what they ask for is made band by band, in the order in which it was met.
+//!
+//! Memory: 128 KiB, half of it a direct-mapped cache of the blocks met, which spares the index most look-ups, half for requests. Time:
+//! linear in pixels times blocks per ray, at most [`MAX_BLOCKS_PER_RAY`].
 
-use super::{BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Slot, Viewpoint, Volume};
+use super::{
+    BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Slot, Viewpoint, Volume,
+    request::{Band, Rays},
+};
 use crate::{
-    geometry::scalar::{floor_i32, max_f32},
     image::View,
-    memory::{Carver, region_bytes},
+    parallel::{Executor, each},
 };
 use nalgebra::Vector3;
 
 /// Most blocks one ray visits: 2 x 64 voxels of truncation are 16 blocks, diagonally across three axes, and one at either end.
 pub const MAX_BLOCKS_PER_RAY: usize = 16 * 2 + 3;
-
-/// Entries of the cache of blocks seen in this frame: a power of two.
-const SEEN_ENTRIES: usize = 1 << 14;
 
 /// What one frame's allocation did. Requests refused repeat when several rays ask for the same block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,105 +41,18 @@ pub struct AllocationReport {
     pub eviction: EvictionReport,
 }
 
-/// The cache of blocks already visited in this frame.
-#[derive(Debug)]
-pub(super) struct Seen<'s> {
-    entries: &'s mut [u64],
-}
-
-impl<'s> Seen<'s> {
-    pub(super) const fn bytes() -> usize {
-        region_bytes::<u64>(SEEN_ENTRIES)
-    }
-
-    pub(super) fn new_in(carver: &mut Carver<'s>) -> Self {
-        Self { entries: carver.alloc("volume.seen", SEEN_ENTRIES) }
-    }
-
-    fn clear(&mut self) {
-        self.entries.fill(0);
-    }
-
-    /// Its memory, for whoever needs some between two allocations.
-    pub(super) fn scratch(&mut self) -> &mut [f32] {
-        bytemuck::cast_slice_mut(self.entries)
-    }
-
-    /// Enters a block; `true` when it was entered last at its place. A street is wide and long, hardly high: hence the split of bits.
-    #[inline]
-    fn enter(&mut self, [x, y, z]: [i32; 3]) -> bool {
-        let place = (x & 63) | (z & 63) << 6 | (y & 3) << 12;
-        let tag = 1 << 63 | (x as u64 & 0x1F_FFFF) << 42 | (y as u64 & 0x1F_FFFF) << 21 | (z as u64 & 0x1F_FFFF);
-        match self.entries.get_mut(place as usize) {
-            Some(entry) if *entry == tag => true,
-            Some(entry) => {
-                *entry = tag;
-                false
-            }
-            None => false,
-        }
-    }
-}
-
-/// A walk through the block grid from one point to another, in block units.
-struct Walk {
-    at: [i32; 3],
-    step: [i32; 3],
-    left: [u32; 3],
-    /// Ray parameter at which the next block begins, and its growth per block, on each axis.
-    next: [f32; 3],
-    growth: [f32; 3],
-}
-
-impl Walk {
-    fn new(from: [f32; 3], to: [f32; 3]) -> Self {
-        let mut walk = Self { at: [0; 3], step: [0; 3], left: [0; 3], next: [f32::MAX; 3], growth: [0.0; 3] };
-        let axes = walk.at.iter_mut().zip(&mut walk.step).zip(&mut walk.left).zip(&mut walk.next).zip(&mut walk.growth);
-        for (((((at, step), left), next), growth), (from, to)) in axes.zip(from.into_iter().zip(to)) {
-            *at = floor_i32(from);
-            let last = floor_i32(to);
-            *step = if last >= *at { 1 } else { -1 };
-            *left = last.abs_diff(*at);
-            if *left > 0 {
-                let across = to - from;
-                let border = *at as f32 + if last > *at { 1.0 } else { 0.0 };
-                *next = (border - from) / across;
-                *growth = *step as f32 / across;
-            }
-        }
-        walk
-    }
-
-    /// Visits every block once, in order.
-    #[inline]
-    fn visit(mut self, mut visit: impl FnMut([i32; 3])) {
-        visit(self.at);
-        for _ in 1..MAX_BLOCKS_PER_RAY {
-            let [x, y, z] = self.next;
-            let axis = if x <= y && x <= z { 0 } else { 1 + usize::from(z < y) };
-            let (Some(at), Some(step), Some(left), Some(next), Some(growth)) =
-                (self.at.get_mut(axis), self.step.get(axis), self.left.get_mut(axis), self.next.get_mut(axis), self.growth.get(axis))
-            else {
-                return;
-            };
-            if *left == 0 {
-                return;
-            }
-            *at += step;
-            *left -= 1;
-            *next = if *left == 0 { f32::MAX } else { *next + growth };
-            visit(self.at);
-        }
-    }
-}
-
 impl Volume<'_> {
     /// Makes the blocks around the surface that `depth_m` (0 none) shows from `view`, and lists what is visible. Blocks that must leave go
     /// to `store`, and those it kept come back.
-    pub fn allocate<S: BlockStore>(&mut self, view: &Viewpoint, depth_m: View<'_, f32>, store: &mut S) -> AllocationReport {
+    pub fn allocate<S: BlockStore, E: Executor>(
+        &mut self,
+        view: &Viewpoint,
+        depth_m: View<'_, f32>,
+        store: &mut S,
+        executor: &E,
+    ) -> AllocationReport {
         let mut report = AllocationReport::default();
         self.visible.begin_frame();
-        self.seen.clear();
 
         // Block coordinates relative to the camera's block keep their precision however far the camera has come.
         let block_m = f64::from(self.config.voxel_size_m) * BLOCK_SIDE as f64;
@@ -148,25 +63,17 @@ impl Volume<'_> {
             return report;
         };
         let start = (camera - Vector3::new(f64::from(base[0]), f64::from(base[1]), f64::from(base[2]))).cast::<f32>();
-        let [corner, per_column, per_row] = view.rays_world().map(|ray| (ray / block_m).cast::<f32>());
-        let truncation_m = self.config.truncation_m;
-
-        for (v, row) in depth_m.rows().enumerate() {
-            let first = corner + per_row * v as f32;
-            for (u, &depth) in row.iter().enumerate() {
-                if !(depth > 0.0 && depth <= self.config.far_m) {
-                    continue;
-                }
-                let ray = first + per_column * u as f32;
-                let from = start + ray * max_f32(depth - truncation_m, 0.0);
-                let to = start + ray * (depth + truncation_m);
-                Walk::new(from.into(), to.into()).visit(|block| {
-                    if !self.seen.enter(block) {
-                        self.request(block, base, store, &mut report);
-                    }
-                });
+        let rays = Rays::new(&self.config, view, depth_m, start, self.visible.frame());
+        // Out of the volume while its bands ask for blocks.
+        let mut requested = core::mem::take(&mut self.requested);
+        let mut bands = requested.bands(depth_m.height());
+        while !bands.iter().all(Band::is_done) {
+            each(executor, bands.each_mut(), |band| rays.walk(band));
+            for band in &mut bands {
+                band.drain().for_each(|block| self.request(block, base, store, &mut report));
             }
         }
+        self.requested = requested;
         self.keep_in_view(view, &mut report);
         self.visible.sort(self.pool.high_water());
         report

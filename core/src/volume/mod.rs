@@ -16,6 +16,7 @@ mod index;
 mod pool;
 mod prune;
 mod recency;
+mod request;
 mod sampler;
 mod store;
 #[cfg(test)]
@@ -48,7 +49,7 @@ pub struct Volume<'s> {
     pool: SlotPool<'s>,
     blocks: Blocks<'s>,
     visible: VisibleList<'s>,
-    seen: allocate::Seen<'s>,
+    requested: request::RequestedCache<'s>,
     history: VisibleHistory<'s>,
     recency: Recency<'s>,
     digest: u64,
@@ -61,7 +62,7 @@ impl<'s> Volume<'s> {
             + SlotPool::bytes(capacity.blocks)
             + Blocks::bytes(capacity.blocks, capacity.colour)
             + VisibleList::bytes(capacity)
-            + allocate::Seen::bytes()
+            + request::RequestedCache::bytes()
             + VisibleHistory::bytes(capacity)
             + Recency::bytes(capacity.blocks)
     }
@@ -74,7 +75,7 @@ impl<'s> Volume<'s> {
             pool: SlotPool::new_in(carver, capacity.blocks, ["volume.live", "volume.free"]),
             blocks: Blocks::new_in(capacity, carver),
             visible: VisibleList::new_in(capacity, carver),
-            seen: allocate::Seen::new_in(carver),
+            requested: request::RequestedCache::new_in(carver),
             history: VisibleHistory::new_in(capacity, carver),
             recency: Recency::new_in(capacity.blocks, carver),
             digest: 0,

@@ -16,7 +16,7 @@ impl Volume<'_> {
             index: _,
             digest: _,
             config: _,
-            seen: _,
+            requested: _,
         } = self;
         pool.visit(visitor);
         if !pool.rebuild() {

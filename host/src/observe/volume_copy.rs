@@ -120,7 +120,7 @@ mod tests {
                 colour: None,
                 class: None,
             };
-            volume.allocate(&view, depth_m, &mut NoStore);
+            volume.allocate(&view, depth_m, &mut NoStore, &Serial);
             volume.fuse(&view, seen, &Serial);
         }
         volume.prune_whole(1);

@@ -189,12 +189,11 @@ impl Fusion<'_> {
 
     /// Counts the observations.
     #[inline]
-    #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
     fn count(&self, scratch: &Scratch, weight: &mut Layer<u8>) {
         let most = i16::from(self.config.max_weight);
-        for i in 0..LAYER_VOXELS {
-            let sum = i16::from(weight[i]) + (scratch.gain[i] & scratch.hit[i]);
-            weight[i] = if sum < most { sum } else { most } as u8;
+        for (weight, (gain, hit)) in weight.iter_mut().zip(scratch.gain.iter().zip(&scratch.hit)) {
+            let sum = i16::from(*weight) + (gain & hit);
+            *weight = if sum < most { sum } else { most } as u8;
         }
     }
 
@@ -203,9 +202,9 @@ impl Fusion<'_> {
     pub(super) fn colour_layer(&self, scratch: &Scratch, planes: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
         let mut flags = [0u8; LAYER_VOXELS];
         let band_m = self.colour_band_m;
-        for i in 0..LAYER_VOXELS {
-            let is_near = (scratch.distance_m[i] <= band_m) & (scratch.distance_m[i] >= -band_m);
-            flags[i] = u8::from(is_near & (scratch.hit[i] & scratch.gain[i] != 0));
+        for (flag, ((distance_m, hit), gain)) in flags.iter_mut().zip(scratch.distance_m.iter().zip(&scratch.hit).zip(&scratch.gain)) {
+            let is_near = (*distance_m <= band_m) & (*distance_m >= -band_m);
+            *flag = u8::from(is_near & (hit & gain != 0));
         }
         let mut near = packed(&flags);
         let [red, green, blue] = planes;
@@ -227,7 +226,6 @@ impl Fusion<'_> {
 
 /// Sets a coordinate of all voxels, from those of the first voxels of its rows on.
 #[inline]
-#[expect(clippy::indexing_slicing, reason = "axes are below 3")]
 fn fill(layer: &mut Layer<f32>, starts: &[Vector3<f32>; BLOCK_SIDE], axis: usize, along: &[f32; BLOCK_SIDE]) {
     for (row, start) in layer.as_chunks_mut::<BLOCK_SIDE>().0.iter_mut().zip(starts) {
         let start = start[axis];
@@ -239,14 +237,13 @@ fn fill(layer: &mut Layer<f32>, starts: &[Vector3<f32>; BLOCK_SIDE], axis: usize
 
 /// Moves distances towards what is observed: `old + round((target - old) * share)`, as a sum of two products of 16 bits.
 #[inline]
-#[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
 fn average(scratch: &Scratch, sdf: &mut Layer<i16>) {
-    for i in 0..LAYER_VOXELS {
-        let share = scratch.share[i];
+    let averaged = scratch.share.iter().zip(&scratch.target).zip(&scratch.hit);
+    for (sdf, ((&share, &target), &hit)) in sdf.iter_mut().zip(averaged) {
         // Both shares are negative, and add up to -32,768.
         let rest = i16::MIN.wrapping_sub(share);
-        let sum = i32::from(sdf[i]) * i32::from(rest) + i32::from(scratch.target[i]) * i32::from(share);
+        let sum = i32::from(*sdf) * i32::from(rest) + i32::from(target) * i32::from(share);
         let new = (((1 << 14) - sum) >> 15) as i16;
-        sdf[i] = (new & scratch.hit[i]) | (sdf[i] & !scratch.hit[i]);
+        *sdf = (new & hit) | (*sdf & !hit);
     }
 }

@@ -133,7 +133,7 @@ impl<'a> Fusion<'a> {
 impl Volume<'_> {
     /// Averages an observation from `view` into every visible block.
     pub fn fuse<E: Executor>(&mut self, view: &Viewpoint, seen: Observation<'_>, executor: &E) {
-        let horizon = Horizon::new(seen.depth_m, self.seen.scratch());
+        let horizon = Horizon::new(seen.depth_m, self.requested.scratch());
         let fusion = Fusion::new(&self.config, view, seen, horizon);
         let (low, high) = Band::whole(self.visible.slots(), &mut self.blocks).halves();
         let ((a, b), (c, d)) = (low.halves(), high.halves());

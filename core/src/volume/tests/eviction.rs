@@ -56,7 +56,7 @@ fn drive(blocks: usize, config: &VolumeConfig, places_m: &[f64], shelf: &mut She
             let depth_m: Vec<f32> = bumpy_depth().iter().map(|depth| depth * 0.5 + 0.01 * (i % 3) as f32).collect();
             let view = view([0.0; 3], [0.0, 0.0, z]);
             let seen = observation(&depth_m, &grey);
-            let report = volume.allocate(&view, seen.depth_m, shelf);
+            let report = volume.allocate(&view, seen.depth_m, shelf, &Serial);
             assert_eq!(report.refused, 0);
             add(&mut sum, report.eviction);
             volume.fuse(&view, seen, &Serial);
@@ -128,7 +128,7 @@ fn a_map_told_to_refuse_stays_where_it_is() {
         let mut refused = 0;
         for i in 0..20 {
             let seen = observation(&depth_m, &grey);
-            let report = volume.allocate(&view([0.0; 3], [0.0, 0.0, f64::from(i)]), seen.depth_m, &mut NoStore);
+            let report = volume.allocate(&view([0.0; 3], [0.0, 0.0, f64::from(i)]), seen.depth_m, &mut NoStore, &Serial);
             assert_eq!(report.eviction, EvictionReport::default());
             refused += report.refused;
         }

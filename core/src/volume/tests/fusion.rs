@@ -32,10 +32,12 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
     let depth_m = bumpy_depth();
     let view = view([0.1, -0.2, 0.05], [1.0, -0.3, 2.0]);
     with_volume(&CAPACITY, &VolumeConfig::default(), |volume| {
-        let report = volume.allocate(&view, View::new(&depth_m, WIDTH, HEIGHT).unwrap(), &mut NoStore);
+        let report = volume.allocate(&view, View::new(&depth_m, WIDTH, HEIGHT).unwrap(), &mut NoStore, &Serial);
         let mut fine = BTreeSet::new();
         let block_m = 0.4;
-        for (i, &depth) in depth_m.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+        // The first frame's: every second row from the first on, and in it every second pixel, from the second and the first on by turns.
+        let is_taken = |i: usize| (i / WIDTH).is_multiple_of(2) && (i % WIDTH + i / WIDTH / 2) % 2 == 1;
+        for (i, &depth) in depth_m.iter().enumerate().filter(|(i, depth)| **depth > 0.0 && is_taken(*i)) {
             let direction = Vector3::new(((i % WIDTH) as f64 - RIG.center_u_px) / 80.0, ((i / WIDTH) as f64 - RIG.center_v_px) / 80.0, 1.0);
             for step in 0..=3_000 {
                 let at = f64::from(depth) - 0.75 + 1.5 * f64::from(step) / 3_000.0;
@@ -127,7 +129,7 @@ fn equals_the_plain_twin_bit_for_bit() {
                 class: if i % 3 < 2 { View::new(&class, WIDTH, HEIGHT) } else { None },
                 ..observation(&depth_m, &grey)
             };
-            volume.allocate(&view, seen.depth_m, &mut NoStore);
+            volume.allocate(&view, seen.depth_m, &mut NoStore, &Serial);
             let blocks = &volume.blocks;
             let slots = volume.visible().slots().iter();
             let twins: Vec<_> = slots.map(|&slot| (slot, blocks.voxels[slot.index()], *blocks.colour(slot).unwrap())).collect();
@@ -153,13 +155,16 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
             for i in 0..4 {
                 let view = view([0.0, 0.05 * f64::from(i), 0.0], [0.0, 0.0, 0.3 * f64::from(i)]);
                 let seen = observation(&depth_m, &grey);
-                volume.allocate(&view, seen.depth_m, &mut NoStore);
                 if threads {
+                    volume.allocate(&view, seen.depth_m, &mut NoStore, &TwoThreads);
                     volume.fuse(&view, seen, &TwoThreads)
                 } else {
+                    volume.allocate(&view, seen.depth_m, &mut NoStore, &Serial);
                     volume.fuse(&view, seen, &Serial)
                 }
-                digests.push(volume.digest());
+                // In slot order: the slots are the same too.
+                let coords: Vec<_> = volume.visible().slots().iter().map(|&slot| volume.blocks().coord(slot)).collect();
+                digests.push((volume.digest(), coords));
             }
             let of_content = volume
                 .pool()
@@ -263,7 +268,7 @@ fn a_class_of_weight_zero_stays_out_of_the_map_and_another_counts_thrice() {
     with_volume(&CAPACITY, &config, |volume| {
         let mut seen = observation(&depth_m, &grey);
         seen.class = View::new(&class, WIDTH, HEIGHT);
-        volume.allocate(&view([0.0; 3], [0.0; 3]), seen.depth_m, &mut NoStore);
+        volume.allocate(&view([0.0; 3], [0.0; 3]), seen.depth_m, &mut NoStore, &Serial);
         volume.fuse(&view([0.0; 3], [0.0; 3]), seen, &Serial);
         assert_eq!(volume.sampler().voxel([-10, 0, 60]), None);
         assert_eq!(volume.sampler().voxel([10, 0, 60]).unwrap().weight, 3);

@@ -61,7 +61,7 @@ fn observation<'a>(depth_m: &'a [f32], grey: &'a [u8]) -> Observation<'a> {
 
 fn fuse_once(volume: &mut Volume<'_>, view: &Viewpoint, depth_m: &[f32], grey: &[u8]) -> AllocationReport {
     let seen = observation(depth_m, grey);
-    let report = volume.allocate(view, seen.depth_m, &mut NoStore);
+    let report = volume.allocate(view, seen.depth_m, &mut NoStore, &Serial);
     volume.fuse(view, seen, &Serial);
     report
 }

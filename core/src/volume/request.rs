@@ -1,0 +1,306 @@
+//! Which blocks a depth image runs through: the walk along its rays, and what remembers the blocks met.
+//!
+//! Each band of rows has a cache of the blocks it met last and a list of those to ask the map for. A list that is full is emptied before its
+//! band goes on, so that no size of it loses a block.
+
+use super::{BLOCK_SIDE, MAX_BLOCKS_PER_RAY, Viewpoint, VolumeConfig};
+use crate::{
+    geometry::scalar::{floor_i32, max_f32},
+    image::View,
+    memory::{Carver, region_bytes},
+    parallel::{BANDS, Bands},
+};
+use nalgebra::Vector3;
+
+/// Rows and columns from one pixel whose ray is walked to the next: a block is 14 px wide at 20 m and KITTI's focal length.
+const PIXEL_STEP: usize = 2;
+/// Entries of a band's cache, as a power of two, and of its list.
+const CACHE_BITS: u32 = 11;
+const CACHE_ENTRIES: usize = 1 << CACHE_BITS;
+const LIST_ENTRIES: usize = 2_048;
+const _: () = assert!(LIST_ENTRIES >= MAX_BLOCKS_PER_RAY, "a list has room for a ray");
+
+/// A block relative to the camera's, in one word that is never 0.
+#[derive(Clone, Copy)]
+struct Tag(u64);
+
+/// Bits of each coordinate in a tag.
+const FIELD: u32 = 21;
+
+impl Tag {
+    #[inline]
+    fn of([x, y, z]: [i32; 3]) -> Self {
+        const MASK: u64 = (1 << FIELD) - 1;
+        Self(1 << 63 | (x as u64 & MASK) << (2 * FIELD) | (y as u64 & MASK) << FIELD | (z as u64 & MASK))
+    }
+
+    /// The block again.
+    #[inline]
+    fn block(self) -> [i32; 3] {
+        [2, 1, 0].map(|field| (self.0 << (64 - FIELD - field * FIELD)) as i64 >> (64 - FIELD)).map(|c| c as i32)
+    }
+
+    /// Where a cache keeps it.
+    #[inline]
+    fn entry(self) -> usize {
+        (self.0.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - CACHE_BITS)) as usize
+    }
+}
+
+/// Caches and lists of all bands.
+#[derive(Debug, Default)]
+pub(super) struct RequestedCache<'s> {
+    caches: &'s mut [u64],
+    lists: &'s mut [u64],
+}
+
+impl<'s> RequestedCache<'s> {
+    pub const fn bytes() -> usize {
+        region_bytes::<u64>(BANDS * CACHE_ENTRIES) + region_bytes::<u64>(BANDS * LIST_ENTRIES)
+    }
+
+    pub fn new_in(carver: &mut Carver<'s>) -> Self {
+        Self {
+            caches: carver.alloc("volume.requested", BANDS * CACHE_ENTRIES),
+            lists: carver.alloc("volume.requests", BANDS * LIST_ENTRIES),
+        }
+    }
+
+    /// Memory for what is needed between two allocations alone.
+    pub fn scratch(&mut self) -> &mut [f32] {
+        bytemuck::cast_slice_mut(self.caches)
+    }
+
+    /// The bands of an image of that many rows, nothing met yet.
+    pub fn bands(&mut self, rows: usize) -> [Band<'_>; BANDS] {
+        self.caches.fill(0);
+        let quarters = Bands::of(rows.div_ceil(PIXEL_STEP));
+        let mut caches = self.caches.chunks_mut(CACHE_ENTRIES);
+        let list_len = self.lists.len() / BANDS;
+        let mut lists = self.lists.chunks_mut(list_len.max(1));
+        let [a, b, c, d] = quarters.first();
+        [[a, b], [b, c], [c, d], [d, rows.div_ceil(PIXEL_STEP)]].map(|[first, end]| Band {
+            cache: caches.next().unwrap_or_default(),
+            list: lists.next().unwrap_or_default(),
+            len: 0,
+            next: [first, 0],
+            end,
+        })
+    }
+}
+
+/// Some rows of an image, and the blocks met in them.
+pub(super) struct Band<'b> {
+    cache: &'b mut [u64],
+    list: &'b mut [u64],
+    len: usize,
+    /// Row and column to go on with, in steps.
+    next: [usize; 2],
+    /// The row after the last, in steps.
+    end: usize,
+}
+
+impl Band<'_> {
+    /// Whether all rows were walked and the list is empty.
+    pub fn is_done(&self) -> bool {
+        self.next[0] >= self.end && self.len == 0
+    }
+
+    /// Empties the list: the blocks met, relative to the camera's, in order. One may come twice.
+    pub fn drain(&mut self) -> impl Iterator<Item = [i32; 3]> {
+        let len = core::mem::take(&mut self.len);
+        self.list.iter().take(len).map(|&tag| Tag(tag).block())
+    }
+
+    /// Lists a block unless it was met just now.
+    #[inline]
+    fn meet(&mut self, block: [i32; 3]) {
+        let tag = Tag::of(block);
+        let entry = self.cache.get_mut(tag.entry());
+        debug_assert!(entry.is_some() && self.len < self.list.len(), "a cache has an entry for each tag, and the list has room for a ray");
+        if let (Some(entry), Some(request)) = (entry, self.list.get_mut(self.len))
+            && *entry != tag.0
+        {
+            (*entry, *request) = (tag.0, tag.0);
+            self.len += 1;
+        }
+    }
+}
+
+/// The rays of a depth image, in units of blocks relative to the camera's.
+pub(super) struct Rays<'a> {
+    depth_m: View<'a, f32>,
+    start: Vector3<f32>,
+    /// The ray of pixel (0, 0) per metre of depth, and its change per column and row.
+    rays: [Vector3<f32>; 3],
+    truncation_m: f32,
+    far_m: f32,
+    /// First row, and first column of it.
+    offset: [usize; 2],
+}
+
+impl<'a> Rays<'a> {
+    /// The rays of a camera at `start`; which pixels are taken changes from frame to frame.
+    pub fn new(config: &VolumeConfig, view: &Viewpoint, depth_m: View<'a, f32>, start: Vector3<f32>, frame: u32) -> Self {
+        let block_m = f64::from(config.voxel_size_m) * BLOCK_SIDE as f64;
+        Self {
+            depth_m,
+            start,
+            rays: view.rays_world().map(|ray| (ray / block_m).cast::<f32>()),
+            truncation_m: config.truncation_m,
+            far_m: config.far_m,
+            offset: [(frame / 2) as usize % PIXEL_STEP, frame as usize % PIXEL_STEP],
+        }
+    }
+
+    /// First column of a row, both counted in steps: the next row's lie between.
+    fn first_column(&self, row: usize) -> usize {
+        (self.offset[1] + row) % PIXEL_STEP
+    }
+
+    /// Walks a band's rays until it ends or its list may have no room for another one.
+    pub fn walk(&self, band: &mut Band<'_>) {
+        let [corner, per_column, per_row] = self.rays;
+        while band.next[0] < band.end {
+            let [row, first] = band.next;
+            let v = PIXEL_STEP * row + self.offset[0];
+            let ray = corner + per_row * v as f32;
+            let first_u = self.first_column(row) + PIXEL_STEP * first;
+            for (i, &depth_m) in self.depth_m.row(v).iter().skip(first_u).step_by(PIXEL_STEP).enumerate() {
+                if !(depth_m > 0.0 && depth_m <= self.far_m) {
+                    continue;
+                }
+                if band.list.len() - band.len < MAX_BLOCKS_PER_RAY {
+                    band.next = [row, first + i];
+                    return;
+                }
+                let ray = ray + per_column * (first_u + PIXEL_STEP * i) as f32;
+                let from = self.start + ray * max_f32(depth_m - self.truncation_m, 0.0);
+                let to = self.start + ray * (depth_m + self.truncation_m);
+                walk(from, to, |block| band.meet(block));
+            }
+            band.next = [row + 1, 0];
+        }
+    }
+}
+
+/// A walk along one axis of the block grid.
+#[derive(Clone, Copy)]
+struct Axis {
+    at: i32,
+    step: i32,
+    left: i32,
+    /// Ray parameter at which the next block begins, and its growth per block.
+    next: f32,
+    growth: f32,
+}
+
+impl Axis {
+    #[inline(always)]
+    fn new(from: f32, to: f32) -> Self {
+        let (at, last) = (floor_i32(from), floor_i32(to));
+        let (ahead, left) = (last > at, last.saturating_sub(at).saturating_abs().min(MAX_BLOCKS_PER_RAY as i32));
+        // Of no use where no border is crossed.
+        let per_block = 1.0 / (to - from);
+        let border = at as f32 + if ahead { 1.0 } else { 0.0 };
+        Self {
+            at,
+            step: if ahead { 1 } else { -1 },
+            left,
+            next: if left > 0 { (border - from) * per_block } else { f32::MAX },
+            growth: if ahead { per_block } else { -per_block },
+        }
+    }
+
+    /// Goes on if it is this axis' turn: selections, for which axis it is no processor can foresee.
+    #[inline(always)]
+    fn advance(&mut self, turn: bool) {
+        self.at += if turn { self.step } else { 0 };
+        self.left -= i32::from(turn);
+        let next = if self.left > 0 { self.next + self.growth } else { f32::MAX };
+        self.next = if turn { next } else { self.next };
+    }
+}
+
+/// Visits every block between two points once, in order; both in block units.
+#[inline(always)]
+fn walk(from: Vector3<f32>, to: Vector3<f32>, mut visit: impl FnMut([i32; 3])) {
+    let mut x = Axis::new(from.x, to.x);
+    let mut y = Axis::new(from.y, to.y);
+    let mut z = Axis::new(from.z, to.z);
+    visit([x.at, y.at, z.at]);
+    let steps = (x.left + y.left + z.left).min(MAX_BLOCKS_PER_RAY as i32 - 1);
+    for _ in 0..steps {
+        let x_turn = (x.next <= y.next) & (x.next <= z.next);
+        let z_turn = !x_turn & (z.next < y.next);
+        x.advance(x_turn);
+        y.advance(!x_turn & !z_turn);
+        z.advance(z_turn);
+        visit([x.at, y.at, z.at]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::{collections::BTreeSet, vec, vec::Vec};
+
+    #[test]
+    fn a_tag_is_its_block_again() {
+        for block in [[0, 0, 0], [-1, 2, -3], [1_000_000, -1_000_000, 65_536]] {
+            assert_eq!(Tag::of(block).block(), block);
+        }
+    }
+
+    #[test]
+    fn a_walk_goes_from_block_to_neighbouring_block_and_through_all_that_small_steps_find() {
+        let mut random = Random::new(8);
+        for _ in 0..2_000 {
+            let mut point = |scale: f32| Vector3::from([(); 3].map(|()| (random.below(2_001) as f32 / 1_000.0 - 1.0) * scale));
+            let from = point(30.0);
+            let to = from + point(4.0);
+            let mut met: Vec<[i32; 3]> = Vec::new();
+            walk(from, to, |block| met.push(block));
+            let floor = |point: Vector3<f32>| [point.x, point.y, point.z].map(floor_i32);
+            assert_eq!((met.first(), met.last()), (Some(&floor(from)), Some(&floor(to))));
+            let apart = |pair: &[[i32; 3]]| pair[0].iter().zip(pair[1]).map(|(a, b)| a.abs_diff(b)).sum::<u32>();
+            assert!(met.windows(2).all(|pair| apart(pair) == 1));
+            let all: BTreeSet<_> = met.iter().copied().collect();
+            // Steps that do not end on a corner, where rounding decides.
+            let missed = (0..=997).map(|i| floor(from + (to - from) * (i as f32 / 997.0))).filter(|block| !all.contains(block)).count();
+            assert!(missed <= 1, "{missed} of 998 points");
+        }
+    }
+
+    #[test]
+    fn short_lists_lose_no_block() {
+        let depth_m: Vec<f32> = (0..64 * 48).map(|i| 3.0 + (i % 7) as f32).collect();
+        let depth_m = View::new(&depth_m, 64, 48).unwrap();
+        let rays = Rays {
+            depth_m,
+            start: Vector3::new(0.3, 0.4, 0.5),
+            rays: [Vector3::new(-1.2, -0.9, 2.5), Vector3::new(0.04, 0.0, 0.0), Vector3::new(0.0, 0.04, 0.0)],
+            truncation_m: 0.75,
+            far_m: 20.0,
+            offset: [1, 0],
+        };
+        let met = |list: usize| {
+            let (mut caches, mut lists) = (vec![0; BANDS * CACHE_ENTRIES], vec![0; 4 * list]);
+            let mut requested = RequestedCache { caches: &mut caches, lists: &mut lists };
+            let (mut met, mut rounds) = (BTreeSet::new(), 0);
+            let mut bands = requested.bands(48);
+            while !bands.iter().all(Band::is_done) {
+                rounds += 1;
+                for band in &mut bands {
+                    rays.walk(band);
+                    met.extend(band.drain());
+                }
+            }
+            (met, rounds)
+        };
+        let ((few, rounds), (many, one)) = (met(MAX_BLOCKS_PER_RAY), met(40_000));
+        assert!(rounds > 10 && one == 1, "{rounds} rounds");
+        assert!(few == many && many.len() > 500, "{} blocks", many.len());
+    }
+}
