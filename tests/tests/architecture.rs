@@ -21,7 +21,7 @@ const CORE: Layers = &[
     ("geometry", &["image"]),
     ("state", &["digest", "geometry"]),
     ("random", &["state"]),
-    ("rectify", &["digest", "geometry", "image", "memory", "parallel", "problem"]),
+    ("rectify", &["digest", "geometry", "image", "memory", "parallel", "problem", "state"]),
     ("stereo", &["digest", "geometry", "image", "memory", "parallel", "problem"]),
     ("scene_flow", &["audit", "digest", "geometry", "image", "memory", "parallel", "problem", "state"]),
     ("egomotion", &["digest", "geometry", "image", "memory", "problem", "random", "scene_flow", "state"]),

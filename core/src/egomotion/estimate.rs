@@ -2,7 +2,7 @@
 
 use super::{
     EgomotionConfig,
-    normal::{Normal, Posed},
+    normal_equations::{NormalEquations, RotationMatrix},
     points::{Point, Points},
 };
 use crate::{
@@ -138,10 +138,10 @@ impl<'s> Estimator<'s> {
             }
             motion = better;
         }
-        let posed = Posed::new(&motion);
-        let mut sums = Normal::ZERO;
+        let matrix = RotationMatrix::new(&motion);
+        let mut sums = NormalEquations::ZERO;
         for point in self.chosen() {
-            sums.add(&point, &posed, rig, |_| 1.0);
+            sums.add(&point, &matrix, rig, |_| 1.0);
         }
         estimate.residual_rms_px = libm::sqrt(sums.error / (4.0 * sums.weight));
         MotionEstimate { status: MotionStatus::Estimated, t_current_previous: Some(motion), ..estimate }
@@ -192,10 +192,10 @@ impl<'s> Estimator<'s> {
         let points = [self.points.get(a as usize)?, self.points.get(b as usize)?, self.points.get(c as usize)?];
         let mut motion = *start;
         for _ in 0..config.sample_steps {
-            let posed = Posed::new(&motion);
-            let mut sums = Normal::ZERO;
+            let matrix = RotationMatrix::new(&motion);
+            let mut sums = NormalEquations::ZERO;
             for point in &points {
-                sums.add(point, &posed, rig, |_| 1.0);
+                sums.add(point, &matrix, rig, |_| 1.0);
             }
             let step = sums.solve()?;
             motion = motion.retract(step);
@@ -214,10 +214,10 @@ impl<'s> Estimator<'s> {
     fn refine(&self, config: &EgomotionConfig, rig: &StereoRig, motion: &Transform) -> (Transform, u32, bool) {
         let mut motion = *motion;
         for taken in 1..=u32::from(config.refine_steps) {
-            let posed = Posed::new(&motion);
-            let mut sums = Normal::ZERO;
+            let matrix = RotationMatrix::new(&motion);
+            let mut sums = NormalEquations::ZERO;
             for point in self.chosen() {
-                sums.add(&point, &posed, rig, |_| side_weight(config, rig, &point));
+                sums.add(&point, &matrix, rig, |_| side_weight(config, rig, &point));
             }
             let Some(step) = sums.solve() else { return (motion, taken, false) };
             motion = motion.retract(step);

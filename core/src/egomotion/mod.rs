@@ -32,7 +32,7 @@
 mod config;
 mod estimate;
 pub mod icp;
-mod normal;
+mod normal_equations;
 mod points;
 mod track;
 

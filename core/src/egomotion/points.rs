@@ -3,19 +3,15 @@
 //! Memory: 28 bytes per match and 8 for the lists of inliers.
 
 use crate::{
-    geometry::{StereoRig, Transform},
+    geometry::{DEPTH_MIN_M, StereoRig, Transform},
     memory::{Carver, region_bytes},
     scene_flow::Match,
 };
 
-/// Smallest disparity a point is triangulated from, px.
-const DISPARITY_MIN_PX: f64 = 0.1;
 /// Points scored between two looks at whether the hypothesis can still win.
 const STRIDE: usize = 256;
 /// Coordinates of a point and its observations.
 const COLUMNS: usize = 7;
-/// Nearest depth at which a point can be seen, m.
-pub(super) const DEPTH_MIN_M: f64 = 0.05;
 
 /// The points. Coordinates in m, observations in px from the principal point.
 #[derive(Debug)]
@@ -65,7 +61,7 @@ impl<'s> Points<'s> {
         self.len
     }
 
-    /// Triangulates the matches. Those without disparity, not finite or beyond the room are left out; returns how many were given.
+    /// Triangulates the matches. Those without disparity, not finite or beyond the capacity are left out; returns how many were given.
     pub(super) fn fill<'m>(&mut self, matches: impl IntoIterator<Item = &'m Match>, rig: &StereoRig) -> usize {
         self.len = 0;
         let mut given = 0;
@@ -117,7 +113,7 @@ impl<'s> Points<'s> {
 
     /// Counts the points within `inlier_px` of where the motion puts them; gives up, with a smaller count, when `to_beat` is out of reach.
     pub(super) fn score(&self, motion: &Transform, rig: &StereoRig, inlier_px: f32, to_beat: u32) -> u32 {
-        let view = Single::new(motion, rig);
+        let view = SinglePrecision::new(motion, rig);
         let mut count = 0;
         let mut first = 0;
         while first < self.len && count + ((self.len - first) as u32) > to_beat {
@@ -130,7 +126,7 @@ impl<'s> Points<'s> {
 
     /// Writes the positions of the points within `inlier_px` to `inliers`, in order. Returns how many there are.
     pub(super) fn select(&self, motion: &Transform, rig: &StereoRig, inlier_px: f32, inliers: &mut [u32]) -> usize {
-        let view = Single::new(motion, rig);
+        let view = SinglePrecision::new(motion, rig);
         let mut slots = inliers.iter_mut();
         let mut count = 0;
         let mut index = 0;
@@ -150,7 +146,7 @@ impl<'s> Points<'s> {
     /// Folds the squared errors of a range of points, px²; infinite for points that would be behind the camera.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "all columns are cut to n first")]
-    fn errors(&self, view: &Single, range: core::ops::Range<usize>, mut fold: impl FnMut(u32, f32) -> u32) -> u32 {
+    fn errors(&self, view: &SinglePrecision, range: core::ops::Range<usize>, mut fold: impl FnMut(u32, f32) -> u32) -> u32 {
         let n = range.len();
         let columns = [&*self.x, self.y, self.z, self.left_u, self.left_v, self.right_u, self.right_v];
         let [Some(x), Some(y), Some(z), Some(left_u), Some(left_v), Some(right_u), Some(right_v)] =
@@ -167,22 +163,21 @@ impl<'s> Points<'s> {
     }
 }
 
-/// A motion and a rig in single precision, for scoring.
-struct Single {
+/// A motion and a rig in single precision, for scoring: hundreds of hypotheses times a thousand
+/// points. Its projection divides once and never branches, which the one of [`StereoRig`] in double
+/// precision does not allow.
+struct SinglePrecision {
     rotation: [[f32; 3]; 3],
     translation: [f32; 3],
     focal: f32,
     focal_baseline: f32,
 }
 
-impl Single {
+impl SinglePrecision {
     fn new(motion: &Transform, rig: &StereoRig) -> Self {
-        let r = motion.quaternion().to_rotation_matrix();
-        let r = r.matrix();
-        let t = &motion.translation();
         Self {
-            rotation: [[r.m11, r.m12, r.m13], [r.m21, r.m22, r.m23], [r.m31, r.m32, r.m33]].map(|row| row.map(|x| x as f32)),
-            translation: [t.x, t.y, t.z].map(|x| x as f32),
+            rotation: motion.rotation_matrix().map(|row| row.map(|x| x as f32)),
+            translation: motion.translation_m.map(|x| x as f32),
             focal: rig.focal_px as f32,
             focal_baseline: rig.focal_baseline_px_m() as f32,
         }
@@ -205,18 +200,13 @@ impl Single {
 
 /// The point a match shows, in the previous left camera, and its current observations.
 fn triangulate(m: &Match, rig: &StereoRig) -> Option<Point> {
-    let center = [rig.center_u_px, rig.center_v_px];
-    let from_center = |[u, v]: [f32; 2]| [f64::from(u) - center[0], f64::from(v) - center[1]];
-    let before = from_center(m.previous_left);
-    let disparity = before[0] - from_center(m.previous_right)[0];
-    let (left, right) = (from_center(m.current_left), from_center(m.current_right));
-    let finite = left.iter().chain(&right).chain(&before).all(|x| x.is_finite());
-    // `>=` is false for NaN as well.
-    if !(finite && disparity >= DISPARITY_MIN_PX) {
+    let (left, right) = (rig.from_center(m.current_left), rig.from_center(m.current_right));
+    if !left.iter().chain(&right).all(|x| x.is_finite()) {
         return None;
     }
-    let per_px = rig.baseline_m / disparity;
-    let v = 0.5 * (before[1] + from_center(m.previous_right)[1]);
-    let v = if v.is_finite() { v } else { return None };
-    Some(Point { xyz: [before[0] * per_px, v * per_px, rig.focal_px * per_px], left, right })
+    Some(Point {
+        xyz: rig.triangulate(&rig.observation(m.previous_left, m.previous_right))?,
+        left,
+        right,
+    })
 }

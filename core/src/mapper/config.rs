@@ -7,6 +7,7 @@ use crate::{
     objects::ObjectsConfig,
     problem::{Problems, require},
     rectify::Rectification,
+    rectify::self_calibration::RigConfig,
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
     tracking::TrackingConfig,
@@ -30,6 +31,8 @@ pub struct Config {
     pub rig: StereoRig,
     /// How raw pairs become those of `rig`; `None` where they come rectified.
     pub rectification: Option<Rectification>,
+    /// What of the rig can be told beside its calibration.
+    pub rig_settings: RigConfig,
     /// Stereo matching.
     pub stereo: StereoConfig,
     /// Features and their matches over time.
@@ -58,6 +61,7 @@ impl Config {
         Self {
             rig,
             rectification: None,
+            rig_settings: RigConfig::default(),
             stereo: StereoConfig::default(),
             scene_flow: SceneFlowConfig::default(),
             egomotion: EgomotionConfig::default(),
@@ -69,6 +73,11 @@ impl Config {
             raycast: RaycastConfig::default(),
             mesh: MeshConfig::default(),
         }
+    }
+
+    /// The cameras with the baseline that is to be used.
+    pub fn scaled_rig(&self) -> StereoRig {
+        StereoRig { baseline_m: self.rig.baseline_m * self.rig_settings.baseline_scale, ..self.rig }
     }
 
     /// Everything wrong with it; empty when nothing is.
@@ -88,6 +97,7 @@ impl Config {
         require(&mut problems, rig != Err(RigProblem::Focal), "rig.focal_px", "must be a positive number");
         require(&mut problems, rig != Err(RigProblem::Center), "rig.center_px", "must be finite numbers");
         require(&mut problems, rig != Err(RigProblem::Baseline), "rig.baseline_m", "must be a positive number");
+        self.rig_settings.validate(&mut problems);
         self.stereo.validate(&mut problems);
         self.scene_flow.validate(&mut problems);
         self.egomotion.validate(&mut problems);

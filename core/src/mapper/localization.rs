@@ -6,10 +6,11 @@ use crate::{
         Egomotion, Estimator, MotionEstimate,
         icp::{self, IcpReport, IcpStatus, MapPicture},
     },
-    geometry::Transform,
+    geometry::{StereoObservation, StereoRig, Transform},
     image::View,
     parallel::Executor,
-    scene_flow::{FlowMatcher, FlowStatus},
+    rectify::self_calibration::SelfCalibration,
+    scene_flow::{FlowMatcher, FlowStatus, Match},
     tracking::{CameraMotion, EgomotionMask},
     view::Raycaster,
     volume::{Viewpoint, Volume},
@@ -23,6 +24,7 @@ pub(super) struct Localization<'m, 's> {
     pub scene_flow: &'m FlowMatcher<'s>,
     pub background: &'m Volume<'s>,
     pub camera: &'m mut Egomotion,
+    pub self_calibration: &'m mut SelfCalibration,
     pub estimator: &'m mut Estimator<'s>,
     pub raycaster: &'m mut Raycaster<'s>,
     /// The depth image is computed anew when the frame is fused: until then it is scratch for ICP's pyramid.
@@ -37,6 +39,17 @@ pub(super) struct Located {
     pub icp: Option<IcpReport>,
     /// Matches that were excluded because they may move.
     pub matches_excluded: u32,
+}
+
+/// Rows by which the left and the right position of a match may differ where it says something about
+/// the rig.
+const ROW_DIFFERENCE_MAX_PX: f32 = 2.0;
+
+/// What both cameras saw of a match, before and now; `None` where the rows are too far apart.
+fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
+    let pairs = [(m.previous_left, m.previous_right), (m.current_left, m.current_right)];
+    let aligned = pairs.iter().all(|(left, right)| (left[1] - right[1]).abs() <= ROW_DIFFERENCE_MAX_PX);
+    aligned.then(|| pairs.map(|(left, right)| rig.observation(left, right)))
 }
 
 impl Localization<'_, '_> {
@@ -76,13 +89,19 @@ impl Localization<'_, '_> {
         let included = selection.iter().filter(|&&index| mask.includes(index));
         let excluded = selection.len() - included.clone().count();
         let matches = included.filter_map(|&index| refined.get(index as usize));
-        (self.camera.step(&self.config.egomotion, &self.config.rig, matches, self.estimator), excluded as u32)
+        let rig = self.config.scaled_rig();
+        let estimate = self.camera.step(&self.config.egomotion, &rig, matches.clone(), self.estimator);
+        // A motion few matches agree with says nothing about the rig.
+        if let Some(motion) = estimate.t_current_previous.filter(|_| 2 * estimate.inliers >= estimate.matches) {
+            self.self_calibration.update(&rig, matches.filter_map(|m| observations(&rig, m)), &motion);
+        }
+        (estimate, excluded as u32)
     }
 
     /// Registers the depth with the map as it appears from the last pose. All of the picture counts, what moves as well: the baseline knows
     /// no objects.
     fn register_depth<E: Executor>(&mut self, [width, height]: [usize; 2], executor: &E) -> IcpReport {
-        let (rig, limits_m) = (self.config.rig, [self.config.volume.near_m, self.config.volume.far_m]);
+        let (rig, limits_m) = (self.config.scaled_rig(), [self.config.volume.near_m, self.config.volume.far_m]);
         let view = Viewpoint { rig, width, height, t_world_camera: *self.camera.t_world_camera() };
         let cast = self.raycaster.cast(self.background, &view, executor);
         let picture = match (cast, self.raycaster.depth_m(), self.raycaster.normal()) {

@@ -69,7 +69,7 @@ impl<'s> Mapper<'s> {
 
     fn viewpoint(&self, t_world_camera: &Transform) -> Result<Viewpoint, RaycastError> {
         let [width, height] = self.size.ok_or(RaycastError::ImageSize)?;
-        Ok(Viewpoint { rig: self.config.rig, width, height, t_world_camera: *t_world_camera })
+        Ok(Viewpoint { rig: self.config.scaled_rig(), width, height, t_world_camera: *t_world_camera })
     }
 }
 

@@ -7,6 +7,7 @@ use crate::{
     geometry::Transform,
     objects::InstancesReport,
     rectify::RectifyReport,
+    rectify::self_calibration::{CalibrationState, SelfCalibrationReport},
     scene_flow::FlowReport,
     stereo::StereoReport,
     volume::{AllocationReport, PruneReport},
@@ -91,6 +92,8 @@ pub struct Report {
     pub egomotion: Option<MotionEstimate>,
     /// The camera's motion from depth, where that is asked for; none in the first frame.
     pub icp: Option<IcpReport>,
+    /// What the rig's disparity was found to be off by.
+    pub self_calibration: SelfCalibrationReport,
     /// What moves or could; [`crate::Mapper::tracks`] has the tracks one by one.
     pub instances: InstancesReport,
     /// Whether the frame was fused. One whose pose had to be guessed is not: it would smear the map. Nor is one between two turns of
@@ -116,9 +119,10 @@ impl Report {
     pub fn severity(&self) -> Severity {
         let allocation = &self.allocation;
         let blocks = allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
-        if self.pose == PoseOrigin::Held || blocks + self.instances.refused() + self.internal_faults > 0 {
+        let refused = blocks + self.instances.refused() + self.internal_faults;
+        if self.pose == PoseOrigin::Held || refused > 0 || self.self_calibration.is_uncorrected() {
             Severity::MapAffected
-        } else if self.dropped_features() + self.prune.early > 0 {
+        } else if self.dropped_features() + self.prune.early > 0 || self.self_calibration.state() > CalibrationState::Sound {
             Severity::Recovered
         } else {
             Severity::Info

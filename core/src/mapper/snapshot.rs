@@ -13,7 +13,7 @@
 //! | 4 | frames taken |
 //! | 4, 8, 4 | whether the last frame had a time, that time, ns, and the time since the frame before, s |
 //! | 4, 4 | image width and height, px (0 before the first frame) |
-//! | | the last pair, the camera, tracks, masks and objects, the static map |
+//! | | the last pair, the camera, the rig's self-calibration, tracks, masks and objects, the static map |
 //! | 8 | checksum of everything before: a flipped bit anywhere is found |
 //!
 //! Memory: none but the mapper's. Bytes: about those of the blocks in use, and of what waits to be
@@ -158,6 +158,7 @@ impl<'s> Mapper<'s> {
         let Self {
             scene_flow,
             camera,
+            self_calibration,
             tracker,
             objects,
             background,
@@ -183,6 +184,7 @@ impl<'s> Mapper<'s> {
         *size = (width * height > 0).then_some([width, height]);
         scene_flow.visit(visitor);
         camera.visit(visitor);
+        self_calibration.visit(visitor);
         tracker.visit(visitor);
         objects.visit(visitor);
         background.visit(visitor);

@@ -28,7 +28,12 @@ impl StaticMap<'_, '_> {
         store: &mut S,
     ) -> AllocationReport {
         let (width, height) = (frame.left.width(), frame.left.height());
-        let view = Viewpoint { rig: self.config.rig, width, height, t_world_camera: camera.t_world_camera };
+        let view = Viewpoint {
+            rig: self.config.scaled_rig(),
+            width,
+            height,
+            t_world_camera: camera.t_world_camera,
+        };
         let Some(mut depth_m) = ViewMut::new(self.depth_m, width, height) else {
             debug_assert!(false, "the depth image has the capacity's size");
             return AllocationReport::default();

@@ -8,7 +8,9 @@ use super::{
 use crate::{
     Executor, Stage,
     audit::Audit,
+    digest::Digest,
     egomotion::MotionEstimate,
+    geometry::DisparityCorrection,
     image::InvalidPair,
     objects::{InstancesReport, NoSink, ObjectFrame, ObjectSink, Picture},
     rectify::Pair,
@@ -71,10 +73,11 @@ impl Mapper<'_> {
         store: &mut S,
         sink: &mut O,
     ) -> Report {
-        let config = &self.config;
+        let (config, rig) = (&self.config, self.config.scaled_rig());
         let invalid = self.rectifier.invalid();
         // (A) Depth from the pair, and (C.1) sparse scene flow over this pair and the last.
         let (stereo, scene_flow) = match_images(config, &mut self.stereo, &mut self.scene_flow, frame, invalid.as_ref(), executor);
+        correct_disparity(config, self.self_calibration.correction(), &mut self.stereo, &mut self.scene_flow, executor);
         let disparity_q8 = self.stereo.disparity_q8();
         let matches = FrameMatches { refined: self.scene_flow.refined(), sparse: self.scene_flow.sparse() };
         // (B) Detections, associated with tracks, and the matches assigned to them.
@@ -88,6 +91,7 @@ impl Mapper<'_> {
             scene_flow: &self.scene_flow,
             background: &self.background,
             camera: &mut self.camera,
+            self_calibration: &mut self.self_calibration,
             estimator: &mut self.estimator,
             raycaster: &mut self.raycaster,
             depth_m: self.depth_m,
@@ -97,18 +101,13 @@ impl Mapper<'_> {
         // (D) The objects' motions.
         let search = GuidedMatching { matcher: &self.scene_flow, disparity_q8 };
         let mut tracked =
-            executor.stage(Stage::Instances, || assigned.estimate_motions(&config.rig, &located.camera, Some(search), &mut self.estimator));
+            executor.stage(Stage::Instances, || assigned.estimate_motions(&rig, &located.camera, Some(search), &mut self.estimator));
         // (E) The static map, without what moves or may move, and the objects' maps; unless the pose is extrapolated.
         let fused = located.origin != PoseOrigin::Held && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
         let mut map = StaticMap { config, disparity_q8, background: &mut self.background, depth_m: self.depth_m };
         let allocation = if fused { map.fuse(frame, &located.camera, &mut tracked, executor, store) } else { AllocationReport::default() };
         let picture = Picture { grey: frame.left, colour: frame.colour };
-        let shown = ObjectFrame {
-            rig: &config.rig,
-            t_world_camera: &located.camera.t_world_camera,
-            picture,
-            disparity_q8,
-        };
+        let shown = ObjectFrame { rig: &rig, t_world_camera: &located.camera.t_world_camera, picture, disparity_q8 };
         let tracking = executor.stage(Stage::Instances, || {
             self.objects.reconstruct(&tracked, fused.then_some(&shown), executor, sink);
             tracked.commit()
@@ -131,6 +130,7 @@ impl Mapper<'_> {
             pose: located.origin,
             egomotion: located.egomotion,
             icp: located.icp,
+            self_calibration: self.self_calibration.report(),
             instances: InstancesReport::of(&tracking, self.objects.report(), located.matches_excluded),
             fused,
             allocation,
@@ -171,11 +171,19 @@ impl Mapper<'_> {
             input: 0,
             disparity: self.stereo.digest(),
             matches: self.scene_flow.digest(),
-            egomotion: self.camera.digest(egomotion),
+            egomotion: self.egomotion_digest(egomotion),
             tracks: self.tracks_digest(),
             background: self.background.digest(),
             objects: ObjectDigests::of(self.objects.digests().map(|(id, digest)| ObjectDigest { id, digest })),
         }
+    }
+
+    /// Digest of the camera's motion and of what it says about the rig.
+    fn egomotion_digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
+        let mut digest = Digest::default();
+        digest.u64(self.camera.digest(estimate));
+        digest.u64(Hasher::digest(|hasher| self.self_calibration.visit(hasher)));
+        digest.finish()
     }
 
     /// Digest of the tracks by age, their masks, and the crops that wait to be fused.
@@ -202,4 +210,19 @@ fn match_images<E: Executor>(
     };
     let match_features = || scene_flow.push_within(&config.scene_flow, frame.left, frame.right, invalid, executor);
     executor.join(|| executor.stage(Stage::Stereo, compute_disparity), || executor.stage(Stage::SceneFlow, match_features))
+}
+
+/// Takes the disparity error found so far out of the disparity image and the matches.
+fn correct_disparity<E: Executor>(
+    config: &Config,
+    correction: DisparityCorrection,
+    stereo: &mut StereoMatcher<'_>,
+    scene_flow: &mut FlowMatcher<'_>,
+    executor: &E,
+) {
+    if !correction.is_zero() {
+        let columns = correction.for_rig(&config.rig);
+        executor.stage(Stage::Stereo, || stereo.correct(columns, executor));
+        executor.stage(Stage::SceneFlow, || scene_flow.correct(columns));
+    }
 }

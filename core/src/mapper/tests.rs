@@ -4,6 +4,7 @@ mod drives;
 mod mutations;
 mod raw;
 mod resume;
+mod self_calibration;
 
 use super::*;
 use crate::{

@@ -40,6 +40,7 @@ mod monotonic;
 mod radial_tangential;
 mod rectification;
 mod rectifier;
+pub mod self_calibration;
 #[cfg(test)]
 mod tests;
 

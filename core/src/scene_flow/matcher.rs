@@ -15,6 +15,7 @@ use super::{
 use crate::{
     audit::Audit,
     digest::Digest,
+    geometry::ColumnCorrection,
     image::{InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, each, zip3},
@@ -46,6 +47,8 @@ pub struct FlowMatcher<'s> {
     score: &'s mut [f32],
     selection: &'s mut [u32],
     selection_len: usize,
+    /// What has been taken out of the last frame's matches.
+    correction: ColumnCorrection,
 }
 
 const LEFT: Names = Names {
@@ -119,6 +122,7 @@ impl<'s> FlowMatcher<'s> {
             score: carver.alloc("scene_flow.score", matches),
             selection: carver.alloc("scene_flow.selection", matches),
             selection_len: 0,
+            correction: ColumnCorrection::default(),
         }
     }
 
@@ -146,10 +150,20 @@ impl<'s> FlowMatcher<'s> {
     /// pixel in the other three images. `None` without a frame before, where it is expected outside an image or at no number, and where it is
     /// lost: no texture, or nothing alike within 1.75 px.
     pub fn find(&self, expected: &Match) -> Option<Match> {
+        let expected = &expected.with_right(|column| self.correction.uncorrected(column));
         let [width, height] = self.last.filter(|_| self.matched)?;
         let inside = |at: [f32; 2]| at[0] >= 0.0 && at[1] >= 0.0 && at[0] < width as f32 && at[1] < height as f32;
         let positions = [expected.previous_left, expected.previous_right, expected.current_left, expected.current_right];
-        positions.into_iter().all(inside).then(|| find_back(expected, images(&self.left, &self.right, [width, height])))?
+        let found = positions.into_iter().all(inside).then(|| find_back(expected, images(&self.left, &self.right, [width, height])))??;
+        Some(found.with_right(|column| self.correction.corrected(column)))
+    }
+
+    /// Takes a disparity error out of the last frame's matches, and of those found later.
+    pub fn correct(&mut self, correction: ColumnCorrection) {
+        self.correction = correction;
+        for matches in [self.sparse.get_mut(..self.sparse_len), self.refined.get_mut(..self.refined_len)] {
+            matches.unwrap_or_default().iter_mut().for_each(|m| *m = m.with_right(|column| correction.corrected(column)));
+        }
     }
 
     #[cfg(test)]
@@ -205,6 +219,7 @@ impl<'s> FlowMatcher<'s> {
             score: _,
             selection: _,
             selection_len: _,
+            correction: _,
         } = self;
         let [mut width, mut height] = last.unwrap_or_default();
         visitor.count(&mut width, capacity[0]);
@@ -224,6 +239,7 @@ impl<'s> FlowMatcher<'s> {
 
     fn clear(&mut self) {
         (self.sparse_len, self.refined_len, self.selection_len) = (0, 0, 0);
+        self.correction = ColumnCorrection::default();
         self.matched = false;
     }
 

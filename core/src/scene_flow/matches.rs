@@ -27,6 +27,16 @@ impl Match {
         self.current_left[0] - self.current_right[0]
     }
 
+    /// The same with the columns of both right images replaced.
+    pub(crate) fn with_right(&self, column: impl Fn(f32) -> f32) -> Self {
+        let ([u_previous, v_previous], [u_current, v_current]) = (self.previous_right, self.current_right);
+        Self {
+            previous_right: [column(u_previous), v_previous],
+            current_right: [column(u_current), v_current],
+            ..*self
+        }
+    }
+
     /// Movement in the left image, px.
     pub fn flow_px(&self) -> [f32; 2] {
         [self.current_left[0] - self.previous_left[0], self.current_left[1] - self.previous_left[1]]

@@ -17,6 +17,7 @@ use super::{
 };
 use crate::{
     digest::Digest,
+    geometry::ColumnCorrection,
     image::{DISPARITY_ONE_PX, InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{BANDS, Bands, Executor, each, zip3},
@@ -218,6 +219,14 @@ impl<'s> StereoMatcher<'s> {
             }
         }
         report
+    }
+
+    /// Takes a disparity error out of the last pair's disparities, whichever way they came.
+    pub fn correct<E: Executor>(&mut self, correction: ColumnCorrection, executor: &E) {
+        let (width, height) = (self.width, self.height);
+        each(executor, Bands::of(height).split_mut(self.disparity, width), |rows: &mut [u16]| {
+            rows.chunks_exact_mut(width).for_each(|row| correction.correct_row(row));
+        });
     }
 
     /// Checks the input, takes the image's size and blanks the result.

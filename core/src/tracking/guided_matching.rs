@@ -14,7 +14,6 @@ use crate::{
     masks::{MaskHandle, MaskStore},
     scene_flow::{FlowMatcher, Match},
 };
-use nalgebra::Point3;
 
 /// Most patches searched for on one object.
 pub(crate) const GUIDED_MATCHES_MAX: usize = 256;
@@ -22,8 +21,6 @@ pub(crate) const GUIDED_MATCHES_MAX: usize = 256;
 const STEP_MIN_PX: i32 = 3;
 /// Most lines of the grid in a direction, more than any image needs.
 const LINES_MAX: i32 = 4096;
-/// Nearest depth at which a point can be seen, m.
-const DEPTH_MIN_M: f64 = 0.05;
 /// Half a patch and a pixel, px: all around it must lie under the mask, for at the rim a patch also shows what is behind.
 const RIM_PX: i32 = 5;
 
@@ -97,20 +94,15 @@ pub(crate) fn step_px(width: i32, height: i32) -> i32 {
 
 /// Where a pixel of the current left image is in all four.
 fn expected(rig: &StereoRig, [u, v]: [i32; 2], disparity_px: f64, t_previous_current: &Transform) -> Option<Match> {
-    let per_px = rig.baseline_m / disparity_px;
-    let (x, y) = (f64::from(u) - rig.center_u_px, f64::from(v) - rig.center_v_px);
-    let previous = t_previous_current.transform_point(Point3::new(x * per_px, y * per_px, rig.focal_px * per_px));
-    // Not so for NaN.
-    let is_visible = previous.z > DEPTH_MIN_M;
-    if !is_visible {
-        return None;
-    }
-    let per_m = rig.focal_px / previous.z;
-    let (u_before, v_before) = (previous.x * per_m + rig.center_u_px, previous.y * per_m + rig.center_v_px);
+    let current_left = [u as f32, v as f32];
+    let current_right = [(f64::from(u) - disparity_px) as f32, v as f32];
+    let current = rig.triangulate(&rig.observation(current_left, current_right))?;
+    let previous = rig.project(t_previous_current.transform_point(current))?;
+    let v_previous = (previous.v_px + rig.center_v_px) as f32;
     Some(Match {
-        previous_left: [u_before as f32, v_before as f32],
-        previous_right: [(u_before - rig.baseline_m * per_m) as f32, v_before as f32],
-        current_left: [u as f32, v as f32],
-        current_right: [(f64::from(u) - disparity_px) as f32, v as f32],
+        previous_left: [(previous.u_left_px + rig.center_u_px) as f32, v_previous],
+        previous_right: [(previous.u_right_px + rig.center_u_px) as f32, v_previous],
+        current_left,
+        current_right,
     })
 }

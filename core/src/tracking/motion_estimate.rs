@@ -15,9 +15,6 @@ use crate::{
 };
 use nalgebra::Point3;
 
-/// Smallest disparity a point is triangulated from, px.
-const DISPARITY_MIN_PX: f64 = 0.1;
-
 /// What a frame's motions are measured by.
 pub(super) struct MotionFrame<'a> {
     pub rig: &'a StereoRig,
@@ -162,19 +159,10 @@ impl<'m, M: Iterator<Item = (u32, &'m Match)>, I: Iterator<Item = u32>> Iterator
 /// A match as the filter takes it: its point is triangulated in the previous camera and predicted as a static one.
 fn observation(m: &Match, frame: &MotionFrame<'_>) -> Option<Observation> {
     let rig = frame.rig;
-    let centered = |[u, v]: [f32; 2]| [f64::from(u) - rig.center_u_px, f64::from(v) - rig.center_v_px];
-    let ([u, v], [u_right, v_right]) = (centered(m.previous_left), centered(m.previous_right));
-    let disparity = u - u_right;
-    // Not so for NaN.
-    let triangulates = disparity >= DISPARITY_MIN_PX;
-    if !triangulates {
-        return None;
-    }
-    let per_px = rig.baseline_m / disparity;
-    let previous = Point3::new(u * per_px, 0.5 * (v + v_right) * per_px, rig.focal_px * per_px);
+    let previous = Point3::from(rig.triangulate(&rig.observation(m.previous_left, m.previous_right))?);
     Some(Observation {
         static_prediction: frame.t_current_previous.transform_point(previous),
-        left: centered(m.current_left),
-        right: centered(m.current_right),
+        left: rig.from_center(m.current_left),
+        right: rig.from_center(m.current_right),
     })
 }

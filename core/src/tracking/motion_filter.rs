@@ -11,7 +11,7 @@
 //! independent (one mask, one rectification): no more than `independent_matches` count.
 
 use super::config::MotionConfig;
-use crate::geometry::{StereoRig, Transform};
+use crate::geometry::{StereoObservation, StereoRig, Transform};
 use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
@@ -20,8 +20,6 @@ use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
 const STEPS: usize = 4;
 /// Squared Mahalanobis distance from the prediction beyond which a frame contradicts it: chi-square, 6 degrees of freedom, 1e-5.
 const CONTRADICTION: f64 = 34.0;
-/// Nearest depth at which a point can be seen, m.
-const DEPTH_MIN_M: f64 = 0.05;
 
 /// A point of an object: where it would be in the current camera if the object were static, and where it is observed, px from the
 /// principal point.
@@ -232,24 +230,19 @@ impl NormalEquations {
 
     /// Adds a point at `at` in the camera, `arm` from the centre. One behind the camera adds nothing.
     fn add(&mut self, rig: &StereoRig, arm: &Vector3<f64>, at: &Vector3<f64>, observed: &Observation) {
-        let before_camera = at.z > DEPTH_MIN_M;
-        if !before_camera {
-            return;
-        }
-        let per_m = rig.focal_px / at.z;
-        let (u, v) = (per_m * at.x, per_m * at.y);
-        let right = u - rig.focal_baseline_px_m() / at.z;
+        let at = (*at).into();
+        let Some(StereoObservation { u_left_px, v_px, u_right_px }) = rig.project(at) else { return };
         // Derivatives of a coordinate by the point (gx, gy, gz), and by the rotation: arm x g.
         let row = |g: [f64; 3]| {
             let turn = arm.cross(&Vector3::from(g));
             [turn.x, turn.y, turn.z, g[0], g[1], g[2]]
         };
-        let down = row([0.0, per_m, -v / at.z]);
+        let [left, down, right] = rig.project_jacobian(at).map(row);
         let rows = [
-            (row([per_m, 0.0, -u / at.z]), u - observed.left[0]),
-            (row([per_m, 0.0, -right / at.z]), right - observed.right[0]),
-            (down, v - observed.left[1]),
-            (down, v - observed.right[1]),
+            (left, u_left_px - observed.left[0]),
+            (right, u_right_px - observed.right[0]),
+            (down, v_px - observed.left[1]),
+            (down, v_px - observed.right[1]),
         ];
         for (row, error) in rows {
             for ((line, sum), a) in self.matrix.iter_mut().zip(&mut self.vector).zip(row) {

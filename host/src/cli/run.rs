@@ -305,6 +305,9 @@ fn write(folder: &RunFolder, plan: &Plan, run: &RunRecord, summary: &Summary) ->
     let (times_s, poses) = (&sections.trajectory.times_s, &sections.trajectory.poses);
     let stamp_ns = |(&index, &time_s): (&usize, &f64)| plan.dataset.stamp_ns(index).unwrap_or((time_s * 1e9).round() as u64);
     let times_ns: Vec<u64> = plan.indices.iter().zip(times_s).map(stamp_ns).collect();
+    if let Some(text) = report::rig::calibration_toml(run) {
+        folder.write("calibration.toml", |out| std::io::Write::write_all(out, text.as_bytes()))?;
+    }
     folder.write("config.toml", |out| std::io::Write::write_all(out, run.header.config_toml.as_bytes()))?;
     folder.write("trajectory_kitti.txt", |out| formats::write_kitti(out, poses))?;
     folder.write("trajectory_tum.txt", |out| formats::write_tum(out, &times_ns, poses))?;

@@ -6,7 +6,7 @@ use dynvox_core::egomotion::EgomotionConfig;
 use dynvox_core::egomotion::icp::IcpConfig;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::objects::ObjectsConfig;
-use dynvox_core::rectify::Rectification;
+use dynvox_core::rectify::{Rectification, self_calibration::RigConfig};
 use dynvox_core::scene_flow::SceneFlowConfig;
 use dynvox_core::stereo::StereoConfig;
 use dynvox_core::tracking::TrackingConfig;
@@ -18,10 +18,11 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Everything that can be configured, in the sections of the file. The rig is not among it: it comes with the data set.
+/// Everything that can be configured, in the sections of the file. The rig's calibration is not among it: it comes with the data set.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
+    rig: RigConfig,
     stereo: StereoConfig,
     scene_flow: SceneFlowConfig,
     egomotion: EgomotionConfig,
@@ -69,6 +70,7 @@ impl Settings {
     /// The mapper's configuration for a rig, and for raw images where they are rectified.
     pub fn config(&self, rig: StereoRig, rectification: Option<&Rectification>) -> Config {
         let Self {
+            rig: rig_settings,
             stereo,
             scene_flow,
             egomotion,
@@ -84,6 +86,7 @@ impl Settings {
         Config {
             rig,
             rectification: rectification.copied(),
+            rig_settings: *rig_settings,
             stereo: *stereo,
             scene_flow: *scene_flow,
             egomotion: *egomotion,
@@ -243,7 +246,7 @@ mod tests {
         let message = refusal("volume.voxel_sise_m=0.1");
         assert!(message.contains("`volume.voxel_sise_m`") && message.contains("voxel_size_m"), "{message}");
         assert!(refusal("volumes.far_m=1").contains("no section volumes"));
-        assert!(refusal("rig.focal_px=1").contains("no section rig"));
+        assert!(refusal("rig.focal_px=1").contains("`rig.focal_px`"), "the calibration comes with the data");
         assert!(refusal("far_m=1").contains("`far_m` is not a key"));
         assert!(refusal("volume.far_m").contains("has no value"));
         assert!(refusal("volume.far_m=wide").contains("`volume.far_m`"));

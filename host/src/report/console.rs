@@ -1,5 +1,6 @@
 //! The last lines of a run on the console.
 
+use super::rig;
 use super::text::{MIB, lost_because, motion_error, states_in_time};
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::TrajectoryErrors;
@@ -22,6 +23,7 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     }
     lines.extend(block_lines(run));
     lines.extend(pose_lines(run));
+    lines.push((if rig::is_warning(run) { "calibration WARNING" } else { "calibration" }, rig::sentence(run)));
     lines.push(("digest", format!("{:016x}", run.digest())));
     lines.push(("results", folder.display().to_string()));
     lines.iter().map(|(name, value)| format!("{name:<22}{value}\n")).collect()

@@ -5,6 +5,7 @@ pub mod compare;
 mod console;
 mod csv;
 pub mod html;
+pub mod rig;
 mod summary;
 pub mod text;
 

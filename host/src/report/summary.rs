@@ -1,5 +1,6 @@
 //! `summary.json`: the figures of a run under fixed keys. A key is absent where its value is unknown.
 
+use super::rig::RigSummary;
 use crate::evaluate::objects::{ObjectFigures, TrackErrors};
 use crate::evaluate::reference::ReferenceFigures;
 use crate::evaluate::surfaces::SurfaceFigures;
@@ -23,6 +24,9 @@ pub struct Summary {
     rss_peak_bytes: Option<u64>,
     stages: BTreeMap<&'static str, StageSummary>,
     egomotion: EgomotionSummary,
+    /// What the run found left of the calibration's error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rig: Option<RigSummary>,
     #[serde(skip_serializing_if = "Option::is_none")]
     lidar: Option<ReferenceFigures>,
     /// Every track, by number.
@@ -188,6 +192,7 @@ impl Summary {
             rss_peak_bytes: run.rss_peak_bytes,
             stages: run.stage_statistics().into_iter().map(|(name, of)| (name, stage(of))).collect(),
             egomotion: EgomotionSummary::of(&sections.trajectory),
+            rig: super::rig::summary(run),
             lidar: sections.reference.as_ref().and_then(|reference| reference.figures.clone()),
             objects: sections.tracks.tracks.iter().map(|track| ObjectSummary::of(track, &sections.objects.objects)).collect(),
             objects_truth: sections.tracks.figures.clone(),

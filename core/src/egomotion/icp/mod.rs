@@ -22,12 +22,12 @@ mod tests;
 
 pub use config::{IcpConfig, MAX_LEVELS};
 
-use super::normal::Normal;
+use super::normal_equations::NormalEquations;
 use crate::{
     geometry::{StereoRig, Transform},
     image::View,
 };
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use pyramid::Pyramid;
 
 /// Fewest pairs a motion is sought with.
@@ -136,7 +136,7 @@ pub fn track(
         for _ in 0..config.steps {
             report.steps += 1;
             let sums = pairing.sums(&t_previous_current, disparity_px, map);
-            let Some(step) = sums.normal.solve().filter(|_| sums.pairs >= PAIRS_MIN) else { break };
+            let Some(step) = sums.equations.solve().filter(|_| sums.pairs >= PAIRS_MIN) else { break };
             t_previous_current = t_previous_current.retract(step);
             if step.iter().all(|part| part.abs() < STEP_MIN) {
                 break;
@@ -146,7 +146,7 @@ pub fn track(
             let sums = pairing.sums(&t_previous_current, disparity_px, map);
             (report.points, report.pairs) = (sums.points, sums.pairs);
             report.residual_rms_m = libm::sqrt(sums.squared_m2 / f64::from(sums.pairs.max(1)));
-            report.held = sums.normal.held_share();
+            report.held = sums.equations.min_eigen_share();
             report.t_current_previous = t_previous_current.inverse();
             report.status = judge(config, &report);
         }
@@ -184,8 +184,8 @@ struct Pairing<'c> {
 }
 
 /// Sums over the pairs of a level.
-struct Sums {
-    normal: Normal,
+struct PairSums {
+    equations: NormalEquations,
     points: u32,
     pairs: u32,
     squared_m2: f64,
@@ -204,48 +204,46 @@ impl<'c> Pairing<'c> {
     }
 
     /// Sums of the point-to-plane error's normal equations, row by row.
-    fn sums(&self, t_previous_current: &Transform, disparity_px: View<'_, f32>, map: &MapPicture<'_>) -> Sums {
+    fn sums(&self, t_previous_current: &Transform, disparity_px: View<'_, f32>, map: &MapPicture<'_>) -> PairSums {
         let rig = self.rig;
-        let mut sums = Sums { normal: Normal::ZERO, points: 0, pairs: 0, squared_m2: 0.0 };
+        let mut sums = PairSums { equations: NormalEquations::ZERO, points: 0, pairs: 0, squared_m2: 0.0 };
         let middle = |at: usize| (at as f64 + 0.5) * self.stride_px - 0.5;
         for (v, row) in disparity_px.rows().enumerate() {
-            let slope_v = (middle(v) - rig.center_v_px) / rig.focal_px;
             for (u, &disparity) in row.iter().enumerate().filter(|(_, disparity)| **disparity > 0.0) {
                 let depth = rig.focal_baseline_px_m() / f64::from(disparity);
-                let slope_u = (middle(u) - rig.center_u_px) / rig.focal_px;
-                let carried = t_previous_current.transform_point(Point3::new(slope_u * depth, slope_v * depth, depth));
-                let Some((surface, normal)) = self.partner(&carried.coords, map) else { continue };
+                let point = rig.ray(middle(u), middle(v)).map(|part| part * depth);
+                let moved = Vector3::from(t_previous_current.transform_point(point));
+                let Some((surface, normal)) = self.associate(&moved, map) else { continue };
                 sums.points += 1;
-                let away = carried.coords - surface;
+                let away = moved - surface;
                 let noise_m = self.noise_per_m * depth * depth;
                 let reach_m = (self.distance_m + 3.0 * noise_m) * self.widening;
                 if away.dot(&away) > reach_m * reach_m {
                     continue;
                 }
                 let distance_m = normal.dot(&away);
-                let turn = carried.coords.cross(&normal);
+                let turn = moved.cross(&normal);
                 let weight = 1.0 / (NOISE_M * NOISE_M + noise_m * noise_m);
                 sums.pairs += 1;
                 sums.squared_m2 += distance_m * distance_m;
-                sums.normal.add_row([turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], distance_m, weight);
+                sums.equations.add_row([turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], distance_m, weight);
             }
         }
         sums
     }
 
     /// The map's surface at the pixel a point falls on, and its normal.
-    fn partner(&self, point: &Vector3<f64>, map: &MapPicture<'_>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    fn associate(&self, point: &Vector3<f64>, map: &MapPicture<'_>) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let rig = self.rig;
-        let positive = point.z > 0.0;
-        let (u, v) = (rig.focal_px * point.x / point.z + rig.center_u_px, rig.focal_px * point.y / point.z + rig.center_v_px);
+        let seen = rig.project((*point).into())?;
+        let (u, v) = (seen.u_left_px + rig.center_u_px, seen.v_px + rig.center_v_px);
         // Rounded down half a pixel further on: the nearest pixel. Casts hold at the ends, and a negative one is none.
-        if !(positive && u >= -0.5 && v >= -0.5) {
+        if !(u >= -0.5 && v >= -0.5) {
             return None;
         }
         let (u, v) = ((u + 0.5) as usize, (v + 0.5) as usize);
         let depth = f64::from(map.depth_m.get(u, v).filter(|depth| *depth > 0.0)?);
         let normal = map.normal.get(u, v)?.map(|part| f64::from(part) / NORMAL_ONE);
-        let slopes = [(u as f64 - rig.center_u_px) / rig.focal_px, (v as f64 - rig.center_v_px) / rig.focal_px];
-        Some((Vector3::new(slopes[0] * depth, slopes[1] * depth, depth), Vector3::from(normal)))
+        Some((Vector3::from(rig.ray(u as f64, v as f64)) * depth, Vector3::from(normal)))
     }
 }

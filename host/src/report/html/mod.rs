@@ -6,6 +6,7 @@ mod memory;
 mod objects;
 mod pictures;
 mod reference;
+mod rig;
 mod time;
 mod trajectory;
 
@@ -48,6 +49,7 @@ pub fn write(out: &mut impl Write, run: &RunRecord) -> io::Result<()> {
         (memory::section(run))
         (time::section(run))
         (health::section(run))
+        (rig::section(run))
         (configuration(run))
     };
     out.write_all(page(&format!("dynvox: {}", run.header.name), &content).into_string().as_bytes())

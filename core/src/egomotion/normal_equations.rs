@@ -1,18 +1,17 @@
 //! The normal equations of a reprojection error, and their solution.
 //!
-//! The motion is moved by a small rotation vector and translation on its left: T <- retract(step) T. Per point three different rows: u in
+//! The motion is moved by a small rotation vector and translation on its left: T <- T.retract(step). Per point three different rows: u in
 //! the left image, u in the right one, and v, which both images share and which therefore counts twice.
 
-use super::points::{DEPTH_MIN_M, Point};
-use crate::geometry::{StereoRig, Transform};
-use nalgebra::Vector3;
+use super::points::Point;
+use crate::geometry::{StereoObservation, StereoRig, Transform};
 
 const N: usize = 6;
 /// A pivot below this share of its diagonal is none: the motion is not determined.
 const PIVOT_MIN: f64 = 1e-12;
 
 /// Sums of weighted J'J (lower half) and J'r over points, in the order of the points.
-pub(super) struct Normal {
+pub(super) struct NormalEquations {
     matrix: [[f64; N]; N],
     vector: [f64; N],
     /// Sum of weighted squared errors, px².
@@ -22,54 +21,48 @@ pub(super) struct Normal {
 }
 
 /// A motion with its rotation as a matrix.
-pub(super) struct Posed {
-    rotation: nalgebra::Matrix3<f64>,
-    translation: Vector3<f64>,
+pub(super) struct RotationMatrix {
+    rows: [[f64; 3]; 3],
+    translation_m: [f64; 3],
 }
 
-impl Posed {
+impl RotationMatrix {
     pub(super) fn new(motion: &Transform) -> Self {
-        Self {
-            rotation: motion.quaternion().to_rotation_matrix().into_inner(),
-            translation: motion.translation(),
-        }
+        Self { rows: motion.rotation_matrix(), translation_m: motion.translation_m }
     }
 
-    /// Where a point is in the current camera; `None` behind it.
-    fn carry(&self, point: &Point) -> Option<[f64; 3]> {
-        let (r, t, [x, y, z]) = (&self.rotation, &self.translation, point.xyz);
-        let depth = r.m31 * x + r.m32 * y + r.m33 * z + t.z;
-        (depth > DEPTH_MIN_M).then(|| [r.m11 * x + r.m12 * y + r.m13 * z + t.x, r.m21 * x + r.m22 * y + r.m23 * z + t.y, depth])
+    /// Where a point is in the current camera.
+    fn transform(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let ([a, b, c], [tx, ty, tz]) = (self.rows, self.translation_m);
+        let row = |r: [f64; 3], t: f64| r[0] * x + r[1] * y + r[2] * z + t;
+        [row(a, tx), row(b, ty), row(c, tz)]
     }
 }
 
 /// Errors of one point: predicted minus seen, as u left, u right, v left, v right.
-fn residual([x, y, z]: [f64; 3], point: &Point, rig: &StereoRig) -> [f64; 4] {
-    let u = rig.focal_px * x / z;
-    let v = rig.focal_px * y / z;
-    [u - point.left[0], u - rig.focal_baseline_px_m() / z - point.right[0], v - point.left[1], v - point.right[1]]
+fn residual(predicted: &StereoObservation, point: &Point) -> [f64; 4] {
+    let StereoObservation { u_left_px, v_px, u_right_px } = *predicted;
+    [u_left_px - point.left[0], u_right_px - point.right[0], v_px - point.left[1], v_px - point.right[1]]
 }
 
-impl Normal {
+impl NormalEquations {
     pub(super) const ZERO: Self = Self { matrix: [[0.0; N]; N], vector: [0.0; N], error: 0.0, weight: 0.0 };
 
     /// Adds a point; one behind the camera adds nothing.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "both indices run below N, the length of every row")]
-    pub(super) fn add(&mut self, point: &Point, posed: &Posed, rig: &StereoRig, weight: impl Fn(f64) -> f64) {
-        let Some(p) = posed.carry(point) else { return };
+    pub(super) fn add(&mut self, point: &Point, motion: &RotationMatrix, rig: &StereoRig, weight: impl Fn(f64) -> f64) {
+        let p = motion.transform(point.xyz);
+        let Some(predicted) = rig.project(p) else { return };
         let [x, y, z] = p;
-        let [left, right, up_left, up_right] = residual(p, point, rig);
+        let [left, right, up_left, up_right] = residual(&predicted, point);
         let squared = left * left + right * right + up_left * up_left + up_right * up_right;
         let weight = weight(squared);
-        let per_m = rig.focal_px / z;
-        // Derivatives of the projection by the carried point, times those of the carried point by the step: a cross product and itself.
-        let row = |slope: f64| {
-            let (a, c) = (per_m, -per_m * slope);
-            [c * y, a * z - c * x, -a * y, a, 0.0, c]
-        };
-        let (u_left, u_right) = (row(x / z), row((x - rig.baseline_m) / z));
-        let (b, c) = (per_m, -per_m * y / z);
+        // Derivatives of the projection by the carried point, times those of the carried point by
+        // the step: a cross product and itself.
+        let [u_left, v, u_right] = rig.project_jacobian(p);
+        let row = |[a, _, c]: [f64; 3]| [c * y, a * z - c * x, -a * y, a, 0.0, c];
+        let (u_left, u_right, [_, b, c]) = (row(u_left), row(u_right), v);
         let v = [c * y - b * z, -c * x, b * x, 0.0, b, c];
         let both = up_left + up_right;
         for i in 0..N {
@@ -98,7 +91,7 @@ impl Normal {
 
     /// How well the translation held worst is held, as a share of what rows that all point its way would do; a bound from below, from the
     /// trace of the translation's covariance. 0 where the rows do not determine a motion.
-    pub(super) fn held_share(&self) -> f64 {
+    pub(super) fn min_eigen_share(&self) -> f64 {
         let variance = |axis: usize| {
             let unit = core::array::from_fn(|at| if at == axis { 1.0 } else { 0.0 });
             self.solve_for(unit).and_then(|solution| solution.get(axis).copied())

@@ -1,0 +1,98 @@
+//! A disparity offset planted in real pictures, found from their own matches.
+
+use crate::{
+    Capacity, Serial,
+    egomotion::{Egomotion, EgomotionConfig, Estimator},
+    geometry::{StereoRig, Transform},
+    image::View,
+    memory::{Carver, SLAB_ALIGN},
+    rectify::self_calibration::{RigConfig, SelfCalibration, SelfCalibrationReport},
+    scene_flow::{FlowMatcher, SceneFlowConfig},
+};
+use std::{
+    path::{Path, PathBuf},
+    println, vec,
+    vec::Vec,
+};
+
+const FRAMES: usize = 31;
+/// The rig of KITTI odometry 06.
+const RIG: StereoRig = StereoRig {
+    focal_px: 707.0912,
+    center_u_px: 601.8873,
+    center_v_px: 183.1104,
+    baseline_m: 379.8145 / 707.0912,
+};
+
+/// A grey picture, row by row, and its width and height.
+type Grey = (Vec<u8>, usize, usize);
+
+fn sequence() -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    std::env::var_os("DYNVOX_DATA").map_or_else(beside, PathBuf::from).join("kitti-odometry/sequences/06")
+}
+
+fn grey(camera: &str, frame: usize) -> Option<Grey> {
+    let picture = image::open(sequence().join(camera).join(std::format!("{frame:06}.png"))).ok()?.into_luma8();
+    let (width, height) = picture.dimensions();
+    Some((picture.into_raw(), width as usize, height as usize))
+}
+
+/// The picture moved to the right by `by_px`, with cubic interpolation.
+fn shifted((pixels, width, height): Grey, by_px: f64) -> Grey {
+    let whole = (-by_px).floor();
+    let t = -by_px - whole;
+    let weights = [
+        -0.5 * t + t * t - 0.5 * t * t * t,
+        1.0 - 2.5 * t * t + 1.5 * t * t * t,
+        0.5 * t + 2.0 * t * t - 1.5 * t * t * t,
+        0.5 * t * t * (t - 1.0),
+    ];
+    let moved = |at: usize| {
+        let (row, column) = (at / width, (at % width) as i64 + whole as i64 - 1);
+        let pixel = |k: i64| f64::from(pixels[row * width + (column + k).clamp(0, width as i64 - 1) as usize]);
+        let sum: f64 = (0..4).zip(weights).map(|(k, weight)| weight * pixel(k)).sum();
+        sum.round().clamp(0.0, 255.0) as u8
+    };
+    ((0..width * height).map(moved).collect(), width, height)
+}
+
+/// What is found with the right pictures moved by `by_px`, and how far the camera drove, m.
+fn driven(by_px: f64) -> Option<(SelfCalibrationReport, f64)> {
+    let capacity = Capacity::ONBOARD;
+    let bytes = FlowMatcher::bytes(&capacity) + Estimator::bytes(&capacity);
+    let mut slab = vec![0; bytes + SLAB_ALIGN];
+    let mut carver = Carver::new(&mut slab, bytes).unwrap();
+    let (mut matcher, mut estimator) = (FlowMatcher::new_in(&capacity, &mut carver), Estimator::new_in(&capacity, &mut carver));
+    let (mut camera, mut calibration) = (Egomotion::default(), SelfCalibration::new(&RigConfig::default()));
+    for frame in 0..FRAMES {
+        let (left, right) = (grey("image_0", frame)?, shifted(grey("image_1", frame)?, by_px));
+        let images = [&left, &right].map(|(pixels, width, height)| View::new(pixels, *width, *height).unwrap());
+        matcher.push(&SceneFlowConfig::default(), images[0], images[1], &Serial);
+        matcher.correct(calibration.correction().for_rig(&RIG));
+        if frame > 0 {
+            let estimate = camera.step(&EgomotionConfig::default(), &RIG, matcher.bucketed(), &mut estimator);
+            let observations = matcher
+                .bucketed()
+                .map(|m| [(m.previous_left, m.previous_right), (m.current_left, m.current_right)].map(|(l, r)| RIG.observation(l, r)));
+            calibration.update(&RIG, observations, &estimate.t_current_previous.unwrap());
+        }
+    }
+    let way: &Transform = camera.t_world_camera();
+    Some((calibration.report(), way.distance_m()))
+}
+
+#[test]
+fn an_offset_planted_in_real_pictures_is_found_and_the_way_keeps_its_length() {
+    let Some((own, way_m)) = driven(0.0) else {
+        println!("skipped: kitti-odometry/06");
+        return;
+    };
+    for planted in [-0.7, 0.7] {
+        let (found, planted_way_m) = driven(planted).unwrap();
+        println!("{planted}: {found:?}; {planted_way_m} m for {way_m} m");
+        assert!((found.offset_px - own.offset_px - planted).abs() < 0.05, "{planted}: {found:?}, {own:?}");
+        assert!((found.applied_offset_px - found.offset_px).abs() < 0.01);
+        assert!((planted_way_m / way_m - 1.0).abs() < 0.01, "{planted_way_m} m for {way_m} m: 3 per cent without correction");
+    }
+}

@@ -1,0 +1,197 @@
+//! An information filter over `P` parameters of the rig, and the sums a frame gives it.
+//!
+//! A frame's sums are the normal equations of its reprojection errors by the camera's motion (six
+//! columns), the parameters (`P`) and the error itself (one): `C = 6 + P + 1` columns. Eliminating
+//! the motion leaves what the frame says about the parameters alone (a Schur complement).
+
+use crate::state::Visitor;
+
+/// Columns of the camera's motion: rotation, translation.
+pub(super) const MOTION: usize = 6;
+/// A pivot below this share of its diagonal leaves the motion undetermined.
+const PIVOT_MIN: f64 = 1e-12;
+/// Share of what was known that a frame leaves: half is forgotten after 69 frames.
+const MEMORY: f64 = 0.99;
+
+/// Lower half of the sums of weighted products of columns.
+pub(super) struct Sums<const C: usize>([[f64; C]; C]);
+
+/// What a frame says about the parameters: `S` and `q` of `S step = -q`.
+pub(super) struct FrameInformation<const P: usize> {
+    pub matrix: [[f64; P]; P],
+    pub vector: [f64; P],
+}
+
+#[expect(clippy::indexing_slicing, reason = "all indices run below C or P, the lengths of all rows")]
+impl<const C: usize> Sums<C> {
+    pub(super) const ZERO: Self = Self([[0.0; C]; C]);
+
+    /// Adds a row of whitened derivatives, the error in its last column.
+    #[inline]
+    pub(super) fn add(&mut self, row: &[f64; C], weight: f64) {
+        for i in 0..C {
+            let weighted = weight * row[i];
+            for j in 0..=i {
+                self.0[i][j] += weighted * row[j];
+            }
+        }
+    }
+
+    /// Eliminates the motion. `None` where the matches do not determine it, or where a sum is not
+    /// finite.
+    pub(super) fn without_motion<const P: usize>(&self) -> Option<FrameInformation<P>> {
+        let mut lower = self.0;
+        for k in 0..MOTION {
+            let pivot = lower[k][k];
+            // False for NaN as well.
+            if !(pivot > PIVOT_MIN * self.0[k][k] && pivot < f64::INFINITY) {
+                return None;
+            }
+            for i in k + 1..C {
+                let factor = lower[i][k] / pivot;
+                for j in k + 1..=i {
+                    lower[i][j] -= factor * lower[j][k];
+                }
+            }
+        }
+        let at = |i: usize, j: usize| if i > j { lower[MOTION + i][MOTION + j] } else { lower[MOTION + j][MOTION + i] };
+        let matrix = core::array::from_fn(|i| core::array::from_fn(|j| at(i, j)));
+        let vector = core::array::from_fn(|i| lower[C - 1][MOTION + i]);
+        let frame = FrameInformation { matrix, vector };
+        let finite = frame.matrix.as_flattened().iter().chain(&frame.vector).all(|value| value.is_finite());
+        finite.then_some(frame)
+    }
+}
+
+/// What is known of the parameters: `L`, `e`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Information<const P: usize> {
+    matrix: [[f64; P]; P],
+    vector: [f64; P],
+}
+
+/// What stays the same of a filter, px.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior<const P: usize> {
+    /// Where the parameters are before the first frame.
+    pub mean: [f64; P],
+    /// How far from there they may be.
+    pub sigma: [f64; P],
+    /// How far one frame may be off in what the model does not describe.
+    pub frame_sigma: [f64; P],
+}
+
+#[expect(clippy::indexing_slicing, reason = "all indices run below P, the length of all rows")]
+impl<const P: usize> Information<P> {
+    pub(super) const NONE: Self = Self { matrix: [[0.0; P]; P], vector: [0.0; P] };
+
+    /// Takes a frame in, linearised at `at`. With `F` the variances a frame may be off by, it counts
+    /// as `(S⁻¹ + F)⁻¹`, which is `S - S D (I + D S D)⁻¹ D S` with `D² = F` and needs no inverse of `S`.
+    pub(super) fn take(&mut self, prior: &Prior<P>, frame: &FrameInformation<P>, at: [f64; P]) -> Option<()> {
+        let (s, d) = (&frame.matrix, prior.frame_sigma);
+        let damped: [[f64; P]; P] =
+            core::array::from_fn(|i| core::array::from_fn(|j| d[i] * s[i][j] * d[j] + if i == j { 1.0 } else { 0.0 }));
+        let reduce = |right: [f64; P]| -> Option<[f64; P]> {
+            let inner = solve(&damped, core::array::from_fn(|i| d[i] * right[i]))?;
+            Some(core::array::from_fn(|i| right[i] - (0..P).fold(0.0, |sum, j| sum + s[i][j] * d[j] * inner[j])))
+        };
+        let mut matrix = [[0.0; P]; P];
+        for (j, column) in matrix.iter_mut().enumerate() {
+            // Columns of a symmetric matrix stand for its rows.
+            *column = reduce(core::array::from_fn(|i| s[i][j]))?;
+        }
+        let target: [f64; P] = core::array::from_fn(|i| (0..P).fold(-frame.vector[i], |sum, j| sum + s[i][j] * at[j]));
+        let vector = reduce(target)?;
+        for i in 0..P {
+            self.vector[i] = MEMORY * self.vector[i] + vector[i];
+            for j in 0..P {
+                self.matrix[i][j] = MEMORY * self.matrix[i][j] + 0.5 * (matrix[i][j] + matrix[j][i]);
+            }
+        }
+        Some(())
+    }
+
+    /// The parameters and the error of the first one, px.
+    pub(super) fn estimate(&self, prior: &Prior<P>) -> Option<([f64; P], f64)> {
+        let weight = |i: usize| 1.0 / (prior.sigma[i] * prior.sigma[i]);
+        let matrix: [[f64; P]; P] =
+            core::array::from_fn(|i| core::array::from_fn(|j| self.matrix[i][j] + if i == j { weight(i) } else { 0.0 }));
+        let parameters = solve(&matrix, core::array::from_fn(|i| self.vector[i] + weight(i) * prior.mean[i]))?;
+        let variance = solve(&matrix, core::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 }))?;
+        Some((parameters, libm::sqrt(variance[0])))
+    }
+
+    /// Visits every field.
+    pub(super) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { matrix, vector } = self;
+        visitor.f64s(matrix.as_flattened_mut());
+        visitor.f64s(vector);
+    }
+}
+
+/// What a positive definite matrix turns into `right`; `None` where it is not positive definite.
+#[expect(clippy::indexing_slicing, reason = "all indices run below P, the length of all rows")]
+fn solve<const P: usize>(matrix: &[[f64; P]; P], right: [f64; P]) -> Option<[f64; P]> {
+    let (mut upper, mut solution) = (*matrix, right);
+    for k in 0..P {
+        // False for NaN as well.
+        if !(upper[k][k] > 0.0 && upper[k][k] < f64::INFINITY) {
+            return None;
+        }
+        for i in k + 1..P {
+            let factor = upper[i][k] / upper[k][k];
+            for j in k..P {
+                upper[i][j] -= factor * upper[k][j];
+            }
+            solution[i] -= factor * solution[k];
+        }
+    }
+    for k in (0..P).rev() {
+        for j in k + 1..P {
+            solution[k] -= upper[k][j] * solution[j];
+        }
+        solution[k] /= upper[k][k];
+    }
+    solution.iter().all(|value| value.is_finite()).then_some(solution)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_positive_definite_matrix_is_solved_and_another_refused() {
+        let matrix = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.2], [0.5, -0.2, 2.0]];
+        let [x, y, z] = solve(&matrix, [4.0 + 2.0 + 1.5, 1.0 + 6.0 - 0.6, 0.5 - 0.4 + 6.0]).unwrap();
+        assert!((x - 1.0).abs() < 1e-12 && (y - 2.0).abs() < 1e-12 && (z - 3.0).abs() < 1e-12);
+        assert_eq!(solve(&[[1.0, 2.0], [2.0, 1.0]], [1.0, 1.0]), None);
+        assert_eq!(solve(&[[f64::NAN]], [1.0]), None);
+    }
+
+    #[test]
+    fn a_frame_counts_no_more_than_what_it_may_be_off_by() {
+        let prior = Prior { mean: [0.0], sigma: [0.5], frame_sigma: [0.1] };
+        let mut information = Information::NONE;
+        // A frame that is certain of .4 px, were it not for what the model lacks.
+        let frame = FrameInformation { matrix: [[1e9]], vector: [-0.4e9] };
+        information.take(&prior, &frame, [0.0]).unwrap();
+        let ([found], sigma) = information.estimate(&prior).unwrap();
+        assert!((sigma - 0.098).abs() < 1e-3 && (found - 0.4).abs() < 0.02, "{found} {sigma}");
+        let start = Prior { mean: [0.7], ..prior };
+        assert_eq!(Information::NONE.estimate(&start).unwrap(), ([0.7], 0.5), "before the first frame the prior is all there is");
+    }
+
+    #[test]
+    fn motion_is_eliminated_or_said_to_be_undetermined() {
+        let mut sums = Sums::<8>::ZERO;
+        assert!(sums.without_motion::<1>().is_none());
+        for k in 0..7 {
+            let mut row = [0.0; 8];
+            (row[k], row[6], row[7]) = (1.0, 1.0, if k == 6 { 3.0 } else { 0.0 });
+            sums.add(&row, 1.0);
+        }
+        // Six rows are used up by the motion; the seventh is left: parameter 1, error 3.
+        let left = sums.without_motion::<1>().unwrap();
+        assert!((left.matrix[0][0] - 1.0).abs() < 1e-12 && (left.vector[0] - 3.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,163 @@
+//! A camera that drives past points seen with noise, through a rig whose disparities are off by what
+//! the tests choose.
+
+use super::*;
+use crate::{random::Random, state::Hasher};
+use std::vec::Vec;
+
+const RIG: StereoRig = StereoRig { focal_px: 720.0, center_u_px: 610.0, center_v_px: 175.0, baseline_m: 0.54 };
+/// Forward a little less than a metre, turning a little.
+const DRIVING: ([f64; 3], [f64; 3]) = ([0.001, 0.01, -0.002], [0.02, -0.01, -0.9]);
+const NOISE_PX: f64 = 0.2;
+const FAR_M: f64 = 40.0;
+
+/// Points of a street at most `far_m` away, none nearer than 5 m or, of a far scene, 200 m, seen before and after a motion by a rig to whose
+/// disparities `error` must be added.
+fn street(error: &DisparityCorrection, motion: &Transform, far_m: f64, random: &mut Random) -> Vec<[StereoObservation; 2]> {
+    let mut uniform = move |low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / f64::from(u32::MAX);
+    let columns = error.for_rig(&RIG);
+    (0..1_500)
+        .filter_map(|_| {
+            let z = 1.0 / uniform(1.0 / far_m, if far_m > FAR_M { 0.005 } else { 0.2 });
+            let [x, y, _] = [uniform(-0.8, 0.8) * z, uniform(-0.2, 0.2) * z, z];
+            let seen = [[x, y, z], motion.transform_point([x, y, z])].map(|point| {
+                // Of three uniform numbers: nearly normal, and never far.
+                let mut noise = |sigma: f64| sigma * (uniform(-1.0, 1.0) + uniform(-1.0, 1.0) + uniform(-1.0, 1.0));
+                let exact = RIG.project(point)?;
+                let column = (exact.u_right_px + RIG.center_u_px) as f32;
+                Some(StereoObservation {
+                    u_left_px: exact.u_left_px + noise(NOISE_PX),
+                    v_px: exact.v_px + noise(NOISE_PX * 0.7),
+                    u_right_px: f64::from(columns.uncorrected(column)) - RIG.center_u_px + noise(NOISE_PX),
+                })
+            });
+            Some([seen[0]?, seen[1]?])
+        })
+        .collect()
+}
+
+/// The filter after `frames` frames.
+fn driven(config: &RigConfig, error: &DisparityCorrection, motion: ([f64; 3], [f64; 3]), far_m: f64, frames: usize) -> SelfCalibration {
+    let (mut random, mut calibration) = (Random::new(11), SelfCalibration::new(config));
+    let motion = Transform::new(motion.0, motion.1);
+    for _ in 0..frames {
+        let correction = calibration.correction().for_rig(&RIG);
+        let corrected = |seen: StereoObservation| {
+            let column = (seen.u_right_px + RIG.center_u_px) as f32;
+            StereoObservation { u_right_px: f64::from(correction.corrected(column)) - RIG.center_u_px, ..seen }
+        };
+        let observations = street(error, &motion, far_m, &mut random).into_iter().map(|pair| pair.map(corrected));
+        calibration.update(&RIG, observations, &motion);
+    }
+    calibration
+}
+
+fn offset(offset_px: f64) -> DisparityCorrection {
+    DisparityCorrection { offset_px, ..DisparityCorrection::default() }
+}
+
+#[test]
+fn an_offset_is_found_and_taken_out() {
+    for planted in [-1.0, -0.7, -0.3, 0.3, 0.7] {
+        let calibration = driven(&RigConfig::default(), &offset(planted), DRIVING, FAR_M, 30);
+        let report = calibration.report();
+        assert!(report.known && (report.offset_px - planted).abs() < 0.05, "{planted}: {report:?}");
+        assert!((report.offset_px - planted).abs() < 4.0 * report.offset_sigma_px, "{planted}: {report:?}");
+        assert!((report.applied_offset_px - planted).abs() < 0.05, "{planted}: {report:?}");
+        assert_eq!(calibration.found().offset_px, report.offset_px);
+    }
+}
+
+#[test]
+fn what_the_lenses_left_at_the_sides_is_found() {
+    let error = DisparityCorrection { offset_px: 0.2, slope_px: 0.4, quartic_px: 1.2 };
+    let found = driven(&RigConfig::default(), &error, DRIVING, FAR_M, 60).found();
+    assert!((found.slope_px - 0.4).abs() < 0.15 && (found.quartic_px - 1.2).abs() < 0.3, "{found:?}");
+}
+
+#[test]
+fn a_sound_rig_is_left_alone() {
+    let report = driven(&RigConfig::default(), &offset(0.0), DRIVING, FAR_M, 60).report();
+    assert!(report.known && report.offset_px.abs() < 0.05 && report.applied_offset_px == 0.0, "{report:?}");
+    assert_eq!(report.state(), CalibrationState::Sound);
+}
+
+#[test]
+fn standing_turning_on_the_spot_and_a_far_scene_say_nothing() {
+    for (motion, far_m) in [(([0.0; 3], [0.0; 3]), FAR_M), (([0.0, 0.05, 0.0], [0.0; 3]), FAR_M), (DRIVING, 4_000.0)] {
+        let calibration = driven(&RigConfig::default(), &offset(0.7), motion, far_m, 40);
+        let report = calibration.report();
+        assert!(!report.known && calibration.correction().is_zero(), "{motion:?}: {report:?}");
+        assert!(report.offset_sigma_px > 0.2, "{report:?}");
+    }
+}
+
+#[test]
+fn the_correction_changes_gently() {
+    let mut random = Random::new(11);
+    let (mut calibration, motion) = (SelfCalibration::new(&RigConfig::default()), Transform::new(DRIVING.0, DRIVING.1));
+    for _ in 0..20 {
+        let before = calibration.correction();
+        calibration.update(&RIG, street(&offset(1.0), &motion, FAR_M, &mut random), &motion);
+        let now = calibration.correction();
+        assert!((now.offset_px - before.offset_px).abs() <= CHANGE_MAX_PX + 1e-12, "{before:?} {now:?}");
+    }
+}
+
+#[test]
+fn what_is_only_to_be_reported_is_not_applied_and_what_is_off_not_sought() {
+    let with = |self_calibration| RigConfig { self_calibration, ..RigConfig::default() };
+    let reported = driven(&with(SelfCalibrationMode::Report), &offset(0.7), DRIVING, FAR_M, 30);
+    assert!(reported.correction().is_zero() && (reported.report().offset_px - 0.7).abs() < 0.05);
+    assert_eq!(reported.report().state(), CalibrationState::Off);
+    let off = driven(&with(SelfCalibrationMode::Off), &offset(0.7), DRIVING, FAR_M, 30);
+    assert_eq!(off.report(), SelfCalibrationReport::default());
+}
+
+#[test]
+fn a_run_begins_where_another_ended() {
+    let start = driven(&RigConfig::default(), &offset(0.7), DRIVING, FAR_M, 30).found();
+    let config = RigConfig { disparity_correction: start, ..RigConfig::default() };
+    let again = SelfCalibration::new(&config);
+    assert_eq!(again.correction(), start);
+    assert_eq!(again.found(), start, "until it knows better");
+    let report = driven(&config, &offset(0.7), DRIVING, FAR_M, 30).report();
+    assert!((report.offset_px - 0.7).abs() < 0.05, "{report:?}");
+}
+
+#[test]
+fn observations_that_make_no_sense_change_nothing() {
+    let motion = Transform::new(DRIVING.0, DRIVING.1);
+    let mut calibration = SelfCalibration::new(&RigConfig::default());
+    let bad = [f64::NAN, f64::INFINITY, -1e300, 1e300].map(|value| {
+        let seen = StereoObservation { u_left_px: value, v_px: value, u_right_px: 3.0 };
+        [seen, seen]
+    });
+    calibration.update(&RIG, bad, &motion);
+    calibration.update(&RIG, [], &motion);
+    assert_eq!(calibration.report().frames, 0);
+    let mut random = Random::new(1);
+    let good = street(&offset(0.5), &motion, FAR_M, &mut random);
+    let mut mixed = calibration.clone();
+    calibration.update(&RIG, good.clone(), &motion);
+    mixed.update(&RIG, good.into_iter().chain(bad), &motion);
+    let digest = |calibration: &mut SelfCalibration| {
+        let mut hasher = Hasher::default();
+        calibration.visit(&mut hasher);
+        hasher.0.finish()
+    };
+    assert_eq!(digest(&mut calibration), digest(&mut mixed));
+    assert_eq!(calibration.report().frames, 1);
+}
+
+#[test]
+fn settings_out_of_range_are_named() {
+    let mut problems = crate::problem::Problems::new();
+    RigConfig::default().validate(&mut problems);
+    assert!(problems.is_empty());
+    let wrong = DisparityCorrection { offset_px: 6.0, slope_px: f64::NAN, quartic_px: -9.0 };
+    RigConfig { baseline_scale: 0.0, disparity_correction: wrong, ..RigConfig::default() }.validate(&mut problems);
+    let keys: Vec<_> = problems.iter().map(|problem| problem.key).collect();
+    let part = |name: &str| std::format!("rig.disparity_correction.{name}_px");
+    assert_eq!(keys, ["rig.baseline_scale", &part("offset"), &part("slope"), &part("quartic")]);
+}

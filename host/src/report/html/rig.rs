@@ -1,0 +1,26 @@
+//! What the run found left of the calibration's error.
+
+use super::{frames, series};
+use crate::report::chart::{COLOURS, lines};
+use crate::report::rig::{is_warning, sentence};
+use crate::run::RunRecord;
+use maud::{Markup, html};
+
+pub fn section(run: &RunRecord) -> Markup {
+    let chart = lines(
+        &frames(run),
+        &[
+            series(run, "size of what was found", COLOURS[0], |row| row.report.self_calibration.offset_px.abs()),
+            series(run, "size of what was taken out", COLOURS[3], |row| row.report.self_calibration.applied_offset_px.abs()),
+        ],
+        "px",
+        0.1,
+    );
+    html! {
+        section {
+            h2 { "Disparity offset of the rig" }
+            p.soft.small { @if is_warning(run) { b { (sentence(run)) "." } } @else { (sentence(run)) "." } }
+            (chart)
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What a run found out about its rig: figures, a sentence, and a file to begin another run with.
+
+use crate::run::RunRecord;
+use dynvox_core::rectify::self_calibration::{CalibrationState, SelfCalibrationReport};
+use serde::Serialize;
+
+/// The rig's part of `summary.json`.
+#[derive(Debug, Serialize)]
+pub struct RigSummary {
+    /// What must be added to disparities in the middle of the image, px.
+    disparity_offset_px: f64,
+    disparity_offset_sigma_px: f64,
+    /// Growth of that towards the right side, px there.
+    disparity_slope_px: f64,
+    /// Growth of that with the fourth power of the distance from the middle, px at the sides.
+    disparity_quartic_px: f64,
+    /// Frames that said something about it.
+    disparity_frames: u32,
+    /// `sound`, `off` or `recalibrate`.
+    calibration: &'static str,
+    /// Whether it was taken out of depth and motion.
+    corrected: bool,
+}
+
+/// What is known after the last frame.
+fn found(run: &RunRecord) -> Option<SelfCalibrationReport> {
+    run.frames.last().map(|row| row.report.self_calibration).filter(|report| report.known)
+}
+
+/// The figures; `None` where too little moved to tell.
+pub fn summary(run: &RunRecord) -> Option<RigSummary> {
+    found(run).map(|report| RigSummary {
+        disparity_offset_px: report.offset_px,
+        disparity_offset_sigma_px: report.offset_sigma_px,
+        disparity_slope_px: report.slope_px,
+        disparity_quartic_px: report.quartic_px,
+        disparity_frames: report.frames,
+        calibration: match report.state() {
+            CalibrationState::Sound => "sound",
+            CalibrationState::Off => "off",
+            CalibrationState::Recalibrate => "recalibrate",
+        },
+        corrected: report.corrected,
+    })
+}
+
+/// What was found and what to do about it.
+pub fn sentence(run: &RunRecord) -> String {
+    let Some(report) = found(run) else {
+        return "disparity offset unknown: the camera has to move past something within about 30 m".to_owned();
+    };
+    let value = format!("{:+.3} px of disparity, sigma {:.3} px", report.offset_px, report.offset_sigma_px);
+    let done = if report.corrected { "taken out" } else { "not taken out: set rig.self_calibration=\"apply\"" };
+    match report.state() {
+        CalibrationState::Sound => format!("sound: {value}"),
+        CalibrationState::Off => format!("{value}, {done}; another run begins with it: --config calibration.toml"),
+        CalibrationState::Recalibrate => {
+            format!("{value}, {done}. Recalibrate the cameras: more than 1 px is more than they should be off")
+        }
+    }
+}
+
+/// Whether the sentence is a warning.
+pub fn is_warning(run: &RunRecord) -> bool {
+    found(run).is_some_and(|report| report.state() > CalibrationState::Sound)
+}
+
+/// Settings that begin another run with what was found; `None` where there is nothing to correct.
+pub fn calibration_toml(run: &RunRecord) -> Option<String> {
+    let found = run.frames.last()?.report.self_calibration.found().filter(|found| !found.is_zero())?;
+    Some(format!(
+        "# What must be added to the disparities of this rig, px, as a run over {} frames found it.\n\
+         # Another run of the same rig begins with it: dynvox run PATH --config calibration.toml\n\
+         [rig.disparity_correction]\noffset_px = {:.4}\nslope_px = {:.4}\nquartic_px = {:.4}\n",
+        run.frames.len(),
+        found.offset_px,
+        found.slope_px,
+        found.quartic_px
+    ))
+}
