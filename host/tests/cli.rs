@@ -3,7 +3,7 @@
 
 mod binary;
 
-use binary::{CALIB, dynvox, names, rig, said};
+use binary::{CALIB, dynvox, names, rig, output_text};
 use image::{GrayImage, Luma};
 use std::fs;
 use std::process::Output;
@@ -14,8 +14,8 @@ fn a_run_leaves_its_folder_and_json_alone_on_standard_output() {
     let root = TempDir::new().unwrap();
     rig(root.path(), 3);
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--json"]);
-    assert!(run.status.success(), "{}", said(&run));
-    assert_eq!(said(&run), "", "nothing but the summary");
+    assert!(run.status.success(), "{}", output_text(&run));
+    assert_eq!(output_text(&run), "", "nothing but the summary");
     let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
     assert_eq!(summary["frames"], 3);
     assert_eq!(summary["digest"].as_str().unwrap().len(), 16);
@@ -61,7 +61,7 @@ fn bad_input_fails_with_a_sentence_and_leaves_no_folder() {
     let fails = |args: &[&str], sentence: &str| {
         let run = dynvox(root.path(), &[&["run"], args, &["--out", "result"]].concat());
         assert_eq!(run.status.code(), Some(1), "{args:?}");
-        assert!(said(&run).contains("error: ") && said(&run).contains(sentence), "{args:?}: {}", said(&run));
+        assert!(output_text(&run).contains("error: ") && output_text(&run).contains(sentence), "{args:?}: {}", output_text(&run));
         assert_eq!(names(root.path()), ["rig"], "{args:?} left something behind");
     };
     let tiny = ["rig", "--profile", "tiny"];
@@ -98,11 +98,11 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
     fs::write(root.path().join("rig/calib.txt"), CALIB).unwrap();
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result"]);
     assert!(
-        said(&run).contains("do not fit profile tiny") && said(&run).contains("--profile small, or shrink the images with --scale 0.5")
+        output_text(&run).contains("do not fit profile tiny") && output_text(&run).contains("--profile small, or shrink the images with --scale 0.5")
     );
-    assert!(said(&run).contains("desktop") && said(&run).contains("path, s"), "the table is shown");
+    assert!(output_text(&run).contains("desktop") && output_text(&run).contains("path, s"), "the table is shown");
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--scale", "0.5", "--quiet"]);
-    assert!(run.status.success(), "black images are a value, not a failure: {}", said(&run));
+    assert!(run.status.success(), "black images are a value, not a failure: {}", output_text(&run));
 }
 
 #[test]
@@ -112,12 +112,12 @@ fn a_strict_run_fails_at_the_first_frame_that_affects_the_map_and_names_the_caus
     let run = |more: &[&str]| dynvox(root.path(), &[&["run", "--out", "result"], &street[..], more].concat());
     let strict = run(&["--strict"]);
     assert_eq!(strict.status.code(), Some(1));
-    assert!(said(&strict).contains("frame 0: map affected: ") && said(&strict).contains("block requests refused"), "{}", said(&strict));
+    assert!(output_text(&strict).contains("frame 0: map affected: ") && output_text(&strict).contains("block requests refused"), "{}", output_text(&strict));
     assert!(names(root.path()).is_empty(), "nothing half-written");
     let coarse = ["--set", "volume.voxel_size_m=0.2"];
     assert!(run(&[&["--strict"], &coarse[..]].concat()).status.success(), "a map that fits is harmed by nothing");
     let lenient = run(&["--overwrite"]);
-    assert!(lenient.status.success(), "{}", said(&lenient));
+    assert!(lenient.status.success(), "{}", output_text(&lenient));
 }
 
 #[test]
@@ -128,8 +128,8 @@ fn a_full_disk_is_warned_of_once_and_counted_and_the_run_goes_on() {
     let run = |out: &str, more: &[&str]| {
         let run =
             dynvox(root.path(), &[&["run", "--profile", "tiny", "--dynamic", "off", "--json", "--out", out], &street[..], more].concat());
-        assert!(run.status.success(), "{}", said(&run));
-        (serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap(), said(&run))
+        assert!(run.status.success(), "{}", output_text(&run));
+        (serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap(), output_text(&run))
     };
     let (kept, _) = run("kept", &["--keep-blocks"]);
     let (full, warning) = run("full", &["--stream-mib", "1"]);
@@ -153,7 +153,7 @@ fn more_resident_memory_than_allowed_ends_the_run_with_a_sentence() {
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--out", "result", "--rss-limit-mib", "1"]);
     if cfg!(target_os = "linux") {
         assert_eq!(run.status.code(), Some(1));
-        assert!(said(&run).contains("more than the 1048576 allowed") && said(&run).contains("--rss-limit-mib"), "{}", said(&run));
+        assert!(output_text(&run).contains("more than the 1048576 allowed") && output_text(&run).contains("--rss-limit-mib"), "{}", output_text(&run));
     }
 }
 
@@ -164,7 +164,7 @@ fn an_existing_folder_is_replaced_only_when_asked() {
     let args = ["run", "rig", "--profile", "tiny", "--quiet", "--out", "result"];
     assert!(dynvox(root.path(), &args).status.success());
     let again = dynvox(root.path(), &args);
-    assert!(!again.status.success() && said(&again).contains("--overwrite"));
+    assert!(!again.status.success() && output_text(&again).contains("--overwrite"));
     assert!(dynvox(root.path(), &[&args[..], &["--overwrite"]].concat()).status.success());
     assert_eq!(names(root.path()), ["result", "rig"]);
     assert!(dynvox(root.path(), &args[..5]).status.success(), "without --out");
@@ -186,7 +186,7 @@ fn inspect_tells_what_is_there_and_how_to_map_it() {
         [("rig/left", "is a part of the data set rig"), ("rig/left/000.png", "is a file"), ("nothing", "there is no data set at")]
     {
         let told = dynvox(root.path(), &["inspect", path]);
-        assert!(!told.status.success() && said(&told).contains(words), "{path}: {}", said(&told));
+        assert!(!told.status.success() && output_text(&told).contains(words), "{path}: {}", output_text(&told));
     }
     fs::create_dir_all(root.path().join("run")).unwrap();
     fs::write(root.path().join("run/summary.json"), "{}").unwrap();
@@ -215,14 +215,14 @@ fn a_written_street_is_mapped_as_a_kitti_folder() {
     let root = TempDir::new().unwrap();
     let small = ["--set", "street.width=160", "--set", "street.height=64"];
     let written = dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "3"], &small[..]].concat());
-    assert!(written.status.success(), "{}", said(&written));
+    assert!(written.status.success(), "{}", output_text(&written));
     let from_disk = dynvox(root.path(), &["run", "street", "--images", "colour", "--profile", "tiny", "--out", "a", "--json"]);
     let settings = [&small[..], &["--set", "street.frames=3"]].concat();
     let from_memory = dynvox(root.path(), &[&["run", "--profile", "tiny", "--out", "b", "--json"], &settings[..]].concat());
     let digest = |output: &Output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["digest"].clone();
     assert_eq!(digest(&from_disk), digest(&from_memory), "PNG files lose nothing");
     let refused = dynvox(root.path(), &["synth", "--out", "x", "--set", "street.width=1"]);
-    assert!(!refused.status.success() && said(&refused).contains("width") && !root.path().join("x").exists(), "{}", said(&refused));
+    assert!(!refused.status.success() && output_text(&refused).contains("width") && !root.path().join("x").exists(), "{}", output_text(&refused));
 }
 
 #[test]
@@ -234,7 +234,7 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
     assert!(told.contains("LiDAR scans of 4 frames") && told.contains("dynvox run street --sequence 00 --evaluate lidar"), "{told}");
     let run = |args: &[&str]| dynvox(root.path(), &[&["run", "--profile", "small", "--json"], args].concat());
     let figures = |output: &Output| {
-        assert!(output.status.success(), "{}", said(output));
+        assert!(output.status.success(), "{}", output_text(output));
         serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["lidar"].clone()
     };
     let from_disk = figures(&run(&["street", "--images", "colour", "--evaluate", "lidar", "--out", "a"]));
@@ -256,17 +256,17 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
     let points = |figures: &serde_json::Value| figures["static"]["fused"]["points"].as_u64().unwrap() / figures["frames"].as_u64().unwrap();
     assert!(points(&exact) > points(&from_disk), "{exact} {from_disk}");
     let refused = run(&["street", "--evaluate", "exact", "--out", "d"]);
-    assert!(said(&refused).contains("only the synthetic street has exact depth"), "{}", said(&refused));
+    assert!(output_text(&refused).contains("only the synthetic street has exact depth"), "{}", output_text(&refused));
     let refused = run(&["street", "--evaluate", "lidar", "--evaluation-delay", "9", "--out", "d"]);
-    assert!(said(&refused).contains("--evaluation-delay 9 reaches beyond the last"), "{}", said(&refused));
+    assert!(output_text(&refused).contains("--evaluation-delay 9 reaches beyond the last"), "{}", output_text(&refused));
     // A broken scan is nobody's business who does not ask for it.
     fs::write(root.path().join("street/sequences/00/velodyne/000001.bin"), [0; 17]).unwrap();
     assert!(run(&["street", "--images", "colour", "--out", "e"]).status.success());
     let refused = run(&["street", "--images", "colour", "--evaluate", "lidar", "--out", "f"]);
-    assert!(said(&refused).contains("000001.bin") && said(&refused).contains("whole number of points"), "{}", said(&refused));
+    assert!(output_text(&refused).contains("000001.bin") && output_text(&refused).contains("whole number of points"), "{}", output_text(&refused));
     rig(root.path(), 2);
     let refused = run(&["rig", "--evaluate", "lidar", "--out", "g"]);
-    assert!(said(&refused).contains("velodyne/") && !root.path().join("g").exists(), "{}", said(&refused));
+    assert!(output_text(&refused).contains("velodyne/") && !root.path().join("g").exists(), "{}", output_text(&refused));
 }
 
 #[test]
@@ -276,7 +276,7 @@ fn what_moves_is_kept_apart_unless_no_masks_are_taken_or_all_goes_into_one_map()
         ["--set", "street.width=480", "--set", "street.height=144", "--set", "street.frames=16", "--set", "volume.voxel_size_m=0.1"];
     let run = |out: &str, more: &[&str]| -> (serde_json::Value, Vec<String>) {
         let run = dynvox(root.path(), &[&["run", "--profile", "small", "--json", "--out", out], &street[..], more].concat());
-        assert!(run.status.success(), "{}", said(&run));
+        assert!(run.status.success(), "{}", output_text(&run));
         let tracks = fs::read_to_string(root.path().join(out).join("tracks.csv")).unwrap();
         (serde_json::from_slice(&run.stdout).unwrap(), tracks.lines().skip(1).map(ToOwned::to_owned).collect())
     };
@@ -307,7 +307,7 @@ fn the_depth_tracker_follows_a_slow_camera_and_says_so_when_it_is_lost() {
         let args =
             [&["run", "--profile", "small", "--out", "result", "--overwrite", "--egomotion", "icp", "--set", &speed], &street[..], more];
         let run = dynvox(root.path(), &args.concat());
-        assert!(run.status.success(), "{}", said(&run));
+        assert!(run.status.success(), "{}", output_text(&run));
         let read = |name: &str| fs::read_to_string(root.path().join("result").join(name)).unwrap();
         let summary: serde_json::Value = serde_json::from_str(&read("summary.json")).unwrap();
         let csv = read("frames.csv");
@@ -333,7 +333,7 @@ fn poses_of_a_file_take_the_place_of_egomotion_and_must_cover_the_frames() {
     let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=4", "--profile", "small", "--json"];
     let run = |out: &str, more: &[&str]| dynvox(root.path(), &[&["run", "--out", out], &street[..], more].concat());
     let summary = |output: Output| -> serde_json::Value {
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", output_text(&output));
         serde_json::from_slice(&output.stdout).unwrap()
     };
     let stereo = summary(run("stereo", &[]));
@@ -346,15 +346,15 @@ fn poses_of_a_file_take_the_place_of_egomotion_and_must_cover_the_frames() {
         fs::write(root.path().join("short.txt"), poses.lines().take(3).collect::<Vec<_>>().join("\n")).unwrap();
         let refused = run("x", &["--egomotion", "file:short.txt"]);
         assert!(
-            !refused.status.success() && said(&refused).contains("frame 3") && said(&refused).contains("short.txt"),
+            !refused.status.success() && output_text(&refused).contains("frame 3") && output_text(&refused).contains("short.txt"),
             "{}",
-            said(&refused)
+            output_text(&refused)
         );
     }
     fs::write(root.path().join("odd.txt"), "1 2 3\n").unwrap();
-    assert!(said(&run("x", &["--egomotion", "file:odd.txt"])).contains("line 1 is not a pose"));
-    assert!(said(&run("x", &["--egomotion", "file:nowhere.txt"])).contains("nowhere.txt cannot be read"));
-    assert!(said(&run("x", &["--egomotion", "imu"])).contains("one of stereo, icp, file:POSES"));
+    assert!(output_text(&run("x", &["--egomotion", "file:odd.txt"])).contains("line 1 is not a pose"));
+    assert!(output_text(&run("x", &["--egomotion", "file:nowhere.txt"])).contains("nowhere.txt cannot be read"));
+    assert!(output_text(&run("x", &["--egomotion", "imu"])).contains("one of stereo, icp, file:POSES"));
     assert!(!root.path().join("x").exists());
 }
 
@@ -364,7 +364,7 @@ fn every_kth_frame_alone_is_fused_and_the_map_is_not_affected() {
     let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=5", "--profile", "small", "--json"];
     let run = |every: &str| {
         let run = dynvox(root.path(), &[&["run", "--out", every, "--fuse-every", every, "--strict"], &street[..]].concat());
-        assert!(run.status.success(), "{}", said(&run));
+        assert!(run.status.success(), "{}", output_text(&run));
         let csv = fs::read_to_string(root.path().join(every).join("frames.csv")).unwrap();
         let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
         let column = |name: &str| header.iter().position(|column| *column == name).unwrap();
@@ -380,7 +380,7 @@ fn every_kth_frame_alone_is_fused_and_the_map_is_not_affected() {
     assert_eq!(second.iter().map(|(_, fused)| *fused).collect::<Vec<_>>(), [true, false, true, false, true]);
     assert!(second.iter().skip(1).all(|(motion, _)| motion == "estimated"), "the camera is followed in every frame");
     let refused = dynvox(root.path(), &[&["run", "--out", "x", "--fuse-every", "0"], &street[..]].concat());
-    assert!(said(&refused).contains("mapper.fuse_every must be 1 or more"), "{}", said(&refused));
+    assert!(output_text(&refused).contains("mapper.fuse_every must be 1 or more"), "{}", output_text(&refused));
 }
 
 #[test]
@@ -389,7 +389,7 @@ fn files_are_evaluated_without_a_run() {
     rig(root.path(), 1);
     let json = |args: &[&str]| {
         let told = dynvox(root.path(), args);
-        assert!(told.status.success(), "{}", said(&told));
+        assert!(told.status.success(), "{}", output_text(&told));
         serde_json::from_slice::<serde_json::Value>(&told.stdout).unwrap()
     };
     // The plane as a pair of KITTI 2015: its left half is an object whose truth is 5 px away from what is seen.
@@ -420,14 +420,14 @@ fn files_are_evaluated_without_a_run() {
     let told = String::from_utf8(dynvox(root.path(), &["inspect", "set"]).stdout).unwrap();
     assert!(told.contains("kitti-2015, 1 pairs") && told.contains("dynvox evaluate stereo set"), "{told}");
     let refused = dynvox(root.path(), &["evaluate", "stereo", "rig"]);
-    assert!(!refused.status.success() && said(&refused).contains("is not a stereo benchmark"), "{}", said(&refused));
+    assert!(!refused.status.success() && output_text(&refused).contains("is not a stereo benchmark"), "{}", output_text(&refused));
     // A run's folder against its own poses in the other format.
     let small = ["--set", "street.width=160", "--set", "street.height=64", "--set", "street.frames=3"];
     json(&[&["run", "--profile", "tiny", "--out", "run", "--json"], &small[..]].concat());
     let same = json(&["evaluate", "trajectory", "run", "run/trajectory_kitti.txt", "--json"]);
     assert!(same["ate_m"].as_f64().unwrap() < 1e-9 && same["rpe_r_deg"].as_f64().unwrap() < 1e-6, "{same}");
     let refused = dynvox(root.path(), &["evaluate", "trajectory", "run", "rig/calib.txt"]);
-    assert!(!refused.status.success() && said(&refused).contains("line 1 is not a pose"), "{}", said(&refused));
+    assert!(!refused.status.success() && output_text(&refused).contains("line 1 is not a pose"), "{}", output_text(&refused));
 }
 
 #[test]
@@ -438,14 +438,14 @@ fn a_closed_pipe_or_a_full_device_is_an_error_and_no_panic() {
         let args = ["budget", "--json"];
         let run =
             std::process::Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(root.path()).stdout(device).output().unwrap();
-        assert_eq!(run.status.code(), Some(i32::from(!sentence.is_empty())), "{}", said(&run));
-        assert!(said(&run).contains(sentence) && !said(&run).contains("panicked"), "{}", said(&run));
+        assert_eq!(run.status.code(), Some(i32::from(!sentence.is_empty())), "{}", output_text(&run));
+        assert!(output_text(&run).contains(sentence) && !output_text(&run).contains("panicked"), "{}", output_text(&run));
     }
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let run = std::process::Command::new(env!("CARGO_BIN_EXE_dynvox")).arg("budget").stdout(writer).output().unwrap();
-    assert_eq!(run.status.code(), Some(1), "{}", said(&run));
-    assert!(said(&run).contains("standard output cannot be written") && !said(&run).contains("panicked"), "{}", said(&run));
+    assert_eq!(run.status.code(), Some(1), "{}", output_text(&run));
+    assert!(output_text(&run).contains("standard output cannot be written") && !output_text(&run).contains("panicked"), "{}", output_text(&run));
 }
 
 #[test]
@@ -454,5 +454,5 @@ fn more_threads_than_any_machine_has_are_refused() {
     rig(root.path(), 2);
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--threads", "100000", "--out", "result"]);
     assert_eq!(run.status.code(), Some(1));
-    assert!(said(&run).contains("--threads 100000 is more than 256"), "{}", said(&run));
+    assert!(output_text(&run).contains("--threads 100000 is more than 256"), "{}", output_text(&run));
 }

@@ -21,26 +21,26 @@ fn run(root: &Path, out: &str, more: &[&str]) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Exit code and everything said.
+/// Exit code and all output.
 fn diff(root: &Path, args: &[&str]) -> (i32, String) {
     let output = dynvox(root, &[&["diff"], args].concat());
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    (output.status.code().unwrap(), said)
+    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    (output.status.code().unwrap(), text)
 }
 
 #[test]
 fn one_bit_of_one_pixel_is_found_as_input_of_its_frame() {
     let root = prepared();
     run(root.path(), "again", &["--threads", "2"]);
-    let (code, said) = diff(root.path(), &["clean", "again"]);
-    assert_eq!((code, said.as_str()), (0, "equal in all 4 frames\n"));
+    let (code, output) = diff(root.path(), &["clean", "again"]);
+    assert_eq!((code, output.as_str()), (0, "equal in all 4 frames\n"));
     let path = root.path().join("rig/left/002.png");
     let mut image = image::open(&path).unwrap().into_luma8();
     image.get_pixel_mut(80, 40).0[0] ^= 1;
     image.save(&path).unwrap();
     run(root.path(), "dirty", &[]);
-    let (code, said) = diff(root.path(), &["clean", "dirty"]);
-    assert_eq!((code, said.as_str()), (1, "first divergence: frame 2, input\n"));
+    let (code, output) = diff(root.path(), &["clean", "dirty"]);
+    assert_eq!((code, output.as_str()), (1, "first divergence: frame 2, input\n"));
 }
 
 /// What one bit of a voxel, a match, a pose or a track does to a stage's digest is in the core's tests; here, that the stage is named.
@@ -62,9 +62,9 @@ fn one_bit_of_a_stages_digest_names_the_stage() {
         };
         let lines: Vec<String> = dirty.iter().map(|row| row.join(",") + "\n").collect();
         fs::write(&csv, lines.concat()).unwrap();
-        let (code, said) = diff(root.path(), &["clean", "dirty"]);
+        let (code, output) = diff(root.path(), &["clean", "dirty"]);
         let named = if stage == "objects" { "object 7" } else { stage };
-        assert_eq!((code, said), (1, format!("first divergence: frame 2, {named}\n")));
+        assert_eq!((code, output), (1, format!("first divergence: frame 2, {named}\n")));
     }
 }
 
@@ -72,34 +72,34 @@ fn one_bit_of_a_stages_digest_names_the_stage() {
 fn a_setting_is_named_beside_the_stage_it_reaches_first() {
     let root = prepared();
     run(root.path(), "coarse", &["--set", "volume.voxel_size_m=0.1"]);
-    let (code, said) = diff(root.path(), &["clean", "coarse"]);
+    let (code, output) = diff(root.path(), &["clean", "coarse"]);
     assert_eq!(code, 1);
-    assert!(said.contains("setting volume.voxel_size_m: 0.05 in clean, 0.1 in coarse"), "{said}");
-    assert!(said.ends_with("first divergence: frame 0, background\n"), "{said}");
+    assert!(output.contains("setting volume.voxel_size_m: 0.05 in clean, 0.1 in coarse"), "{output}");
+    assert!(output.ends_with("first divergence: frame 0, background\n"), "{output}");
     run(root.path(), "sparse", &["--set", "scene_flow.bucket_matches=1"]);
-    let (code, said) = diff(root.path(), &["clean", "sparse"]);
-    assert!(code == 1 && said.ends_with("first divergence: frame 1, matches\n"), "{said}");
+    let (code, output) = diff(root.path(), &["clean", "sparse"]);
+    assert!(code == 1 && output.ends_with("first divergence: frame 1, matches\n"), "{output}");
 }
 
 #[test]
 fn a_shorter_run_is_the_beginning_of_a_longer_one() {
     let root = prepared();
     run(root.path(), "short", &["--frames", "3"]);
-    let (code, said) = diff(root.path(), &["clean", "short"]);
-    assert_eq!((code, said.as_str()), (1, "short is a prefix of clean: equal in all its 3 frames, 1 more follow\n"));
+    let (code, output) = diff(root.path(), &["clean", "short"]);
+    assert_eq!((code, output.as_str()), (1, "short is a prefix of clean: equal in all its 3 frames, 1 more follow\n"));
     assert_eq!(diff(root.path(), &["clean", "short", "--shared"]).0, 0);
     run(root.path(), "first", &["--frames", "1"]);
     run(root.path(), "rest", &["--start", "1"]);
-    let (code, said) = diff(root.path(), &["first", "rest"]);
-    assert!(code == 2 && said.contains("the runs share no frame"), "{said}");
+    let (code, output) = diff(root.path(), &["first", "rest"]);
+    assert!(code == 2 && output.contains("the runs share no frame"), "{output}");
 }
 
 #[test]
 fn what_is_no_run_folder_or_an_old_or_damaged_one_is_told_with_what_to_do() {
     let root = prepared();
     let trouble = |name: &str, sentence: &str| {
-        let (code, said) = diff(root.path(), &["clean", name]);
-        assert!(code == 2 && said.contains("error: ") && said.contains(sentence), "{said}");
+        let (code, output) = diff(root.path(), &["clean", name]);
+        assert!(code == 2 && output.contains("error: ") && output.contains(sentence), "{output}");
     };
     trouble("rig", "rig is not a run folder: its frames.csv cannot be read");
     trouble("rig", "Give a folder that `dynvox run` wrote");

@@ -1,9 +1,9 @@
-//! A run that was killed or failed goes on from its last snapshot as if nothing had happened; what is not the same run is refused by name.
+//! A run that was killed or failed resumes after its last snapshot, identical to an uninterrupted one; another run is refused by name.
 #![allow(missing_docs)]
 
 mod binary;
 
-use binary::{dynvox, names, rig, said};
+use binary::{dynvox, names, output_text, rig};
 use image::GrayImage;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -38,10 +38,11 @@ fn killed_at(folder: &Path, args: &[&str], line: &str) {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    let said = BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap).find(|said| said.starts_with(line));
+    let output_text =
+        BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap).find(|output_text| output_text.starts_with(line));
     // SIGKILL: nothing of it can clean up.
     run.kill().unwrap();
-    assert!(!run.wait().unwrap().success() && said.is_some(), "it was under way");
+    assert!(!run.wait().unwrap().success() && output_text.is_some(), "it was under way");
 }
 
 /// Whether a column of frames.csv tells of the machine and not of the run.
@@ -114,8 +115,8 @@ fn a_street_killed_three_times_is_the_street_that_never_stopped() {
     // In the end, when the mesh is made; the last snapshot is that of the last frame.
     killed_at(&elsewhere, &["run", "--resume", "../stopped", "--threads", "1"], "frame 24/24");
     let last = dynvox(root.path(), &["run", "--resume", "stopped", "--json"]);
-    assert!(last.status.success(), "{}", said(&last));
-    assert!(serde_json::from_slice::<serde_json::Value>(&last.stdout).is_ok() && said(&last).is_empty());
+    assert!(last.status.success(), "{}", output_text(&last));
+    assert!(serde_json::from_slice::<serde_json::Value>(&last.stdout).is_ok() && output_text(&last).is_empty());
     assert_eq!(names(root.path()), ["elsewhere", "stopped", "whole"]);
     let of = summary(&root.path().join("whole"));
     assert!(of["evict"]["back"].as_u64().unwrap() > 0 && of["objects"].as_array().unwrap().len() > 2, "{of}");
@@ -133,7 +134,7 @@ fn stopped() -> TempDir {
     rig(root.path(), 8);
     fs::write(root.path().join("settings.toml"), "[volume]\nvoxel_size_m = 0.08\n").unwrap();
     let whole = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--config", "settings.toml", "--quiet", "--out", "whole"]);
-    assert!(whole.status.success(), "{}", said(&whole));
+    assert!(whole.status.success(), "{}", output_text(&whole));
     let image = root.path().join("rig/left/005.png");
     fs::rename(&image, root.path().join("005.png")).unwrap();
     GrayImage::new(50, 50).save(&image).unwrap();
@@ -141,9 +142,10 @@ fn stopped() -> TempDir {
     let run = dynvox(root.path(), &args);
     assert_eq!(run.status.code(), Some(1));
     assert!(
-        said(&run).contains("left/005.png is 50 x 50 px") && said(&run).contains("`dynvox run --resume out/it` resumes the run"),
+        output_text(&run).contains("left/005.png is 50 x 50 px")
+            && output_text(&run).contains("`dynvox run --resume out/it` resumes the run"),
         "{}",
-        said(&run)
+        output_text(&run)
     );
     fs::rename(root.path().join("005.png"), &image).unwrap();
     assert_eq!(names(&root.path().join("out")), [".it.partial"]);
@@ -152,15 +154,15 @@ fn stopped() -> TempDir {
 }
 
 #[test]
-fn a_run_that_failed_goes_on_when_the_cause_is_mended() {
+fn a_run_that_failed_resumes_when_the_cause_is_repaired() {
     let root = stopped();
     let again = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "out/it"]);
-    assert!(said(&again).contains("an interrupted run to out/it has a snapshot"), "{}", said(&again));
+    assert!(output_text(&again).contains("an interrupted run to out/it has a snapshot"), "{}", output_text(&again));
     let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
-    assert!(resumed.status.success(), "{}", said(&resumed));
+    assert!(resumed.status.success(), "{}", output_text(&resumed));
     assert_same(root.path(), "whole", "out/it");
     let twice = dynvox(root.path(), &["run", "--resume", "out/it"]);
-    assert!(said(&twice).contains("it is complete"), "{}", said(&twice));
+    assert!(output_text(&twice).contains("it is complete"), "{}", output_text(&twice));
 }
 
 #[test]
@@ -172,7 +174,7 @@ fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
         let before = fs::read(&snapshot).unwrap();
         let run = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
         assert_eq!(run.status.code(), Some(1));
-        assert!(said(&run).starts_with("error: ") && said(&run).contains(sentence), "{sentence}: {}", said(&run));
+        assert!(output_text(&run).starts_with("error: ") && output_text(&run).contains(sentence), "{sentence}: {}", output_text(&run));
         assert_eq!(names(&path("out")), [".it.partial"]);
         assert!(fs::read(&snapshot).unwrap() == before);
     };
@@ -221,11 +223,11 @@ fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
         (vec!["run", "--snapshot-every", "9", "--evaluate", "exact"], "cannot be used with"),
     ] {
         let run = dynvox(root.path(), &args);
-        assert!(!run.status.success() && said(&run).contains(sentence), "{args:?}: {}", said(&run));
+        assert!(!run.status.success() && output_text(&run).contains(sentence), "{args:?}: {}", output_text(&run));
     }
     // And as it was it goes on, or makes place.
     let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
-    assert!(resumed.status.success(), "{}", said(&resumed));
+    assert!(resumed.status.success(), "{}", output_text(&resumed));
     assert_same(root.path(), "whole", "out/it");
 }
 
@@ -233,7 +235,7 @@ fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
 fn a_stopped_run_makes_place_for_another_when_that_is_asked_for() {
     let root = stopped();
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--frames", "2", "--out", "out/it", "--overwrite"]);
-    assert!(run.status.success(), "{}", said(&run));
+    assert!(run.status.success(), "{}", output_text(&run));
     assert_eq!(names(&root.path().join("out")), ["it"]);
     assert!(!names(&root.path().join("out/it")).contains(&"run.snapshot".to_owned()));
 }

@@ -3,7 +3,7 @@
 
 mod binary;
 
-use binary::{dynvox, names, said};
+use binary::{dynvox, names, output_text};
 use std::fs;
 use std::process::Command;
 use tempfile::TempDir;
@@ -55,17 +55,17 @@ fn a_killed_sweep_goes_on_where_it_stopped_and_parts_make_the_same_whole() {
     let made = |path: &std::path::PathBuf| (fs::read(path).unwrap(), fs::metadata(path).unwrap().modified().unwrap());
     let kept: Vec<_> = before.iter().map(made).collect();
     let on = dynvox(root.path(), &[&sweep[..], &["cut"]].concat());
-    assert!(on.status.success(), "{}", said(&on));
+    assert!(on.status.success(), "{}", output_text(&on));
     assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "what was made is not made again");
     assert_eq!(results("cut").len(), 6, "two late, two scales, tracker and no objects");
     assert_eq!(names(&root.path().join("cut")), ["methods.csv", "plan.json", "prune-weight.csv", "report.html", "runs", "scale.csv"]);
     assert!(names(&root.path().join("cut/runs")).iter().all(|name| name.ends_with(".json")), "nothing of a run stays but its result");
     for part in ["1/2", "2/2"] {
         let run = dynvox(root.path(), &[&sweep[..], &[&part[..1], "--shard", part]].concat());
-        assert!(run.status.success() && results(&part[..1]).len() == 3, "{}", said(&run));
+        assert!(run.status.success() && results(&part[..1]).len() == 3, "{}", output_text(&run));
     }
     let merged = dynvox(root.path(), &["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
-    assert!(merged.status.success(), "{}", said(&merged));
+    assert!(merged.status.success(), "{}", output_text(&merged));
     for table in ["prune-weight.csv", "scale.csv", "methods.csv"] {
         let [whole, cut] = ["whole", "cut"].map(|out| fs::read_to_string(root.path().join(out).join(table)).unwrap());
         assert_eq!(whole, cut, "{table}");
@@ -78,5 +78,5 @@ fn a_killed_sweep_goes_on_where_it_stopped_and_parts_make_the_same_whole() {
         );
     }
     let other = dynvox(root.path(), &[&sweep[..], &["cut", "--set", "volume.far_m=10"]].concat());
-    assert!(!other.status.success() && said(&other).contains("belongs to another sweep"), "{}", said(&other));
+    assert!(!other.status.success() && output_text(&other).contains("belongs to another sweep"), "{}", output_text(&other));
 }

@@ -47,7 +47,7 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
     let mut slab = HeapSlab::of(&capacity);
     let mut mapper = Mapper::new(&capacity, &config, slab.bytes()).unwrap();
     let (mut by_scan, mut by_pixel, mut shifted) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut near, mut judged) = (0u32, 0u32);
+    let (mut near, mut compared) = (0u32, 0u32);
     for index in 0..FRAMES {
         let frame = street.frame(index);
         let exact_q8 = disparity_q8(&street, &frame);
@@ -84,10 +84,10 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
         let off = evaluate(&scans[1], &view_f32(&off));
         let large = scans[1].points.iter().filter(|point| 4.0 <= Rule::KITTI.share * point.disparity_px).count() as u32;
         assert_eq!(off.regions[0].sources[1].errors[0], off.regions[0].total - large, "frame {index}");
-        (near, judged) = (near + large, judged + off.regions[0].total);
+        (near, compared) = (near + large, compared + off.regions[0].total);
         shifted.push(off);
     }
-    assert!(near > 0 && near < judged, "the scene must have both: {near} of {judged}");
+    assert!(near > 0 && near < compared, "the scene must have both: {near} of {compared}");
     for (name, frames) in [("scan", &by_scan), ("pixels", &by_pixel)] {
         let fused = ReferenceFigures::of("exact", 0, frames, None).unwrap().still.fused;
         assert!(fused.points > 10_000);

@@ -45,9 +45,9 @@ impl Seen {
 /// The exact masks of a frame.
 fn seen(frame: &SynthFrame) -> Vec<Seen> {
     let of = |k: usize| {
-        let places = || frame.instances.iter().enumerate().filter(|(_, p)| usize::from(**p) == k).map(|(at, _)| at);
-        let (left, right) = (places().map(|at| at % frame.width).min()?, places().map(|at| at % frame.width).max()?);
-        let (top, bottom) = (places().min()? / frame.width, places().max()? / frame.width);
+        let pixels = || frame.instances.iter().enumerate().filter(|(_, p)| usize::from(**p) == k).map(|(at, _)| at);
+        let (left, right) = (pixels().map(|at| at % frame.width).min()?, pixels().map(|at| at % frame.width).max()?);
+        let (top, bottom) = (pixels().min()? / frame.width, pixels().max()? / frame.width);
         let inside = |v: usize, u: usize| u8::from(usize::from(frame.instances[v * frame.width + u]) == k);
         let mask = (top..=bottom).flat_map(|v| (left..=right).map(move |u| inside(v, u))).collect();
         let pixels = [left, top, right + 1 - left, bottom + 1 - top].map(|px| px as i32);
@@ -56,24 +56,24 @@ fn seen(frame: &SynthFrame) -> Vec<Seen> {
     (1..=frame.objects.len()).filter_map(of).collect()
 }
 
-struct Drive {
+struct Sequence {
     street: Street,
     frames: Vec<(SynthFrame, Vec<Seen>)>,
 }
 
-impl Drive {
+impl Sequence {
     fn new() -> Self {
         let street = Street::new(StreetConfig { width: SIZE[0], height: SIZE[1], frames: FRAMES, ..StreetConfig::default() }).unwrap();
         let frames = (0..FRAMES).map(|index| street.frame(index)).map(|frame| (seen(&frame), frame)).map(|(s, f)| (f, s)).collect();
         Self { street, frames }
     }
 
-    /// Runs all frames; `look` sees the mapper after each.
-    fn run(&self, dynamic: bool, backwards: bool, look: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
-        self.run_within(&CAPACITY, dynamic, backwards, look);
+    /// Runs all frames; `inspect` sees the mapper after each.
+    fn run(&self, dynamic: bool, backwards: bool, inspect: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
+        self.run_within(&CAPACITY, dynamic, backwards, inspect);
     }
 
-    fn run_within(&self, capacity: &Capacity, dynamic: bool, backwards: bool, mut look: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
+    fn run_within(&self, capacity: &Capacity, dynamic: bool, backwards: bool, mut inspect: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
         let mut config = Config::for_rig(self.street.rig());
         config.tracking.dynamic = dynamic;
         let mut slab = HeapSlab::of(capacity);
@@ -87,7 +87,7 @@ impl Drive {
             let pair = StereoFrame::pair(view(&frame.left_grey[..]), view(&frame.right_grey[..]));
             let stereo = StereoFrame { detections: &detections, ..pair };
             let report = mapper.step_with(&stereo, &Serial, &mut NoStore, &mut NoSink).unwrap();
-            look(index, &report, &mut mapper);
+            inspect(index, &report, &mut mapper);
         }
     }
 
@@ -116,12 +116,12 @@ fn truth<'f>(frame: &'f SynthFrame, seen: &[Seen], track: &TrackReport) -> Optio
 
 #[test]
 fn moving_cars_leave_no_trail_in_the_static_map_and_do_without_masks() {
-    let drive = Drive::new();
+    let sequence = Sequence::new();
     let trail = |dynamic| {
         let mut count = 0;
-        drive.run(dynamic, false, |index, _, mapper| {
-            if index + 1 == drive.frames.len() {
-                count = drive.swept(mapper);
+        sequence.run(dynamic, false, |index, _, mapper| {
+            if index + 1 == sequence.frames.len() {
+                count = sequence.swept(mapper);
             }
         });
         count
@@ -133,15 +133,15 @@ fn moving_cars_leave_no_trail_in_the_static_map_and_do_without_masks() {
 }
 
 #[test]
-fn each_cars_state_and_motion_are_the_true_ones_whatever_the_order_of_detections() {
-    let drive = Drive::new();
+fn each_cars_state_and_motion_are_true_in_any_order_of_detections() {
+    let sequence = Sequence::new();
     let mut states: BTreeMap<u32, Vec<(bool, MotionState)>> = BTreeMap::new();
     let (mut errors_m, mut errors_deg) = (Vec::new(), Vec::new());
     let mut digests = Vec::new();
-    drive.run(true, false, |index, report, mapper| {
+    sequence.run(true, false, |index, report, mapper| {
         digests.push(report.digest);
-        let (frame, seen) = &drive.frames[index];
-        let Some((last, _)) = index.checked_sub(1).map(|last| &drive.frames[last]) else { return };
+        let (frame, seen) = &sequence.frames[index];
+        let Some((last, _)) = index.checked_sub(1).map(|last| &sequence.frames[last]) else { return };
         // The truth, as seen from the estimated camera: the camera's own drift is not the object's error.
         let t_map_world = report.t_world_camera * frame.t_world_camera.inverse();
         for track in mapper.tracks().filter(|track| track.detected && track.sightings > 4) {
@@ -176,7 +176,7 @@ fn each_cars_state_and_motion_are_the_true_ones_whatever_the_order_of_detections
     assert!(error_m < 0.05 && error_deg < 0.25, "{error_m} m, {error_deg} deg");
 
     let mut again = Vec::new();
-    drive.run(true, true, |_, report, _| again.push(report.digest));
+    sequence.run(true, true, |_, report, _| again.push(report.digest));
     assert_eq!(again, digests);
 }
 
@@ -190,15 +190,15 @@ fn picture(seen: &Raycaster<'_>) -> Picture {
 
 #[test]
 fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_cars_where_they_are() {
-    let drive = Drive::new();
+    let sequence = Sequence::new();
     let (mut cars, mut totals) = (Vec::new(), [0u32; 3]);
-    drive.run(true, false, |index, report, mapper| {
+    sequence.run(true, false, |index, report, mapper| {
         if index < 6 || index % 3 > 0 {
             return;
         }
         let pose = report.t_world_camera;
         let mut nearest = picture(mapper.raycast(&pose, &Serial).unwrap());
-        let tracks: Vec<u32> = mapper.posed_objects().map(|placed| placed.summary.id).collect();
+        let tracks: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
         for (layer, track) in (1..).zip(&tracks) {
             let alone = picture(mapper.raycast_object(*track, &pose, &Serial).unwrap());
             for (nearest, pixel) in nearest.iter_mut().zip(alone) {
@@ -212,7 +212,7 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
         assert!(mapper.raycast_object(u32::MAX, &pose, &Serial).is_err());
 
         // Under the mask of a car seen now, an object is shown, as far away as the car is.
-        let (frame, seen) = &drive.frames[index];
+        let (frame, seen) = &sequence.frames[index];
         let states: BTreeMap<usize, &str> = mapper
             .tracks()
             .filter(|track| track.detected && tracks.contains(&track.id))
@@ -247,11 +247,11 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
 
 #[test]
 fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
-    let drive = Drive::new();
+    let sequence = Sequence::new();
     for (tracks, objects, object_blocks) in [(1, 1, 17), (1, 1, 1), (1, 0, 0)] {
         let capacity = Capacity { tracks, objects, object_blocks, ..CAPACITY };
         let (mut begun, mut refused, mut blocks) = (0, 0, 0);
-        drive.run_within(&capacity, true, false, |_, report, mapper| {
+        sequence.run_within(&capacity, true, false, |_, report, mapper| {
             let seen = &report.instances;
             assert!(seen.tracks.tracks <= 1 && mapper.tracks().count() <= 1 && seen.objects.objects as usize <= objects);
             assert!(seen.objects.blocks as usize <= objects * object_blocks);
@@ -266,17 +266,17 @@ fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
 
 #[test]
 fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_seen_of_them() {
-    let drive = Drive::new();
-    let rig = drive.street.rig();
+    let sequence = Sequence::new();
+    let rig = sequence.street.rig();
     let mut sides: BTreeMap<u32, SeenSide> = BTreeMap::new();
     let (mut medians_m, mut complete) = (Vec::new(), Vec::new());
-    drive.run(true, false, |index, report, mapper| {
-        let (frame, seen) = &drive.frames[index];
+    sequence.run(true, false, |index, report, mapper| {
+        let (frame, seen) = &sequence.frames[index];
         let t_map_world = report.t_world_camera * frame.t_world_camera.inverse();
         let tracks: BTreeMap<u32, TrackReport> = mapper.tracks().map(|track| (track.id, track)).collect();
         for (summary, _) in mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame) {
             let Some(car) = tracks.get(&summary.id).and_then(|track| truth(frame, seen, track)) else { continue };
-            let thing = TrueObject {
+            let truth = TrueObject {
                 id: car.id,
                 pixels: tracks[&summary.id].pixels,
                 t_world_object: car.t_world_object,
@@ -290,10 +290,10 @@ fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_
                 t_world_camera: frame.t_world_camera,
                 far_m: 20.0,
             };
-            let t_thing_object = car.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
-            sides.entry(summary.id).or_default().add(&view, &thing, &t_thing_object);
+            let t_truth_object = car.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
+            sides.entry(summary.id).or_default().add(&view, &truth, &t_truth_object);
         }
-        if index + 1 < drive.frames.len() {
+        if index + 1 < sequence.frames.len() {
             return;
         }
         for (summary, object) in mapper.objects() {

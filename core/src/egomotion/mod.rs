@@ -41,6 +41,4 @@ pub use estimate::{Estimator, MotionEstimate, MotionStatus};
 pub use track::Egomotion;
 
 #[cfg(test)]
-mod clip;
-#[cfg(test)]
 mod tests;

@@ -1,3 +1,5 @@
+mod clip;
+
 use super::{Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus};
 use crate::{
     geometry::{StereoRig, Transform},

@@ -6,8 +6,6 @@
 //! block is updated by integer averages ([`Volume::fuse`]); what was visible a fixed lag ago is rid of noise ([`Volume::prune`]).
 
 mod allocate;
-#[cfg(test)]
-pub(crate) mod analytic;
 pub(crate) mod block;
 mod config;
 mod fuse;
@@ -20,7 +18,7 @@ mod request;
 mod sampler;
 mod store;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod viewpoint;
 mod visible;
 mod visit;

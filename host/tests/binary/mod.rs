@@ -14,8 +14,8 @@ pub fn dynvox(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(folder).output().unwrap()
 }
 
-/// What it said on standard error.
-pub fn said(output: &Output) -> String {
+/// What a command wrote to standard error.
+pub fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 

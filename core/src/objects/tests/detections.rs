@@ -18,14 +18,14 @@ fn admitted(config: &TrackingConfig, size: [usize; 2], detections: &[Detection<'
 #[test]
 fn a_box_must_be_strictly_larger_than_45_by_45_at_kittis_width_and_in_proportion_at_others() {
     let mask = vec![1; 3000];
-    let taken = |width, height, image: usize| {
+    let retired = |width, height, image: usize| {
         let car = detection(Class::Car, 0.9, &pixels(10, 10, width, height), &mask);
         admitted(&TrackingConfig::default(), [image, 200], &[car]).0.accepted
     };
     // 2024, 2025 and 2026 px.
-    assert_eq!([taken(46, 44, 1242), taken(45, 45, 1242), taken(1013, 2, 1242)], [0, 0, 1]);
+    assert_eq!([retired(46, 44, 1242), retired(45, 45, 1242), retired(1013, 2, 1242)], [0, 0, 1]);
     // Half the width, a quarter of the area: 506.25 px.
-    assert_eq!([taken(23, 22, 621), taken(39, 13, 621)], [0, 1]);
+    assert_eq!([retired(23, 22, 621), retired(39, 13, 621)], [0, 1]);
 }
 
 #[test]
@@ -95,9 +95,9 @@ fn where_masks_overlap_the_higher_score_is_on_top() {
     for order in [[low, high, hidden], [hidden, high, low]] {
         with(&CAPACITY, &any_size(), |instances, _| {
             instances.ingest(0, &order, [WIDTH, HEIGHT]);
-            let taken = instances.tracker.test_instances();
-            assert_eq!((taken.len(), instances.report().detections.covered), (2, 1));
-            let on = |n: usize, u| instances.tracker.masks().contains(&taken[n].mask, u, 20);
+            let retired = instances.tracker.test_instances();
+            assert_eq!((retired.len(), instances.report().detections.covered), (2, 1));
+            let on = |n: usize, u| instances.tracker.masks().contains(&retired[n].mask, u, 20);
             assert_eq!([on(0, 39), on(0, 40), on(1, 39), on(1, 40)], [false, true, true, false]);
         });
     }
@@ -198,9 +198,9 @@ fn of_a_box_half_beside_the_image_the_half_within_counts() {
     for (left, within) in [(-30, 0), (370, 370)] {
         with(&CAPACITY, &any_size(), |instances, _| {
             instances.ingest(0, &[detection(Class::Car, 0.9, &pixels(left, 100, 60, 60), &mask)], [WIDTH, HEIGHT]);
-            let taken = instances.tracker.test_instances()[0];
-            assert_eq!(taken.mask.pixels, pixels(within, 100, 30, 20));
-            assert_eq!(instances.tracker.masks().area(&taken.mask), 30 * 20, "and no pixel beside it");
+            let retired = instances.tracker.test_instances()[0];
+            assert_eq!(retired.mask.pixels, pixels(within, 100, 30, 20));
+            assert_eq!(instances.tracker.masks().area(&retired.mask), 30 * 20, "and no pixel beside it");
         });
     }
 }
@@ -237,8 +237,8 @@ fn of_two_alike_but_for_class_box_or_mask_the_same_is_on_top_in_either_order() {
         let seen = |order: [Detection<'_>; 2]| {
             with(&CAPACITY, &any_size(), |instances, _| {
                 instances.ingest(0, &order, [WIDTH, HEIGHT]);
-                let (masks, taken) = (instances.tracker.masks(), instances.tracker.test_instances());
-                taken.iter().map(|taken| (taken.class(), taken.mask.pixels, masks.area(&taken.mask))).collect::<Vec<_>>()
+                let (masks, retired) = (instances.tracker.masks(), instances.tracker.test_instances());
+                retired.iter().map(|retired| (retired.class(), retired.mask.pixels, masks.area(&retired.mask))).collect::<Vec<_>>()
             })
         };
         let digest = |order: [Detection<'_>; 2]| admitted(&any_size(), [WIDTH, HEIGHT], &order).2;

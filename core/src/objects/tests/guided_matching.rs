@@ -1,4 +1,4 @@
-//! A closer look, at a wall of a textured room that a detector takes for a car.
+//! A closer inspect, at a wall of a textured room that a detector takes for a car.
 
 use super::*;
 use crate::scene_flow::{FlowMatcher, SceneFlowConfig, test_scene};
@@ -15,7 +15,7 @@ fn capacity() -> Capacity {
 
 /// Drives towards the wall at 3 m/s, says that the camera did `camera_m_s`, and looks on the piece with or without images. No match of the scene
 /// flow is handed over.
-fn drive(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
+fn run(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
     let capacity = capacity();
     let mut slab = vec![0u8; FlowMatcher::bytes(&capacity) + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
@@ -59,19 +59,19 @@ fn drive(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
 
 #[test]
 fn a_thing_without_a_match_of_the_scene_flow_is_looked_at_until_it_is_known_to_stand() {
-    let tracks = drive(3.0, true);
+    let tracks = run(3.0, true);
     for track in &tracks[1..] {
         assert!(track.measured && track.matches > 40 && track.inliers > 40, "{track:?}");
         assert!(track.speed_m_s.unwrap()[0] < 0.5, "{track:?}");
     }
     assert_eq!(tracks[5].state, MotionState::Static);
-    assert!(drive(3.0, false).iter().all(|track| !track.measured), "there is nothing else to go by");
+    assert!(run(3.0, false).iter().all(|track| !track.measured), "there is nothing else to go by");
 }
 
 #[test]
 fn what_moves_is_found_where_it_went_and_not_where_it_was_sought() {
     // The camera is said to stand: what comes nearer moves.
-    let tracks = drive(0.0, true);
+    let tracks = run(0.0, true);
     let [speed, _] = tracks[5].speed_m_s.unwrap();
     assert!((speed - 3.0).abs() < 0.3, "{speed} m/s");
     assert_eq!(tracks[5].state, MotionState::Dynamic);

@@ -84,12 +84,12 @@ fn crossing(frame: u32) -> [Transform; 2] {
 /// The car's track in the frame after `boards`, each shown in one frame.
 fn after(config: &TrackingConfig, boards: &[Board]) -> TrackReport {
     with(&CAPACITY, config, |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         for (frame, board) in (0..).zip(boards) {
             let [camera, place] = crossing(frame);
-            drive.step(camera, &[(board, Some(place))]);
+            run.step(camera, &[(board, Some(place))]);
         }
-        drive.track(1).unwrap()
+        run.track(1).unwrap()
     })
 }
 
@@ -124,12 +124,12 @@ fn matches_of_one_thing_err_alike_so_four_times_as_many_do_not_make_it_twice_as_
 fn a_slow_car_is_not_called_moving_where_the_cameras_errors_could_make_it_seem_so() {
     let state = |motion: MotionConfig| {
         with(&CAPACITY, &TrackingConfig { motion, ..any_size() }, |instances, estimator| {
-            let mut drive = Drive::new(instances, estimator);
+            let mut run = Run::new(instances, estimator);
             for frame in 0..8 {
                 let t = 0.1 * f64::from(frame);
-                drive.step(shift(0.0, 0.0, 6.0 * t), &[(&Board::CAR, Some(shift(3.5, 0.3, 14.0 + 3.0 * t)))]);
+                run.step(shift(0.0, 0.0, 6.0 * t), &[(&Board::CAR, Some(shift(3.5, 0.3, 14.0 + 3.0 * t)))]);
             }
-            drive.track(1).unwrap().state
+            run.track(1).unwrap().state
         })
     };
     let exact = MotionConfig { bias_px: 0.0, lens_px: 0.0, camera_rad: 0.0, ..MotionConfig::default() };
@@ -195,10 +195,10 @@ fn a_motion_is_not_made_of_two_points() {
         left: [30.0 * x, 0.0],
         right: [30.0 * x - 15.0, 0.0],
     };
-    let taken = |count: usize| {
+    let retired = |count: usize| {
         let mut filter = MotionFilter::default();
         filter.predict(&config, 0.1);
         filter.update(&config, &RIG, &Transform::IDENTITY, 0.1, 0.3, [0.0, 1.0, 0.5].into_iter().take(count).map(sighting))
     };
-    assert_eq!([taken(2), taken(3)], [false, true]);
+    assert_eq!([retired(2), retired(3)], [false, true]);
 }

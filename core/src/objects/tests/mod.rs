@@ -48,9 +48,9 @@ pub(super) const CAPACITY: Capacity = Capacity {
 
 /// What a sink was handed.
 #[derive(Default)]
-pub(super) struct Taken(pub Vec<(ObjectSummary, Retirement, usize)>);
+pub(super) struct Retired(pub Vec<(ObjectSummary, Retirement, usize)>);
 
-impl ObjectSink for Taken {
+impl ObjectSink for Retired {
     fn retire(&mut self, object: RetiredObject<'_, '_>) {
         self.0.push((object.summary, object.reason, object.volume.pool().len()));
     }
@@ -125,8 +125,8 @@ impl<'s> Instances<'s> {
     }
 }
 
-/// Calls `drive` with instances and an estimator in a slab.
-pub(super) fn with<R>(capacity: &Capacity, config: &TrackingConfig, drive: impl FnOnce(&mut Instances<'_>, &mut Estimator<'_>) -> R) -> R {
+/// Calls `run` with instances and an estimator in a slab.
+pub(super) fn with<R>(capacity: &Capacity, config: &TrackingConfig, run: impl FnOnce(&mut Instances<'_>, &mut Estimator<'_>) -> R) -> R {
     let bytes = Instances::bytes(capacity) + Estimator::bytes(capacity);
     let mut room = vec![0u8; bytes + SLAB_ALIGN];
     let start = room.as_ptr().align_offset(SLAB_ALIGN);
@@ -134,7 +134,7 @@ pub(super) fn with<R>(capacity: &Capacity, config: &TrackingConfig, drive: impl 
     let mut instances = Instances::new_in(capacity, config, &mut carver);
     assert_eq!(carver.footprint().bytes(), Instances::bytes(capacity), "the formula is what is cut");
     let mut estimator = Estimator::new_in(capacity, &mut carver);
-    drive(&mut instances, &mut estimator)
+    run(&mut instances, &mut estimator)
 }
 
 /// A rectangle of points square to the camera, with its place over time.
@@ -162,19 +162,19 @@ fn project(p: &Point3<f64>) -> [[f32; 2]; 2] {
     [[u as f32, v as f32], [(u - RIG.focal_px * RIG.baseline_m / p.z) as f32, v as f32]]
 }
 
-/// A drive past boards, frame by frame.
-pub(super) struct Drive<'i, 's, 't> {
+/// A run past boards, frame by frame.
+pub(super) struct Run<'i, 's, 't> {
     pub instances: &'i mut Instances<'s>,
     pub estimator: &'i mut Estimator<'t>,
     pub frame: u32,
     pub t_world_camera: Transform,
     /// Whether the camera's pose is known, and not a guess.
     pub known: bool,
-    pub sink: Taken,
+    pub sink: Retired,
     before: Vec<Option<Transform>>,
 }
 
-impl<'i, 's, 't> Drive<'i, 's, 't> {
+impl<'i, 's, 't> Run<'i, 's, 't> {
     pub fn new(instances: &'i mut Instances<'s>, estimator: &'i mut Estimator<'t>) -> Self {
         Self {
             instances,
@@ -182,7 +182,7 @@ impl<'i, 's, 't> Drive<'i, 's, 't> {
             frame: 0,
             t_world_camera: Transform::IDENTITY,
             known: true,
-            sink: Taken::default(),
+            sink: Retired::default(),
             before: Vec::new(),
         }
     }

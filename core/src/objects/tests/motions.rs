@@ -8,14 +8,14 @@ fn ahead(frame: u32) -> [Transform; 2] {
     [shift(0.0, 0.0, 5.0 * t), shift(1.0, 0.3, 10.0 + 8.0 * t)]
 }
 
-fn drive(board: &Board, frames: u32, place: impl Fn(u32) -> [Transform; 2]) -> Vec<TrackReport> {
+fn run(board: &Board, frames: u32, place: impl Fn(u32) -> [Transform; 2]) -> Vec<TrackReport> {
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         (0..frames)
             .map(|frame| {
                 let [camera, car] = place(frame);
-                drive.step(camera, &[(board, Some(car))]);
-                drive.track(1).unwrap()
+                run.step(camera, &[(board, Some(car))]);
+                run.track(1).unwrap()
             })
             .collect()
     })
@@ -23,7 +23,7 @@ fn drive(board: &Board, frames: u32, place: impl Fn(u32) -> [Transform; 2]) -> V
 
 #[test]
 fn a_moving_cars_motion_is_its_own_and_not_the_cameras() {
-    let tracks = drive(&Board::CAR, 8, ahead);
+    let tracks = run(&Board::CAR, 8, ahead);
     for track in &tracks[1..] {
         assert!(track.measured);
         let moved = track.motion_world.transform_point(Point3::from(track.center_world_m));
@@ -40,7 +40,7 @@ fn a_moving_cars_motion_is_its_own_and_not_the_cameras() {
 
 #[test]
 fn a_parked_car_follows_the_camera_and_stays_where_it_is_in_the_world() {
-    let tracks = drive(&Board::CAR, 8, |frame| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)]);
+    let tracks = run(&Board::CAR, 8, |frame| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)]);
     assert_eq!(tracks[7].state, MotionState::Static);
     assert_eq!(tracks[7].motion_world, Transform::IDENTITY);
     assert_eq!(tracks[7].t_world_object, tracks[0].t_world_object, "seen from the moving camera it moves, in the world it does not");
@@ -48,13 +48,13 @@ fn a_parked_car_follows_the_camera_and_stays_where_it_is_in_the_world() {
 
 #[test]
 fn seventeen_matches_make_no_first_motion_and_eighteen_do() {
-    let measured = |points| drive(&Board { points, ..Board::CAR }, 2, ahead)[1].measured;
+    let measured = |points| run(&Board { points, ..Board::CAR }, 2, ahead)[1].measured;
     assert_eq!([measured(17), measured(18)], [false, true]);
 }
 
 #[test]
 fn two_fifths_of_background_under_the_mask_do_no_harm() {
-    let tracks = drive(&Board { background: 24, ..Board::CAR }, 6, ahead);
+    let tracks = run(&Board { background: 24, ..Board::CAR }, 6, ahead);
     assert!((tracks[5].speed_m_s.unwrap()[0] - 8.0).abs() < 0.2, "{:?}", tracks[5].speed_m_s);
     assert!(tracks[5].inliers <= 40);
 }
@@ -62,22 +62,22 @@ fn two_fifths_of_background_under_the_mask_do_no_harm() {
 #[test]
 fn a_match_counts_only_from_mask_to_mask() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         let [camera, car] = ahead(0);
-        drive.step(camera, &[(&Board::CAR, Some(car))]);
+        run.step(camera, &[(&Board::CAR, Some(car))]);
         let [camera, car] = ahead(1);
-        drive.step(camera, &[(&Board::CAR, Some(car))]);
-        let pixels = drive.track(1).unwrap().pixels;
+        run.step(camera, &[(&Board::CAR, Some(car))]);
+        let pixels = run.track(1).unwrap().pixels;
         let delete = pixels.scaled(1200);
         let at = |u: i32, v: i32| Match { current_left: [u as f32, v as f32], ..Match::default() };
         let (last, beyond) = (delete.left, delete.left - 1);
-        drive.instances.assign_matches(&[at(last, pixels.top + 5), at(beyond, pixels.top + 5), at(pixels.left + 5, pixels.top + 5)], &[]);
+        run.instances.assign_matches(&[at(last, pixels.top + 5), at(beyond, pixels.top + 5), at(pixels.left + 5, pixels.top + 5)], &[]);
         assert_eq!(
-            [0, 1, 2].map(|at| drive.instances.tracker.test_owner(at)),
+            [0, 1, 2].map(|at| run.instances.tracker.test_owner(at)),
             [MatchOwner::Instance(0), MatchOwner::None, MatchOwner::Instance(0)]
         );
-        drive.instances.assign_matches(&[Match { current_left: [f32::NAN, 5.0], ..Match::default() }], &[]);
-        assert_eq!(drive.instances.tracker.test_owner(0), MatchOwner::None);
+        run.instances.assign_matches(&[Match { current_left: [f32::NAN, 5.0], ..Match::default() }], &[]);
+        assert_eq!(run.instances.tracker.test_owner(0), MatchOwner::None);
     });
 }
 
@@ -85,15 +85,15 @@ fn a_match_counts_only_from_mask_to_mask() {
 fn the_camera_listens_to_no_moving_car_and_to_no_large_one_of_unknown_state() {
     let guides = |config: &TrackingConfig, frames: u32, place: &dyn Fn(u32) -> [Transform; 2], board: &Board| {
         with(&CAPACITY, config, |instances, estimator| {
-            let mut drive = Drive::new(instances, estimator);
+            let mut run = Run::new(instances, estimator);
             for frame in 0..frames {
                 let [camera, car] = place(frame);
-                drive.step(camera, &[(board, Some(car))]);
+                run.step(camera, &[(board, Some(car))]);
             }
-            let pixels = drive.track(1).unwrap().pixels;
+            let pixels = run.track(1).unwrap().pixels;
             let middle = [pixels.left + pixels.width / 2, pixels.top + pixels.height / 2].map(|px| px as f32);
-            drive.instances.assign_matches(&[Match { current_left: middle, ..Match::default() }], &[]);
-            drive.instances.tracker.test_egomotion_includes(0)
+            run.instances.assign_matches(&[Match { current_left: middle, ..Match::default() }], &[]);
+            run.instances.tracker.test_egomotion_includes(0)
         })
     };
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)];
@@ -118,7 +118,7 @@ fn starting_and_stopping_show_within_five_frames() {
     };
     let place =
         |frame: u32| [shift(0.0, 0.0, 0.3 * f64::from(frame)), shift(1.0, 0.3, 10.0 + (0..=frame).map(|n| 0.1 * speed(n)).sum::<f64>())];
-    let states: Vec<MotionState> = drive(&Board::CAR, 50, place).iter().map(|track| track.state).collect();
+    let states: Vec<MotionState> = run(&Board::CAR, 50, place).iter().map(|track| track.state).collect();
     let is = |state, range: core::ops::Range<usize>| range.clone().all(|frame| states[frame] == state);
     assert!(is(MotionState::Static, 4..9) && is(MotionState::Dynamic, 13..38) && is(MotionState::Static, 43..50), "{states:?}");
 }
@@ -132,10 +132,10 @@ fn silhouettes_belong_to_nobody() {
         instances.ingest(0, &cars, [WIDTH, HEIGHT]);
         let at = |u: f32| Match { current_left: [u, 60.0], ..Match::default() };
         instances.assign_matches(&[at(90.0), at(97.0), at(102.0), at(110.0)], &[]);
-        let owner = |at| instances.tracker.test_owner(at);
-        assert_eq!([owner(1), owner(2)], [MatchOwner::Ambiguous; 2]);
-        assert_ne!(owner(0), owner(3));
-        assert!(owner(0) != MatchOwner::Ambiguous && owner(3) != MatchOwner::Ambiguous);
+        let of_match = |at| instances.tracker.test_owner(at);
+        assert_eq!([of_match(1), of_match(2)], [MatchOwner::Ambiguous; 2]);
+        assert_ne!(of_match(0), of_match(3));
+        assert!(of_match(0) != MatchOwner::Ambiguous && of_match(3) != MatchOwner::Ambiguous);
     });
 }
 
@@ -152,18 +152,18 @@ fn a_small_thing_is_nothing_until_its_motion_is_measured_and_left_in_the_static_
     let config = TrackingConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..TrackingConfig::default() };
     for (speed_m_s, state) in [(8.0, MotionState::Dynamic), (0.0, MotionState::Static)] {
         with(&CAPACITY, &config, |instances, estimator| {
-            let mut drive = Drive::new(instances, estimator);
+            let mut run = Run::new(instances, estimator);
             for frame in 0..8 {
                 let [camera, car] = small_car(speed_m_s)(frame);
-                drive.step(camera, &[(&Board::CAR, Some(car))]);
-                assert_eq!(drive.track(1).is_some(), frame > 0, "frame {frame}");
+                run.step(camera, &[(&Board::CAR, Some(car))]);
+                assert_eq!(run.track(1).is_some(), frame > 0, "frame {frame}");
                 let mut depth_m = vec![5.0; WIDTH * HEIGHT];
-                drive.instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap());
-                let moves = drive.track(1).is_some_and(|track| track.state == MotionState::Dynamic);
+                run.instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap());
+                let moves = run.track(1).is_some_and(|track| track.state == MotionState::Dynamic);
                 assert_eq!(depth_m.contains(&0.0), moves, "frame {frame}");
             }
-            assert_eq!(drive.track(1).unwrap().state, state);
-            assert_eq!(drive.instances.objects().count(), 0, "never reconstructed");
+            assert_eq!(run.track(1).unwrap().state, state);
+            assert_eq!(run.instances.objects().count(), 0, "never reconstructed");
         });
     }
 }
@@ -175,14 +175,14 @@ fn a_few_matches_on_what_hides_a_car_do_not_outweigh_its_own() {
     let post = Board { half_m: [0.04, 0.1], points: 6, ..Board::CAR };
     let speed = |with_post: bool| {
         with(&CAPACITY, &any_size(), |instances, estimator| {
-            let mut drive = Drive::new(instances, estimator);
+            let mut run = Run::new(instances, estimator);
             for frame in 0..5 {
                 let t = f64::from(frame) * 0.1;
                 let (camera, car, stands) = (shift(0.0, 0.0, 2.0 * t), shift(0.3, 0.2, 28.0 + 8.0 * t), shift(0.04, 0.03, 4.0));
                 let posts = [(&post, Some(stands))];
-                drive.step_behind(camera, &[(&board, Some(car))], if with_post { &posts } else { &[] });
+                run.step_behind(camera, &[(&board, Some(car))], if with_post { &posts } else { &[] });
             }
-            drive.track(1).unwrap().speed_m_s.unwrap()[0]
+            run.track(1).unwrap().speed_m_s.unwrap()[0]
         })
     };
     assert!((speed(false) - 8.0).abs() < 0.2, "{}", speed(false));

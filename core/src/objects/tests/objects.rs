@@ -10,17 +10,17 @@ fn at(frame: u32) -> [Transform; 2] {
 #[test]
 fn what_was_seen_before_the_motion_was_known_is_fused_when_it_is() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         let reports: Vec<_> = (0..5)
             .map(|frame| {
                 let [camera, car] = at(frame);
-                drive.step(camera, &[(&Board::CAR, Some(car))]).objects
+                run.step(camera, &[(&Board::CAR, Some(car))]).objects
             })
             .collect();
         let begun: Vec<u32> = reports.iter().map(|report| report.begun).collect();
         assert_eq!(begun, [0, 0, 0, 1, 0], "the motion is confirmed in the fourth frame");
         assert_eq!((reports[3].caught_up, reports[3].fused, reports[4].fused), (3, 1, 1));
-        let (summary, object) = drive.instances.objects().next().unwrap();
+        let (summary, object) = run.instances.objects().next().unwrap();
         assert_eq!((summary.frames, summary.state), (2, MotionState::Dynamic));
         // A board square to the camera: its blocks lie in one layer, however far it drove meanwhile.
         let volume = object.volume();
@@ -36,16 +36,16 @@ fn a_car_lost_for_too_long_is_handed_over_and_begun_anew() {
     for (dynamic_frames, missed, restarts) in [(1, 0, 0), (1, 1, 1), (2, 1, 0), (2, 2, 1)] {
         let config = TrackingConfig { state: StateConfig { dynamic_frames, ..StateConfig::default() }, ..any_size() };
         with(&CAPACITY, &config, |instances, estimator| {
-            let mut drive = Drive::new(instances, estimator);
+            let mut run = Run::new(instances, estimator);
             for frame in 0..16 {
                 let [camera, car] = at(frame);
                 let seen = !(6..6 + missed).contains(&frame);
-                drive.step(camera, &[(&Board::CAR, seen.then_some(car))]);
+                run.step(camera, &[(&Board::CAR, seen.then_some(car))]);
             }
-            assert_eq!(drive.track(1).unwrap().state, MotionState::Dynamic);
-            let reasons: Vec<_> = drive.sink.0.iter().map(|taken| taken.1).collect();
+            assert_eq!(run.track(1).unwrap().state, MotionState::Dynamic);
+            let reasons: Vec<_> = run.sink.0.iter().map(|retired| retired.1).collect();
             assert_eq!(reasons, vec![Retirement::Restarted; restarts], "{missed} frames missed");
-            assert!(drive.sink.0.iter().all(|taken| taken.2 > 0), "with what was made of it");
+            assert!(run.sink.0.iter().all(|retired| retired.2 > 0), "with what was made of it");
         });
     }
 }
@@ -55,45 +55,45 @@ fn full_volumes_are_handed_over_for_new_objects_but_not_in_the_frame_they_grow()
     let near = Board { half_m: [0.8, 0.5], ..Board::CAR };
     let parked = |x: f64| Some(shift(x, 0.0, 9.0));
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         let camera = |frame: u32| shift(0.0, 0.0, 0.02 * f64::from(frame));
         for frame in 0..8 {
             let boards = [(&near, parked(-3.5)), (&near, parked(0.0)), (&near, parked(3.5))];
-            let report = drive.step(camera(frame), &boards);
+            let report = run.step(camera(frame), &boards);
             assert_eq!(report.objects.refused, u32::from(frame >= 2), "three stand, two have volumes");
         }
         // One of the two goes out of sight: its volume goes to the third.
-        let owner = drive.instances.objects().next().unwrap().0.id;
-        let gone = drive.track(owner).unwrap().pixels.left;
+        let id = run.instances.objects().next().unwrap().0.id;
+        let lost = run.track(id).unwrap().pixels.left;
         let boards: Vec<_> = [-3.5, 0.0, 3.5]
             .map(|x| {
                 let there = project(&Point3::new(x - 0.8, 0.0, 9.0))[0][0] as i32;
-                (&near, parked(x).filter(|_| (there - gone).abs() > 40))
+                (&near, parked(x).filter(|_| (there - lost).abs() > 40))
             })
             .into();
         for frame in 8..10 {
-            drive.step(camera(frame), &boards);
+            run.step(camera(frame), &boards);
         }
-        assert_eq!(drive.sink.0.len(), 1);
-        assert_eq!((drive.sink.0[0].0.id, drive.sink.0[0].1), (owner, Retirement::Displaced));
-        assert_eq!(drive.instances.objects().count(), 2);
+        assert_eq!(run.sink.0.len(), 1);
+        assert_eq!((run.sink.0[0].0.id, run.sink.0[0].1), (id, Retirement::Displaced));
+        assert_eq!(run.instances.objects().count(), 2);
     });
 }
 
 #[test]
 fn the_forgotten_and_the_last_are_handed_over_too() {
     with(&CAPACITY, &TrackingConfig { forget_frames: 3, ..any_size() }, |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         for frame in 0..16 {
             let [camera, car] = at(frame);
-            drive.step(camera, &[(&Board::CAR, (!(5..=10).contains(&frame)).then_some(car))]);
+            run.step(camera, &[(&Board::CAR, (!(5..=10).contains(&frame)).then_some(car))]);
         }
-        let reasons = |sink: &Taken| sink.0.iter().map(|taken| (taken.0.id, taken.1)).collect::<Vec<_>>();
-        assert_eq!(reasons(&drive.sink), [(1, Retirement::Forgotten)]);
-        let mut sink = Taken::default();
-        assert_eq!(drive.instances.finish(&mut sink), 1);
+        let reasons = |sink: &Retired| sink.0.iter().map(|retired| (retired.0.id, retired.1)).collect::<Vec<_>>();
+        assert_eq!(reasons(&run.sink), [(1, Retirement::Forgotten)]);
+        let mut sink = Retired::default();
+        assert_eq!(run.instances.finish(&mut sink), 1);
         assert_eq!(reasons(&sink), [(2, Retirement::Finished)]);
-        assert_eq!(drive.instances.objects().count(), 0);
+        assert_eq!(run.instances.objects().count(), 0);
     });
 }
 
@@ -101,39 +101,39 @@ fn the_forgotten_and_the_last_are_handed_over_too() {
 fn people_are_tracked_but_not_reconstructed() {
     let walker = Board { class: Class::Person, ..Board::CAR };
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         for frame in 0..6 {
             let [camera, place] = at(frame);
-            drive.step(camera, &[(&walker, Some(place))]);
+            run.step(camera, &[(&walker, Some(place))]);
         }
-        assert_eq!(drive.track(1).unwrap().state, MotionState::Dynamic);
-        assert_eq!(drive.instances.objects().count(), 0);
+        assert_eq!(run.track(1).unwrap().state, MotionState::Dynamic);
+        assert_eq!(run.instances.objects().count(), 0);
     });
 }
 
 #[test]
 fn an_object_larger_than_its_blocks_refuses_the_rest_and_says_so() {
     with(&Capacity { object_blocks: 20, ..CAPACITY }, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         let refused: u32 = (0..6)
             .map(|frame| {
                 let [camera, car] = at(frame);
-                drive.step(camera, &[(&Board::CAR, Some(car))]).objects.blocks_refused
+                run.step(camera, &[(&Board::CAR, Some(car))]).objects.blocks_refused
             })
             .sum();
         assert!(refused > 0);
-        assert!(drive.instances.objects().all(|(_, object)| object.volume().pool().len() <= 20));
+        assert!(run.instances.objects().all(|(_, object)| object.volume().pool().len() <= 20));
     });
 }
 
 #[test]
 fn a_short_ring_of_crops_keeps_the_latest_and_counts_the_rest() {
     with(&Capacity { crop_pixels: 5_000, ..CAPACITY }, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         let reports: Vec<_> = (0..4)
             .map(|frame| {
                 let [camera, car] = at(frame);
-                drive.step(camera, &[(&Board::CAR, Some(car))]).objects
+                run.step(camera, &[(&Board::CAR, Some(car))]).objects
             })
             .collect();
         assert_eq!(reports.iter().map(|report| report.crops_dropped).sum::<u32>(), 2);
@@ -146,13 +146,13 @@ fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 14.0)];
     for (place, state) in [(at as fn(u32) -> [Transform; 2], MotionState::Dynamic), (parked, MotionState::Static)] {
         with(&CAPACITY, &any_size(), |instances, estimator| {
-            let mut drive = Drive::new(instances, estimator);
+            let mut run = Run::new(instances, estimator);
             let mut last = None;
             for frame in 0..16 {
                 let [camera, car] = place(frame);
-                drive.step(camera, &[(&Board::CAR, (frame < 6).then_some(car))]);
-                let track = drive.track(1).unwrap();
-                let placed = drive.instances.posed().next().map(|placed| placed.t_world_object);
+                run.step(camera, &[(&Board::CAR, (frame < 6).then_some(car))]);
+                let track = run.track(1).unwrap();
+                let pose = run.instances.posed().next().map(|pose| pose.t_world_object);
                 let expected = match frame {
                     0..2 => None,
                     // That it moves is confirmed a frame later than that it stands.
@@ -162,11 +162,11 @@ fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_
                     _ if state == MotionState::Static => last,
                     _ => None,
                 };
-                assert_eq!(placed, expected, "frame {frame} {state:?}");
-                last = placed;
+                assert_eq!(pose, expected, "frame {frame} {state:?}");
+                last = pose;
             }
             assert_eq!(last.is_some(), state == MotionState::Static);
-            assert_eq!(drive.instances.objects().count(), 1, "either has its volume");
+            assert_eq!(run.instances.objects().count(), 1, "either has its volume");
         });
     }
 }
@@ -174,13 +174,13 @@ fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_
 #[test]
 fn an_object_of_a_chain_that_broke_is_not_shown_where_the_next_chain_is() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         for frame in 0..12 {
             let [camera, car] = at(frame);
-            drive.step(camera, &[(&Board::CAR, (!(6..9).contains(&frame)).then_some(car))]);
+            run.step(camera, &[(&Board::CAR, (!(6..9).contains(&frame)).then_some(car))]);
             if (9..12).contains(&frame) {
-                assert!(drive.track(1).unwrap().t_world_object.is_some(), "a new chain has begun");
-                assert_eq!(drive.instances.posed().count(), 0);
+                assert!(run.track(1).unwrap().t_world_object.is_some(), "a new chain has begun");
+                assert_eq!(run.instances.posed().count(), 0);
             }
         }
     });

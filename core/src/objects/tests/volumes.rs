@@ -19,17 +19,17 @@ fn content(instances: &Instances<'_>) -> (Vec<BlockCoord>, u8) {
 /// Shows a parked car, too wide in the frames `wide` says; the blocks after each frame and what the sink gets in the end.
 fn parked(frames: u32, z: f64, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize) {
     with(&CAPACITY, &known_in_the_fourth_frame(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         let blocks = (0..frames)
             .map(|frame| {
                 let board = if wide(frame) { &WIDE } else { &SMALL };
-                drive.step(Transform::IDENTITY, &[(board, Some(shift(0.0, 0.0, z)))]);
-                content(drive.instances).0.len()
+                run.step(Transform::IDENTITY, &[(board, Some(shift(0.0, 0.0, z)))]);
+                content(run.instances).0.len()
             })
             .collect();
-        drive.instances.finish(&mut drive.sink);
-        assert_eq!(drive.instances.objects.volumes.blocks(), 0, "what was handed over is empty");
-        (blocks, drive.sink.0[0].2)
+        run.instances.finish(&mut run.sink);
+        assert_eq!(run.instances.objects.volumes.blocks(), 0, "what was handed over is empty");
+        (blocks, run.sink.0[0].2)
     })
 }
 
@@ -64,12 +64,12 @@ fn of_an_object_seen_but_for_a_moment_everything_is_handed_over() {
 #[test]
 fn each_crop_that_waited_is_fused_once() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         for _ in 0..4 {
-            drive.step(Transform::IDENTITY, &[(&SMALL, Some(shift(0.0, 0.0, 9.0)))]);
+            run.step(Transform::IDENTITY, &[(&SMALL, Some(shift(0.0, 0.0, 9.0)))]);
         }
         assert_eq!(
-            (content(drive.instances).1, drive.instances.objects.crops.len()),
+            (content(run.instances).1, run.instances.objects.crops.len()),
             (40, 0),
             "three that waited and this frame's, each of weight 10"
         );
@@ -79,12 +79,12 @@ fn each_crop_that_waited_is_fused_once() {
 #[test]
 fn a_volume_lies_where_the_thing_is() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         for _ in 0..4 {
-            drive.step(Transform::IDENTITY, &[(&SMALL, Some(shift(2.0, -0.6, 9.0)))]);
+            run.step(Transform::IDENTITY, &[(&SMALL, Some(shift(2.0, -0.6, 9.0)))]);
         }
         // 1.2 to 2.8 m to the right, -1.1 to -0.1 m down, 9 m ahead and 30 cm to either side; in blocks of 40 cm, the nearest lattice point's.
-        let blocks = content(drive.instances).0;
+        let blocks = content(run.instances).0;
         let range = |of: fn(&BlockCoord) -> i16| (blocks.iter().map(of).min().unwrap(), blocks.iter().map(of).max().unwrap());
         assert_eq!((range(|at| at.x), range(|at| at.y), range(|at| at.z)), ((2, 7), (-3, -1), (21, 23)));
     });
@@ -95,12 +95,12 @@ fn what_counts_as_standing_is_put_where_it_was_seen_in_the_world() {
     // Whatever it does, it counts as standing.
     let state = StateConfig { dynamic_m_s: 50.0, static_m_s: 50.0, slow_m_s: 50.0, ..StateConfig::default() };
     with(&Capacity { object_blocks: 2000, ..CAPACITY }, &TrackingConfig { state, ..any_size() }, |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         for frame in 0..4 {
-            drive.step(Transform::IDENTITY, &[(&SMALL, Some(shift(0.0, 0.0, 8.0 + 0.8 * f64::from(frame))))]);
+            run.step(Transform::IDENTITY, &[(&SMALL, Some(shift(0.0, 0.0, 8.0 + 0.8 * f64::from(frame))))]);
         }
-        assert_eq!(drive.track(1).unwrap().state, MotionState::Static);
-        let mut layers: Vec<i16> = content(drive.instances).0.iter().map(|at| at.z).collect();
+        assert_eq!(run.track(1).unwrap().state, MotionState::Static);
+        let mut layers: Vec<i16> = content(run.instances).0.iter().map(|at| at.z).collect();
         layers.sort_unstable();
         layers.dedup();
         assert_eq!(layers, (19..=26).collect::<Vec<_>>(), "four places 80 cm apart");
@@ -111,12 +111,12 @@ fn what_counts_as_standing_is_put_where_it_was_seen_in_the_world() {
 fn beyond_twenty_metres_nothing_is_fused() {
     let blocks = |z: f64| {
         with(&CAPACITY, &any_size(), |instances, estimator| {
-            let mut drive = Drive::new(instances, estimator);
+            let mut run = Run::new(instances, estimator);
             for _ in 0..5 {
-                drive.step(Transform::IDENTITY, &[(&Board::CAR, Some(shift(0.0, 0.0, z)))]);
+                run.step(Transform::IDENTITY, &[(&Board::CAR, Some(shift(0.0, 0.0, z)))]);
             }
-            assert_eq!(drive.instances.objects().count(), 1);
-            content(drive.instances).0.len()
+            assert_eq!(run.instances.objects().count(), 1);
+            content(run.instances).0.len()
         })
     };
     assert!(blocks(18.0) > 0);
@@ -126,12 +126,12 @@ fn beyond_twenty_metres_nothing_is_fused() {
 #[test]
 fn a_post_before_a_car_is_no_part_of_it() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        let mut drive = Drive::new(instances, estimator);
+        let mut run = Run::new(instances, estimator);
         let post = Board { half_m: [0.05, 0.2], points: 0, ..Board::CAR };
         for _ in 0..5 {
-            drive.step_behind(Transform::IDENTITY, &[(&Board::CAR, Some(shift(0.0, 0.0, 10.0)))], &[(&post, Some(shift(0.0, 0.0, 4.0)))]);
+            run.step_behind(Transform::IDENTITY, &[(&Board::CAR, Some(shift(0.0, 0.0, 10.0)))], &[(&post, Some(shift(0.0, 0.0, 4.0)))]);
         }
-        let nearest = content(drive.instances).0.iter().map(|at| at.z).min();
+        let nearest = content(run.instances).0.iter().map(|at| at.z).min();
         assert_eq!(nearest, Some(24), "9.6 m");
     });
 }

@@ -3,7 +3,7 @@ use crate::{
     random::Random,
     volume::{
         VolumeConfig,
-        analytic::{Told, cuboid, empty, fill},
+        tests::analytic::{Told, cuboid, empty, fill},
     },
 };
 use std::{collections::BTreeMap, vec::Vec};

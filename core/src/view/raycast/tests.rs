@@ -6,7 +6,7 @@ use crate::{
     random::Random,
     volume::{
         BlockCoord, VolumeConfig,
-        analytic::{Told, cuboid, empty, fill},
+        tests::analytic::{Told, cuboid, empty, fill},
     },
 };
 use cell::{Corners, Field, NO_AXIS, Passage, mean, within};

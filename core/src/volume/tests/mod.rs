@@ -1,5 +1,6 @@
 //! Analytic scenes with closed answers, and slow twins of the fast kernels.
 
+pub(crate) mod analytic;
 mod eviction;
 mod fusion;
 mod pruning;

@@ -2,7 +2,7 @@
 //!
 //! With `--nocapture` the figures and the mean time of a frame are printed.
 
-use super::{Egomotion, EgomotionConfig, Estimator, MotionStatus};
+use crate::egomotion::{Egomotion, EgomotionConfig, Estimator, MotionStatus};
 use crate::{
     geometry::StereoRig,
     image::View,

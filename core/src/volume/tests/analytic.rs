@@ -1,6 +1,6 @@
-//! Maps filled from a formula, for tests.
+//! Maps filled from a formula.
 
-use super::{BLOCK_VOXELS, BlockCoord, Volume, VolumeConfig};
+use crate::volume::{BLOCK_VOXELS, BlockCoord, Volume, VolumeConfig};
 use crate::{
     geometry::scalar::clamp_f32,
     memory::{Capacity, Carver, SLAB_ALIGN},
