@@ -1,4 +1,4 @@
-//! Float helpers that give the same bits everywhere (DESIGN, *Determinism*): no `f32::min`, no rounding by the platform.
+//! Float helpers that give the same bits everywhere (ARCHITECTURE.md, *Rules*): no `f32::min`, no rounding by the platform.
 
 /// The smaller of two; `b` when either is NaN or both are equal.
 pub fn min_f32(a: f32, b: f32) -> f32 {
