@@ -54,7 +54,13 @@ fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
 
 impl Localization<'_, '_> {
     /// Sets the pose the frame brings, or estimates it.
-    pub fn locate<E: Executor>(&mut self, frame: &StereoFrame<'_>, status: FlowStatus, mask: &EgomotionMask<'_>, executor: &E) -> Located {
+    pub fn locate<E: Executor>(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        status: FlowStatus,
+        mask: &EgomotionMask<'_, '_>,
+        executor: &E,
+    ) -> Located {
         let (origin, egomotion, icp, matches_excluded) = if let Some(t_world_camera) = &frame.t_world_camera {
             self.camera.place(t_world_camera);
             // There is no motion to the first pose.
@@ -84,7 +90,7 @@ impl Localization<'_, '_> {
     }
 
     /// Estimates the motion from the matches the mask includes; and how many it excludes.
-    fn estimate_from_matches(&mut self, mask: &EgomotionMask<'_>) -> (MotionEstimate, u32) {
+    fn estimate_from_matches(&mut self, mask: &EgomotionMask<'_, '_>) -> (MotionEstimate, u32) {
         let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
         let included = selection.iter().filter(|&&index| mask.includes(index));
         let excluded = selection.len() - included.clone().count();

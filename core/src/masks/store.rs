@@ -133,6 +133,21 @@ impl<'s> MaskStore<'s> {
         self.row(mask, v).get(column / 64).is_some_and(|word| word >> (column % 64) & 1 == 1)
     }
 
+    /// Sets the pixels of a mask for which `is_set` holds.
+    pub fn fill(&mut self, mask: &MaskHandle, is_set: impl Fn(i32, i32) -> bool) {
+        let PixelBox { left, top, width, height } = mask.pixels;
+        let origin = mask.origin();
+        for v in top..top + height {
+            let words = self.row_mut(mask, v);
+            for u in (left..left + width).filter(|&u| is_set(u, v)) {
+                let column = (u - origin) as usize;
+                if let Some(word) = words.get_mut(column / 64) {
+                    *word |= 1 << (column % 64);
+                }
+            }
+        }
+    }
+
     /// Adds a row of a caller's mask, whose first pixel is at column `left`; pixels outside the box are left out.
     pub fn set_row(&mut self, mask: &MaskHandle, v: i32, left: i32, pixels: &[u8]) {
         let (origin, columns) = (mask.origin(), mask.pixels);

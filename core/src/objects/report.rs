@@ -1,7 +1,7 @@
 //! Reports of a frame's instances, as plain values.
 
 use super::{Object, ObjectSummary, Objects};
-use crate::tracking::{DetectionCount, TrackCount, TrackReport, Tracker, TrackingReport};
+use crate::tracking::{DetectionCount, SegmentationReport, TrackCount, TrackReport, Tracker, TrackingReport};
 
 /// How volumes were used in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,6 +33,8 @@ pub struct ObjectsReport {
 pub struct InstancesReport {
     /// How detections were used.
     pub detections: DetectionCount,
+    /// What was found by its motion.
+    pub segmentation: SegmentationReport,
     /// How they were associated with tracks.
     pub tracks: TrackCount,
     /// How volumes were used.
@@ -46,14 +48,15 @@ pub struct InstancesReport {
 impl InstancesReport {
     /// Of a frame, from the reports of its stages. `matches_excluded` is the camera's.
     pub fn of(tracking: &TrackingReport, objects: ObjectsReport, matches_excluded: u32) -> Self {
-        let &TrackingReport { detections, tracks, pixels_masked } = tracking;
-        Self { detections, tracks, objects, matches_excluded, pixels_masked }
+        let &TrackingReport { detections, tracks, segmentation, pixels_masked } = tracking;
+        Self { detections, segmentation, tracks, objects, matches_excluded, pixels_masked }
     }
 
     /// What should have been used and was not: detections, tracks, masks, objects, their blocks and crops.
     pub fn refused(&self) -> u32 {
         let ObjectsReport { refused, blocks_refused, crops_dropped, .. } = self.objects;
-        self.detections.refused() + self.tracks.refused + self.tracks.masks_lost + refused + blocks_refused + crops_dropped
+        let segmentation = self.segmentation.refused;
+        self.detections.refused() + segmentation + self.tracks.refused + self.tracks.masks_lost + refused + blocks_refused + crops_dropped
     }
 }
 

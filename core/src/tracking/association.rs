@@ -100,14 +100,28 @@ impl<'s> TrackTable<'s> {
         let mut count = TrackCount::default();
         self.forget(config, frame, &mut count);
         self.all_mut().iter_mut().for_each(|track| track.instance = OptionalIndex::NONE);
-        self.score(config, frame, instances, masks);
+        self.associate_from(0, config, frame, instances, masks, &mut count);
+        count
+    }
+
+    /// Associates the instances from position `first` on with the tracks that have none yet, or begins new ones.
+    pub fn associate_from(
+        &mut self,
+        first: usize,
+        config: &TrackingConfig,
+        frame: u32,
+        instances: &mut [Instance],
+        masks: &TwoFrames<MaskStore<'_>>,
+        count: &mut TrackCount,
+    ) {
+        self.score(first, config, frame, instances, masks);
         while let Some((instance, track)) = self.best_pair(config, instances.len()) {
             self.join(instance, track, instances, frame);
             count.detected += 1;
         }
-        for index in 0..instances.len() {
+        for index in first..instances.len() {
             let Some(instance) = instances.get(index).copied().filter(|instance| !instance.track.is_some()) else { continue };
-            if !self.free_entry(frame, instances, &mut count) {
+            if !self.free_entry(frame, instances, count) {
                 count.refused += 1;
                 continue;
             }
@@ -122,15 +136,16 @@ impl<'s> TrackTable<'s> {
             (count.begun, count.detected) = (count.begun + 1, count.detected + 1);
         }
         count.tracks = self.len as u32;
-        count
     }
 
-    /// Fills the table of scores, a row for each instance.
-    fn score(&mut self, config: &TrackingConfig, frame: u32, instances: &[Instance], masks: &TwoFrames<MaskStore<'_>>) {
+    /// Fills the table of scores, a row for each instance; 0 where either is associated already.
+    fn score(&mut self, first: usize, config: &TrackingConfig, frame: u32, instances: &[Instance], masks: &TwoFrames<MaskStore<'_>>) {
         let tracks = self.tracks.get(..self.len).unwrap_or(&[]);
-        for (row, instance) in self.scores.chunks_exact_mut(self.tracks.len().max(1)).zip(instances) {
+        let rows = self.scores.chunks_exact_mut(self.tracks.len().max(1)).zip(instances).enumerate();
+        for (at, (row, instance)) in rows {
             for (score, track) in row.iter_mut().zip(tracks) {
-                *score = affinity(config, frame, instance, track, masks);
+                let is_free = at >= first && !track.instance.is_some();
+                *score = if is_free { affinity(config, frame, instance, track, masks) } else { 0.0 };
             }
         }
     }

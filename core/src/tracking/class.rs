@@ -28,6 +28,8 @@ pub enum Class {
     Motorcycle,
     /// Any animal.
     Animal,
+    /// What moves, found by its motion.
+    MovingObject,
 }
 
 /// What the mapper does with a class.
@@ -42,7 +44,7 @@ pub enum Treatment {
 }
 
 /// All names known, lower case. VOC, COCO, Cityscapes, KITTI labels, MOTS.
-const NAMES: [(&str, Class); 43] = [
+const NAMES: [(&str, Class); 44] = [
     ("car", Class::Car),
     ("bus", Class::Bus),
     ("truck", Class::Truck),
@@ -72,6 +74,7 @@ const NAMES: [(&str, Class); 43] = [
     ("zebra", Class::Animal),
     ("giraffe", Class::Animal),
     ("animal", Class::Animal),
+    ("moving object", Class::MovingObject),
     ("aeroplane", Class::Other),
     ("airplane", Class::Other),
     ("boat", Class::Other),
@@ -90,7 +93,7 @@ const NAMES: [(&str, Class); 43] = [
 
 impl Class {
     /// All classes, in the order of their codes.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Other,
         Self::Car,
         Self::Bus,
@@ -102,6 +105,7 @@ impl Class {
         Self::Bicycle,
         Self::Motorcycle,
         Self::Animal,
+        Self::MovingObject,
     ];
 
     /// The class a data set means by a name, whatever its case; `None` for a name nobody knows.
@@ -141,13 +145,14 @@ impl Class {
             Self::Bicycle => "bicycle",
             Self::Motorcycle => "motorcycle",
             Self::Animal => "animal",
+            Self::MovingObject => "moving object",
         }
     }
 
     /// What is done with it.
     pub const fn treatment(self) -> Treatment {
         match self {
-            Self::Car | Self::Bus | Self::Truck | Self::Van => Treatment::Reconstruct,
+            Self::Car | Self::Bus | Self::Truck | Self::Van | Self::MovingObject => Treatment::Reconstruct,
             Self::Train | Self::Person | Self::Rider | Self::Bicycle | Self::Motorcycle | Self::Animal => Treatment::KeepOut,
             Self::Other => Treatment::Ignore,
         }
@@ -162,7 +167,9 @@ impl Class {
             Self::Bicycle | Self::Motorcycle => 3,
             _ => 0,
         };
-        self == other || (group(self) == group(other) && group(self) != 0)
+        let is_found_by_motion = self == Self::MovingObject || other == Self::MovingObject;
+        let may_move = self.treatment() != Treatment::Ignore && other.treatment() != Treatment::Ignore;
+        self == other || (is_found_by_motion && may_move) || (group(self) == group(other) && group(self) != 0)
     }
 }
 
@@ -193,7 +200,7 @@ mod tests {
     fn four_wheelers_are_reconstructed_what_else_may_move_is_kept_out_and_the_rest_is_the_street() {
         for class in Class::ALL {
             let expected = match class {
-                Class::Car | Class::Bus | Class::Truck | Class::Van => Treatment::Reconstruct,
+                Class::Car | Class::Bus | Class::Truck | Class::Van | Class::MovingObject => Treatment::Reconstruct,
                 Class::Other => Treatment::Ignore,
                 _ => Treatment::KeepOut,
             };
@@ -211,7 +218,8 @@ mod tests {
             &[Class::Animal],
         ];
         for (one, other) in Class::ALL.iter().flat_map(|one| Class::ALL.iter().map(move |other| (*one, *other))) {
-            let alike = one == other || kinds.iter().any(|kind| kind.contains(&one) && kind.contains(&other));
+            let by_motion = [one, other].contains(&Class::MovingObject) && ![one, other].contains(&Class::Other);
+            let alike = one == other || by_motion || kinds.iter().any(|kind| kind.contains(&one) && kind.contains(&other));
             assert_eq!(one.agrees_with(other), alike, "{one:?} and {other:?}");
         }
     }

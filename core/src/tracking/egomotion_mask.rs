@@ -1,10 +1,16 @@
 //! Which matches the camera's own motion is estimated from.
 
 use super::{
-    MotionState, Tracker,
-    match_assignment::{MatchOwner, OwnerCode},
+    Class, MotionState, Tracker,
+    match_assignment::{MatchOwner, OwnerCode, pixel},
+    track::Track,
 };
-use crate::geometry::Transform;
+use crate::{
+    geometry::Transform,
+    masks::{MaskHandle, MaskStore},
+    scene_flow::Match,
+};
+use heapless::Vec;
 
 /// What the camera did in a frame.
 #[derive(Clone, Copy, Debug)]
@@ -15,28 +21,43 @@ pub struct CameraMotion {
     pub t_current_previous: Option<Transform>,
 }
 
+/// Most objects found by their motion whose matches are excluded before they are found again.
+const MOVING_MAX: usize = 16;
+
 /// The matches that egomotion may use: none on a dynamic object, and none on a large one of unknown state, which may be most of what
-/// the camera sees. Among the rest RANSAC decides.
-#[derive(Clone, Copy, Debug)]
-pub struct EgomotionMask<'t> {
+/// the camera sees. Among the rest RANSAC decides. Objects found by their motion are only found again once the camera's is known: of
+/// these the matches that came from the last mask are excluded.
+#[derive(Clone, Debug)]
+pub struct EgomotionMask<'t, 's> {
     owners: &'t [OwnerCode],
+    refined: &'t [Match],
+    previous: &'t MaskStore<'s>,
+    /// Last masks of objects that were found by their motion.
+    moving: Vec<MaskHandle, MOVING_MAX>,
     /// A bit for each instance whose matches are excluded.
     excluded: u64,
 }
 
-impl EgomotionMask<'_> {
+impl EgomotionMask<'_, '_> {
     /// Whether the refined match at that position may be used.
     pub fn includes(&self, index: u32) -> bool {
         match self.owners.get(index as usize).map(|owner| owner.get()) {
             Some(MatchOwner::Ambiguous) => self.excluded == 0,
             Some(MatchOwner::Instance(instance)) => self.excluded >> instance & 1 == 0,
-            Some(MatchOwner::None) | None => true,
+            Some(MatchOwner::None) => !self.is_on_moving(index),
+            None => true,
         }
+    }
+
+    /// Whether the match was under the last mask of an object that was found by its motion.
+    fn is_on_moving(&self, index: u32) -> bool {
+        let at = self.refined.get(index as usize).filter(|_| !self.moving.is_empty()).map(|m| pixel(m.previous_left));
+        at.is_some_and(|(u, v)| self.moving.iter().any(|mask| self.previous.contains(mask, u, v)))
     }
 }
 
-impl Tracker<'_> {
-    pub(super) fn egomotion_mask(&self) -> EgomotionMask<'_> {
+impl<'s> Tracker<'s> {
+    pub(super) fn egomotion_mask<'t>(&'t self, refined: &'t [Match]) -> EgomotionMask<'t, 's> {
         let [width, height] = self.size;
         let large_px = f64::from(self.config.large_share) * width as f64 * height as f64;
         let mut excluded = 0u64;
@@ -49,6 +70,13 @@ impl Tracker<'_> {
             };
             excluded |= u64::from(is_excluded) << bit;
         }
-        EgomotionMask { owners: self.owner, excluded }
+        let is_missing = |track: &&Track| {
+            track.class() == Class::MovingObject
+                && track.moves()
+                && !track.instance.is_some()
+                && self.frame.wrapping_sub(track.last_frame) == 1
+        };
+        let moving = self.tracks.all().iter().filter(is_missing).map(|track| track.mask).take(MOVING_MAX).collect();
+        EgomotionMask { owners: self.owner, refined, previous: self.masks.previous(), moving, excluded }
     }
 }

@@ -152,6 +152,24 @@ impl<'s> Instances<'s> {
     }
 }
 
+impl Instances<'_> {
+    /// Adds an instance that was not detected, with its mask. Whether the table had an entry for it.
+    pub fn add(&mut self, config: &TrackingConfig, mask: MaskHandle, class: Class, score: f32, width: usize) -> bool {
+        let Some(slot) = self.table.get_mut(self.len) else { return false };
+        let area_px = mask.pixels.area();
+        *slot = Instance {
+            mask,
+            score,
+            class: class.code(),
+            delete_permille: config.delete_permille(area_px, width),
+            track: OptionalIndex::NONE,
+            tracked_only: (!config.is_reconstructable(area_px, width)).into(),
+        };
+        self.len += 1;
+        true
+    }
+}
+
 /// The best `most` of the detections that can be used, best first.
 fn select_best(
     config: &TrackingConfig,

@@ -69,6 +69,15 @@ pub struct FrameMatches<'m> {
 impl Tracker<'_> {
     /// Assigns each match to the instance whose copy mask it lies under or else to the best one whose delete mask it lies under.
     pub(super) fn assign_matches(&mut self, matches: &FrameMatches<'_>) {
+        let owners = [&mut *self.owner, &mut *self.sparse_owner];
+        for (owners, matches) in owners.into_iter().zip([matches.refined, matches.sparse]) {
+            owners.iter_mut().zip(matches).for_each(|(owner, _)| *owner = OwnerCode::default());
+        }
+        self.assign_from(0, matches);
+    }
+
+    /// Assigns the matches without an instance to those from position `first` on.
+    pub(super) fn assign_from(&mut self, first: usize, matches: &FrameMatches<'_>) {
         let masks = self.masks.current();
         let (instances, tracks) = (self.instances.all(), self.tracks.all());
         // Of two cars parked one behind the other in the distance neither takes the other's matches.
@@ -78,10 +87,13 @@ impl Tracker<'_> {
         };
         let refined = self.owner.iter_mut().zip(matches.refined);
         for (owner, m) in refined.chain(self.sparse_owner.iter_mut().zip(matches.sparse)) {
+            if owner.get() != MatchOwner::None {
+                continue;
+            }
             let (u, v) = pixel(m.current_left);
-            let first = |mut under: &mut dyn FnMut(&Instance) -> bool| instances.iter().position(&mut under);
-            let copy = first(&mut |instance| masks.contains(&instance.mask, u, v));
-            let found = copy.or_else(|| first(&mut |instance| instance.delete_mask(masks).contains(u, v)));
+            let best = |mut under: &mut dyn FnMut(&Instance) -> bool| instances.iter().skip(first).position(&mut under);
+            let copy = best(&mut |instance| masks.contains(&instance.mask, u, v));
+            let found = copy.or_else(|| best(&mut |instance| instance.delete_mask(masks).contains(u, v))).map(|at| at + first);
             *owner = OwnerCode::from(match found {
                 Some(at) if is_between(instances, distinct, masks, at, u, v) => MatchOwner::Ambiguous,
                 Some(at) => MatchOwner::Instance(at),

@@ -5,7 +5,8 @@
 //!
 //! 1. [`Tracker::detect`] -> [`Detected`]: detections are validated, their masks packed, and associated with tracks;
 //! 2. [`Detected::assign_matches`] -> [`Assigned`]: each match of the scene flow is assigned to the instance it lies on;
-//!    [`Assigned::egomotion_mask`] then tells which matches the camera's egomotion may use;
+//!    [`Assigned::egomotion_mask`] then tells which matches the camera's egomotion may use, and with its motion
+//!    [`Assigned::segment_motion`] adds instances of what moves and no detector found;
 //! 3. [`Assigned::estimate_motions`] -> [`Tracked`]: each track's motion, state and pose;
 //!    [`Tracked::mask_dynamic_depth`] removes the depth under every delete mask, also where an object missed for a frame is predicted;
 //! 4. [`Tracked::commit`]: masks are kept for the next frame.
@@ -52,6 +53,7 @@ mod instance_at;
 mod match_assignment;
 mod motion_estimate;
 mod motion_filter;
+mod motion_segmentation;
 mod motion_state;
 mod motions;
 mod report;
@@ -69,6 +71,7 @@ pub use egomotion_mask::{CameraMotion, EgomotionMask};
 pub use guided_matching::GuidedMatching;
 pub use instance_at::InstanceAt;
 pub use match_assignment::FrameMatches;
+pub use motion_segmentation::{SegmentationConfig, SegmentationReport};
 pub use motion_state::{MotionEvidence, MotionState};
 pub use report::{TrackReport, TrackingReport};
 pub use stages::{Assigned, Detected, Tracked};
@@ -85,6 +88,7 @@ use association::TrackTable;
 use guided_matching::GUIDED_MATCHES_MAX;
 use instance::Instances;
 use match_assignment::OwnerCode;
+use motion_segmentation::MotionSegmenter;
 use motions::MotionInput;
 
 /// Instances and tracks.
@@ -99,6 +103,7 @@ pub struct Tracker<'s> {
     sparse_owner: &'s mut [OwnerCode],
     /// Matches found by guided matching on one object.
     guided_matches: &'s mut [Match],
+    segmenter: MotionSegmenter<'s>,
     frame: u32,
     /// Width and height of the frame's images, px.
     size: [usize; 2],
@@ -113,6 +118,7 @@ impl<'s> Tracker<'s> {
             + TrackTable::bytes(capacity)
             + 2 * region_bytes::<OwnerCode>(capacity.matches)
             + region_bytes::<Match>(GUIDED_MATCHES_MAX)
+            + MotionSegmenter::bytes(capacity)
     }
 
     /// Allocates its regions.
@@ -128,6 +134,7 @@ impl<'s> Tracker<'s> {
             owner: carver.alloc("tracking.owner", capacity.matches),
             sparse_owner: carver.alloc("tracking.sparse_owner", capacity.matches),
             guided_matches: carver.alloc("tracking.guided_matches", GUIDED_MATCHES_MAX),
+            segmenter: MotionSegmenter::new_in(capacity, carver),
             frame: 0,
             size: [0; 2],
             report: TrackingReport::default(),

@@ -1,7 +1,11 @@
 //! The stages of tracking in a frame, each a value that the next one takes.
 
 use super::{CameraMotion, Detection, EgomotionMask, FrameMatches, GuidedMatching, MotionInput, Tracker, TrackingReport};
-use crate::{egomotion::Estimator, geometry::StereoRig, image::ViewMut};
+use crate::{
+    egomotion::Estimator,
+    geometry::StereoRig,
+    image::{View, ViewMut},
+};
 
 impl<'s> Tracker<'s> {
     /// Begins frame `frame` of images of that size: validates its detections and associates them with tracks.
@@ -36,8 +40,14 @@ pub struct Assigned<'t, 'm, 's> {
 
 impl<'t, 's> Assigned<'t, '_, 's> {
     /// Which matches the camera's own motion may be estimated from.
-    pub fn egomotion_mask(&self) -> EgomotionMask<'_> {
-        self.tracker.egomotion_mask()
+    pub fn egomotion_mask(&self) -> EgomotionMask<'_, 's> {
+        self.tracker.egomotion_mask(self.matches.refined)
+    }
+
+    /// Adds instances of what moves and no detector found, if that is asked for ([`super::SegmentationConfig`]).
+    pub fn segment_motion(self, rig: &StereoRig, camera: &CameraMotion, disparity_q8: View<'_, u16>) -> Self {
+        self.tracker.segment_motion(rig, camera, &self.matches, disparity_q8);
+        self
     }
 
     /// Estimates each track's motion, state and pose. `search` is where more matches are searched for on objects that have few.

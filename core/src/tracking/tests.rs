@@ -42,7 +42,7 @@ impl<'s> Tracker<'s> {
 
     /// Whether egomotion may use the refined match at that position.
     pub(crate) fn test_egomotion_includes(&self, index: u32) -> bool {
-        self.egomotion_mask().includes(index)
+        self.egomotion_mask(&[]).includes(index)
     }
 
     pub(crate) fn test_instances(&self) -> &[Instance] {

@@ -110,8 +110,13 @@ impl Track {
 
     /// Majority vote (Boyer, Moore): a class holds until others were detected more often.
     fn vote_class(&mut self, class: u32) {
+        let by_motion = Class::MovingObject.code();
         if class == self.class {
             self.class_margin += 1;
+        } else if class == by_motion {
+            // That it moves says nothing about its class.
+        } else if self.class == by_motion {
+            (self.class, self.class_margin) = (class, 1);
         } else if self.class_margin > 1 {
             self.class_margin -= 1;
         } else {

@@ -14,6 +14,7 @@ impl Tracker<'_> {
         let Self {
             masks,
             tracks,
+            segmenter,
             // Given by the caller, or of one frame alone.
             config: _,
             instances: _,
@@ -26,5 +27,6 @@ impl Tracker<'_> {
         } = self;
         masks.current_mut().visit(visitor);
         tracks.visit(visitor);
+        segmenter.visit(visitor);
     }
 }

@@ -67,8 +67,8 @@ pub struct RunArgs {
     /// and not disparity), disparity:DIR, depth:DIR, or exact (the synthetic street)
     #[arg(long, default_value = "elas", value_name = "SOURCE")]
     depth: DepthChoice,
-    /// Source of instance masks: auto, none, files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or
-    /// noisy[:SEED] (the synthetic street)
+    /// Source of instance masks: auto, motion (no masks: moving objects are found by their motion), none,
+    /// files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or noisy[:SEED] (the synthetic street)
     #[arg(long, default_value = "auto", value_name = "SOURCE")]
     instances: MaskChoice,
     /// Whether objects are masked out of the static map and reconstructed separately; off fuses everything into one map [default: on]
@@ -217,6 +217,9 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     let indices = run::frame_indices(dataset.len(), args.start, args.stride, args.frames)?;
     if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &indices) {
         settings.set_frame_interval_s(interval_s);
+    }
+    if args.instances.finds_motion() {
+        settings.find_motion();
     }
     if let Some(dynamic) = args.dynamic {
         settings.set_dynamic(dynamic);

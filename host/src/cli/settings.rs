@@ -133,6 +133,11 @@ impl Settings {
         self.tracking.dynamic = dynamic;
     }
 
+    /// Searches for moving objects by their motion.
+    pub fn find_motion(&mut self) {
+        self.tracking.segmentation.enabled = true;
+    }
+
     /// The street's configuration.
     pub fn street(&self) -> StreetConfig {
         self.street.clone().unwrap_or_default()

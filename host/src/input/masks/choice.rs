@@ -11,8 +11,10 @@ pub enum MaskChoice {
     /// The data set's own: its folder of instances, the street's exact masks, else none.
     #[default]
     Auto,
-    /// Nothing is seen.
+    /// No masks, and no search for moving objects.
     None,
+    /// No masks: moving objects are found by their motion alone.
+    Motion,
     /// A folder of instance PNGs and lists.
     Files(PathBuf),
     /// KITTI-MOTS: a folder of PNGs or a text file.
@@ -25,6 +27,13 @@ pub enum MaskChoice {
     Noisy(u64),
 }
 
+impl MaskChoice {
+    /// Whether moving objects are found by their motion.
+    pub fn finds_motion(&self) -> bool {
+        matches!(self, Self::Motion)
+    }
+}
+
 impl FromStr for MaskChoice {
     type Err = String;
 
@@ -34,16 +43,17 @@ impl FromStr for MaskChoice {
             None => match text {
                 "auto" => Self::Auto,
                 "none" => Self::None,
+                "motion" => Self::Motion,
                 "exact" => Self::Exact,
                 "noisy" => Self::Noisy(1),
-                _ => return Err("one of auto, none, files:DIR, mots:DIR, mnc:DIR, exact, noisy".to_owned()),
+                _ => return Err("one of auto, motion, none, files:DIR, mots:DIR, mnc:DIR, exact, noisy".to_owned()),
             },
             Some(("files", folder)) => Self::Files(path(folder)?),
             Some(("mots", folder)) => Self::Mots(path(folder)?),
             Some(("mnc", folder)) => Self::Mnc(path(folder)?),
             Some(("noisy", seed)) => Self::Noisy(seed.parse().map_err(|_| format!("{seed} is not a seed: give a whole number"))?),
             Some((kind, _)) => {
-                return Err(format!("there is no source {kind}: use auto, none, files:DIR, mots:DIR, mnc:DIR, exact, noisy"));
+                return Err(format!("there is no source {kind}: use auto, motion, none, files:DIR, mots:DIR, mnc:DIR, exact, noisy"));
             }
         })
     }
@@ -104,7 +114,7 @@ impl OpenedSource {
             Ok(Some(files((source, there), path)))
         };
         match choice {
-            MaskChoice::None => Ok(None),
+            MaskChoice::None | MaskChoice::Motion => Ok(None),
             MaskChoice::Exact => exact(Box::new(Exact), "exact masks"),
             MaskChoice::Noisy(seed) => exact(Box::new(Noisy { inner: Exact, seed: *seed }), "exact masks with a detector's faults"),
             MaskChoice::Auto => match dataset.masks() {

@@ -1,0 +1,265 @@
+//! Candidates that lie together and move alike.
+
+use super::{
+    SegmentationConfig,
+    residual::{Residual, StaticModel},
+};
+use crate::scene_flow::Match;
+use bytemuck::{Pod, Zeroable};
+use heapless::Vec;
+use nalgebra::Vector3;
+
+/// Most candidates of a frame.
+pub(super) const CANDIDATES_MAX: usize = 1024;
+/// Most groups of a frame.
+pub(super) const GROUPS_MAX: usize = 64;
+
+/// Distance in the image at which two candidates may be neighbours, m, and at least, px.
+const NEIGHBOUR_M: f64 = 0.9;
+const NEIGHBOUR_MIN_PX: f64 = 12.0;
+/// The same of disparities, px and as a share.
+const DISPARITY_MIN_PX: f64 = 1.0;
+const DISPARITY_SHARE: f64 = 0.06;
+/// How far motions of neighbours may differ, m, and by metre of depth.
+const MOTION_M: f64 = 0.15;
+const MOTION_PER_DEPTH: f64 = 0.02;
+/// A group's motion beyond the least one, m for each m^2 of squared depth.
+const MOTION_PER_SQUARED_DEPTH: f64 = 0.0008;
+/// Largest extent of a group, m: width, height, length.
+const EXTENT_MAX_M: [f64; 3] = [8.0, 5.0, 12.0];
+/// Motions of groups on one object differ by at most this, m, and lie at most that far apart, m.
+const MERGE_MOTION_M: f64 = 0.2;
+const MERGE_DISTANCE_M: f64 = 4.0;
+
+/// A match that contradicts the static prediction. The position in the image is of the current left frame.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(in crate::tracking) struct Candidate {
+    u: f32,
+    v: f32,
+    disparity_px: f32,
+    /// In the current camera, m.
+    point_m: [f32; 3],
+    motion_m: [f32; 3],
+    depth_sigma_m: f32,
+    /// Another member of the same group; the first member names itself.
+    parent: u32,
+}
+
+impl Candidate {
+    pub fn new(m: &Match, residual: &Residual, index: usize) -> Self {
+        let numbers = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
+        Self {
+            u: m.current_left[0],
+            v: m.current_left[1],
+            disparity_px: m.current_disparity_px(),
+            point_m: numbers(&residual.point_m),
+            motion_m: numbers(&residual.motion_m),
+            depth_sigma_m: residual.depth_sigma_m as f32,
+            parent: index as u32,
+        }
+    }
+
+    /// The same at another position.
+    pub fn at(self, index: usize) -> Self {
+        Self { parent: index as u32, ..self }
+    }
+
+    /// Whether the other one lies next to it and moves alike.
+    fn is_neighbour(&self, other: &Self, reach_px: f64) -> bool {
+        let depth_m = f64::from(self.point_m[2]);
+        let apart = |a: f32, b: f32| libm::fabs(f64::from(a) - f64::from(b));
+        let disparity_px = larger(DISPARITY_SHARE * f64::from(self.disparity_px), DISPARITY_MIN_PX);
+        if apart(self.u, other.u) > reach_px
+            || apart(self.v, other.v) > reach_px
+            || apart(self.disparity_px, other.disparity_px) > disparity_px
+        {
+            return false;
+        }
+        let side_m = MOTION_M + MOTION_PER_DEPTH * depth_m;
+        let along_m = side_m + f64::from(self.depth_sigma_m) + f64::from(other.depth_sigma_m);
+        let [[x, y, z], [x2, y2, z2]] = [self.motion_m, other.motion_m];
+        apart(x, x2) < side_m && apart(y, y2) < side_m && apart(z, z2) < along_m
+    }
+}
+
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// A box in the camera's axes, m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Extent {
+    pub low: [f64; 3],
+    pub high: [f64; 3],
+}
+
+impl Extent {
+    pub fn contains(&self, point: &Vector3<f64>) -> bool {
+        let axes = self.low.iter().zip(&self.high).zip(point.iter());
+        axes.into_iter().all(|((low, high), at)| low <= at && at <= high)
+    }
+
+    pub fn center(&self) -> Vector3<f64> {
+        (Vector3::from(self.low) + Vector3::from(self.high)) * 0.5
+    }
+
+    fn union(&self, other: &Self) -> Self {
+        let mut joined = *self;
+        for (low, theirs) in joined.low.iter_mut().zip(other.low) {
+            *low = if theirs < *low { theirs } else { *low };
+        }
+        for (high, theirs) in joined.high.iter_mut().zip(other.high) {
+            *high = larger(theirs, *high);
+        }
+        joined
+    }
+
+    /// How far the other one is away, m; 0 where they overlap.
+    fn gap(&self, other: &Self) -> f64 {
+        let mut squared = 0.0;
+        for axis in 0..3 {
+            let at = |values: &[f64; 3]| values.get(axis).copied().unwrap_or(0.0);
+            let gap = larger(at(&other.low) - at(&self.high), at(&self.low) - at(&other.high));
+            squared += if gap > 0.0 { gap * gap } else { 0.0 };
+        }
+        libm::sqrt(squared)
+    }
+}
+
+/// Candidates that lie together and move alike, after the gates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Group {
+    /// From the 5th to the 95th percentile of its members.
+    pub extent: Extent,
+    /// Median against the static prediction, in the current camera's axes, m.
+    pub motion_m: Vector3<f64>,
+    pub members: u32,
+    /// Position of its first member.
+    first: u32,
+    /// Error of one member's motion along the depth, one sigma, m.
+    pub depth_sigma_m: f64,
+}
+
+/// Joins neighbours: afterwards `parent` of each candidate names the first member of its group.
+pub(super) fn join(candidates: &mut [Candidate], focal_px: f64) {
+    for later in 1..candidates.len() {
+        let Some((earlier, rest)) = candidates.split_at_mut_checked(later) else { return };
+        let Some(candidate) = rest.first().copied() else { return };
+        let reach_px = larger(NEIGHBOUR_M * focal_px / f64::from(candidate.point_m[2]), NEIGHBOUR_MIN_PX);
+        for index in 0..earlier.len() {
+            let is_neighbour = earlier.get(index).is_some_and(|other| candidate.is_neighbour(other, reach_px));
+            if is_neighbour {
+                let (a, b) = (root(earlier, rest, later as u32), root(earlier, rest, index as u32));
+                let (first, second) = if a < b { (a, b) } else { (b, a) };
+                let slot = if (second as usize) < later { earlier.get_mut(second as usize) } else { rest.first_mut() };
+                slot.into_iter().for_each(|slot| slot.parent = first);
+            }
+        }
+    }
+    for index in 0..candidates.len() {
+        let first = root(candidates, &[], index as u32);
+        candidates.get_mut(index).into_iter().for_each(|candidate| candidate.parent = first);
+    }
+}
+
+/// The first member of a candidate's group: parents have lower positions.
+fn root(earlier: &[Candidate], rest: &[Candidate], mut at: u32) -> u32 {
+    loop {
+        let index = at as usize;
+        let parent = earlier.get(index).or_else(|| rest.get(index.checked_sub(earlier.len())?)).map_or(at, |candidate| candidate.parent);
+        if parent >= at {
+            return at;
+        }
+        at = parent;
+    }
+}
+
+/// The groups that pass the gates; those on one object are merged. `refused` counts groups beyond [`GROUPS_MAX`].
+pub(super) fn select<'m>(
+    model: &StaticModel<'_>,
+    candidates: &[Candidate],
+    matches: impl Iterator<Item = (&'m Match, bool)> + Clone,
+    values: &mut [f32],
+    refused: &mut u32,
+) -> Vec<Group, GROUPS_MAX> {
+    let mut groups = Vec::<Group, GROUPS_MAX>::new();
+    for (first, candidate) in (0u32..).zip(candidates) {
+        if candidate.parent != first {
+            continue;
+        }
+        let Some(group) = describe(model.config, candidates, first, values) else { continue };
+        *refused += u32::from(groups.push(group).is_err());
+    }
+    let mut counts = [[0u32; 2]; GROUPS_MAX];
+    for (m, is_candidate) in matches {
+        let Some(point) = model.current_point(m) else { continue };
+        for (group, [all, own]) in groups.iter().zip(&mut counts) {
+            if group.extent.contains(&point) {
+                *all += 1;
+                *own += u32::from(is_candidate);
+            }
+        }
+    }
+    let share = f64::from(model.config.candidate_share_min);
+    let mut index = 0;
+    groups.retain(|_| {
+        let [all, own] = counts.get(index).copied().unwrap_or_default();
+        index += 1;
+        f64::from(own) >= share * f64::from(all)
+    });
+    merge(groups)
+}
+
+/// A group's median motion and extent, if it has enough members, moves and is not too large.
+fn describe(config: &SegmentationConfig, candidates: &[Candidate], first: u32, values: &mut [f32]) -> Option<Group> {
+    let members = || candidates.iter().filter(move |candidate| candidate.parent == first);
+    let count = members().count();
+    let mut percentile = |of: &dyn Fn(&Candidate) -> f32, permille: usize| -> Option<f64> {
+        let values = values.get_mut(..count)?;
+        values.iter_mut().zip(members()).for_each(|(value, member)| *value = of(member));
+        let (_, value, _) = values.select_nth_unstable_by((count - 1) * permille / 1000, f32::total_cmp);
+        Some(f64::from(*value))
+    };
+    if count < 3 {
+        return None;
+    }
+    let depth_m = percentile(&|member| member.point_m[2], 500)?;
+    let least = if depth_m > f64::from(config.sparse_from_m) { config.far_members_min } else { config.members_min };
+    if count < usize::from(least) {
+        return None;
+    }
+    let motion_m = Vector3::new(
+        percentile(&|member| member.motion_m[0], 500)?,
+        percentile(&|member| member.motion_m[1], 500)?,
+        percentile(&|member| member.motion_m[2], 500)?,
+    );
+    let depth_sigma_m = percentile(&|member| member.depth_sigma_m, 500)?;
+    let mut extent = Extent::default();
+    for (axis, (low, high)) in extent.low.iter_mut().zip(&mut extent.high).enumerate() {
+        let of = move |member: &Candidate| member.point_m.get(axis).copied().unwrap_or(0.0);
+        (*low, *high) = (percentile(&of, 50)?, percentile(&of, 950)?);
+    }
+    let is_small = extent.low.iter().zip(&extent.high).zip(EXTENT_MAX_M).all(|((low, high), most)| high - low <= most);
+    let moves = motion_m.norm() > f64::from(config.motion_min_m) + MOTION_PER_SQUARED_DEPTH * depth_m * depth_m;
+    (is_small && moves).then_some(Group { extent, motion_m, members: count as u32, first, depth_sigma_m })
+}
+
+/// Merges groups of one motion that lie close together: a near car has several.
+fn merge(mut groups: Vec<Group, GROUPS_MAX>) -> Vec<Group, GROUPS_MAX> {
+    let mut merged = Vec::<Group, GROUPS_MAX>::new();
+    groups.sort_unstable_by_key(|group| (u32::MAX - group.members, group.first));
+    for group in &groups {
+        let is_same = |other: &&mut Group| {
+            (other.motion_m - group.motion_m).norm() < MERGE_MOTION_M && other.extent.gap(&group.extent) < MERGE_DISTANCE_M
+        };
+        if let Some(other) = merged.iter_mut().find(is_same) {
+            other.extent = other.extent.union(&group.extent);
+            other.members += group.members;
+        } else {
+            let pushed = merged.push(*group).is_ok();
+            debug_assert!(pushed, "there are no more than before");
+        }
+    }
+    merged
+}

@@ -1,0 +1,197 @@
+//! Groups over frames: a group becomes an object when it is found again with the same motion, and is predicted where it is not.
+
+use super::{
+    SegmentationConfig,
+    groups::{Extent, GROUPS_MAX, Group},
+};
+use crate::{geometry::Transform, state::Visitor};
+use bytemuck::{Pod, Zeroable};
+use nalgebra::Vector3;
+
+/// Most groups followed over frames.
+pub(super) const HYPOTHESES_MAX: usize = 64;
+/// How far a group may lie from where the last one's motion predicts it, m, and by metre of depth.
+const DISTANCE_M: f64 = 1.5;
+const DISTANCE_PER_DEPTH: f64 = 0.06;
+/// How far the motions in two frames may differ, m, and by metre of depth.
+const MOTION_M: f64 = 0.25;
+const MOTION_PER_DEPTH: f64 = 0.02;
+/// Frames of the history that count.
+const RECENT: u32 = 0b111;
+
+/// A group that is followed over frames.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(in crate::tracking) struct Hypothesis {
+    /// Centre in the world, m.
+    center_m: [f64; 3],
+    /// Motion over ground in a frame, in the world's axes, m.
+    motion_m: [f64; 3],
+    /// Half its sizes along the camera's axes, m.
+    half_m: [f64; 3],
+    /// Frames in which a group agreed: a bit a frame, the last one lowest.
+    history: u32,
+    /// Whether it is an object: 0 or 1.
+    confirmed: u32,
+    /// Frames without a group.
+    missed: u32,
+    /// Unused.
+    padding: u32,
+}
+
+impl Hypothesis {
+    fn center(&self) -> Vector3<f64> {
+        Vector3::from(self.center_m)
+    }
+
+    /// Visits every field.
+    fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { center_m, motion_m, half_m, history, confirmed, missed, padding: _ } = self;
+        visitor.f64s(center_m);
+        visitor.f64s(motion_m);
+        visitor.f64s(half_m);
+        visitor.u32s([history, confirmed, missed]);
+    }
+
+    /// Where it is in the camera's axes.
+    pub fn extent(&self, t_world_camera: &Transform) -> Extent {
+        let center: [f64; 3] = t_world_camera.inverse().transform_point(self.center_m);
+        let mut extent = Extent { low: center, high: center };
+        for ((low, high), half_m) in extent.low.iter_mut().zip(&mut extent.high).zip(self.half_m) {
+            (*low, *high) = (*low - half_m, *high + half_m);
+        }
+        extent
+    }
+
+    pub fn is_confirmed(&self) -> bool {
+        self.confirmed > 0
+    }
+
+    /// Updates it by the group of this frame.
+    fn update(&mut self, config: &SegmentationConfig, found: &Observed) {
+        self.history = self.history << 1 | 1;
+        self.missed = 0;
+        if (self.history & RECENT).count_ones() >= u32::from(config.confirm_frames) {
+            self.confirmed = 1;
+        }
+        self.center_m = found.center.into();
+        self.motion_m = found.motion.into();
+        self.half_m = found.half;
+    }
+
+    /// A frame without a group: it moves on.
+    fn miss(&mut self) {
+        self.history <<= 1;
+        self.missed += 1;
+        self.center_m = (self.center() + Vector3::from(self.motion_m)).into();
+    }
+}
+
+/// A group in the world.
+struct Observed {
+    center: Vector3<f64>,
+    motion: Vector3<f64>,
+    half: [f64; 3],
+    depth_m: f64,
+    depth_sigma_m: f64,
+}
+
+/// All hypotheses, oldest first.
+#[derive(Debug)]
+pub(in crate::tracking) struct Hypotheses<'s> {
+    table: &'s mut [Hypothesis],
+    len: usize,
+}
+
+impl<'s> Hypotheses<'s> {
+    pub fn new(table: &'s mut [Hypothesis]) -> Self {
+        Self { table, len: 0 }
+    }
+
+    /// Visits all hypotheses.
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { table, len } = self;
+        visitor.count(len, table.len());
+        table.iter_mut().take(*len).for_each(|hypothesis| hypothesis.visit(visitor));
+    }
+
+    pub fn all(&self) -> &[Hypothesis] {
+        debug_assert!(self.len <= self.table.len());
+        self.table.get(..self.len).unwrap_or(&[])
+    }
+
+    /// Continues hypotheses with a frame's groups, the nearest first for each, begins new ones and drops those missed for too long. Returns
+    /// how many groups found the table full.
+    pub fn update(&mut self, config: &SegmentationConfig, groups: &[Group], t_world_camera: &Transform) -> u32 {
+        let mut used = [false; GROUPS_MAX];
+        let observed = |group: &Group| {
+            let half = group.extent.high.iter().zip(&group.extent.low).map(|(high, low)| 0.5 * (high - low));
+            let mut halves = [0.0; 3];
+            halves.iter_mut().zip(half).for_each(|(slot, half)| *slot = half);
+            Observed {
+                center: t_world_camera.transform_point(group.extent.center()),
+                motion: t_world_camera.rotate(group.motion_m),
+                half: halves,
+                depth_m: group.extent.center().z,
+                depth_sigma_m: group.depth_sigma_m,
+            }
+        };
+        for hypothesis in self.table.iter_mut().take(self.len) {
+            let predicted = hypothesis.center() + Vector3::from(hypothesis.motion_m);
+            let mut best: Option<(f64, usize, Observed)> = None;
+            for (index, group) in groups.iter().enumerate() {
+                let found = observed(group);
+                let distance_m = (found.center - predicted).norm();
+                let difference_m = (found.motion - Vector3::from(hypothesis.motion_m)).norm();
+                let is_near = distance_m < DISTANCE_M + DISTANCE_PER_DEPTH * found.depth_m;
+                let is_alike = difference_m < MOTION_M + MOTION_PER_DEPTH * found.depth_m + found.depth_sigma_m;
+                let is_free = used.get(index) == Some(&false);
+                if is_near && is_alike && is_free && best.as_ref().is_none_or(|(least_m, ..)| distance_m < *least_m) {
+                    best = Some((distance_m, index, found));
+                }
+            }
+            match best {
+                Some((_, index, found)) => {
+                    hypothesis.update(config, &found);
+                    used.get_mut(index).into_iter().for_each(|used| *used = true);
+                }
+                None => hypothesis.miss(),
+            }
+        }
+        self.drop_missed(config);
+        let mut refused = 0;
+        for (group, _) in groups.iter().zip(used).filter(|(_, used)| !used) {
+            let Some(slot) = self.table.get_mut(self.len) else {
+                refused += 1;
+                continue;
+            };
+            *slot = Hypothesis::default();
+            slot.update(config, &observed(group));
+            self.len += 1;
+        }
+        refused
+    }
+
+    /// Drops the hypotheses missed for too long: an unconfirmed one once no recent frame agrees.
+    fn drop_missed(&mut self, config: &SegmentationConfig) {
+        let mut kept = 0;
+        for index in 0..self.len {
+            let Some(hypothesis) = self.table.get(index).copied() else { break };
+            let is_recent = hypothesis.history & RECENT != 0;
+            let stays = if hypothesis.is_confirmed() { hypothesis.missed <= u32::from(config.predict_frames) } else { is_recent };
+            if let Some(slot) = self.table.get_mut(kept).filter(|_| stays) {
+                *slot = hypothesis;
+                kept += 1;
+            }
+        }
+        self.len = kept;
+    }
+
+    /// Drops the hypothesis at that position.
+    pub fn remove(&mut self, index: usize) {
+        if index < self.len {
+            self.table.copy_within(index + 1..self.len, index);
+            self.len -= 1;
+        }
+    }
+}

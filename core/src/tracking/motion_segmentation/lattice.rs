@@ -1,0 +1,176 @@
+//! The disparity image on a lattice: where a group's mask grows.
+
+use super::{ground::Ground, groups::Extent};
+use crate::{
+    geometry::StereoRig,
+    image::{DISPARITY_ONE_PX, View},
+    masks::PixelBox,
+};
+
+/// Side of a lattice cell, px.
+pub(super) const CELL_PX: usize = 4;
+/// How far a mask reaches beyond the extent of a group's members, m: to the side, above and below, along the depth.
+const MARGIN_M: [f64; 3] = [0.9, 0.9, 1.6];
+/// Beyond that, by what depth errs, m for each m^2 of squared depth.
+const DEPTH_MARGIN: f64 = 0.0012;
+/// What is lower above the ground belongs to it, m.
+const CLEARANCE_M: f64 = 0.2;
+
+/// The lattice of a frame.
+pub(super) struct Lattice<'a> {
+    rig: &'a StereoRig,
+    disparity_q8: View<'a, u16>,
+    columns: usize,
+    rows: usize,
+}
+
+impl<'a> Lattice<'a> {
+    pub fn new(rig: &'a StereoRig, disparity_q8: View<'a, u16>) -> Self {
+        let (columns, rows) = (disparity_q8.width().div_ceil(CELL_PX), disparity_q8.height().div_ceil(CELL_PX));
+        Self { rig, disparity_q8, columns, rows }
+    }
+
+    /// The pixel of a cell: its middle, within the image.
+    fn pixel(&self, column: usize, row: usize) -> [usize; 2] {
+        let within = |cell: usize, size: usize| (cell * CELL_PX + CELL_PX / 2).min(size.saturating_sub(1));
+        [within(column, self.disparity_q8.width()), within(row, self.disparity_q8.height())]
+    }
+
+    /// The point of a cell, in the camera, m.
+    fn point(&self, column: usize, row: usize) -> Option<[f64; 3]> {
+        let [u, v] = self.pixel(column, row);
+        let q8 = self.disparity_q8.get(u, v).filter(|q8| *q8 > 0)?;
+        let per_px = self.rig.baseline_m * f64::from(DISPARITY_ONE_PX) / f64::from(q8);
+        let [x, y] = [u as f64 - self.rig.center_u_px, v as f64 - self.rig.center_v_px];
+        Some([x * per_px, y * per_px, self.rig.focal_px * per_px])
+    }
+
+    /// The points of every second cell of every second row below the horizon.
+    pub fn points_below_horizon(&self) -> impl Iterator<Item = [f64; 3]> {
+        let rows = (0..self.rows).step_by(2).filter(|&row| self.pixel(0, row)[1] as f64 > self.rig.center_v_px);
+        rows.flat_map(move |row| (0..self.columns).step_by(2).filter_map(move |column| self.point(column, row)))
+    }
+
+    /// Marks the cells of an object, from those within its extent on, connected through cells that can be its own, and fills gaps between
+    /// them. The marks are `cells`, row by row of the lattice. Returns the pixels they lie in.
+    pub fn grow(&self, extent: &Extent, ground: Option<&Ground>, cells: &mut [u8], queue: &mut [u32]) -> Option<PixelBox> {
+        let reach = widened(extent);
+        let bounds = self.bounds(&reach)?;
+        let can_be_own = |column: usize, row: usize, within: &Extent| {
+            let point = self.point(column, row).filter(|point| within.contains(&(*point).into()));
+            point.is_some_and(|point| ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M))
+        };
+        let cells = cells.get_mut(..self.columns * self.rows)?;
+        cells.fill(0);
+        let mut queued = 0;
+        for (column, row) in bounds.cells() {
+            if can_be_own(column, row, extent) {
+                let (cell, slot) = (cells.get_mut(row * self.columns + column)?, queue.get_mut(queued)?);
+                (*cell, *slot) = (1, (row * self.columns + column) as u32);
+                queued += 1;
+            }
+        }
+        let mut next = 0;
+        while next < queued {
+            let at = *queue.get(next)? as usize;
+            next += 1;
+            let (column, row) = (at % self.columns, at / self.columns);
+            let around = [(column.wrapping_sub(1), row), (column + 1, row), (column, row.wrapping_sub(1)), (column, row + 1)];
+            for (column, row) in around.into_iter().filter(|&(column, row)| bounds.contains(column, row)) {
+                let cell = cells.get_mut(row * self.columns + column)?;
+                if *cell == 0 && can_be_own(column, row, &reach) {
+                    *cell = 1;
+                    *queue.get_mut(queued)? = (row * self.columns + column) as u32;
+                    queued += 1;
+                }
+            }
+        }
+        (queued > 0).then_some(())?;
+        self.close(&bounds, cells);
+        self.pixels(&bounds, cells)
+    }
+
+    /// The cells in which an extent can be seen.
+    fn bounds(&self, extent: &Extent) -> Option<Bounds> {
+        let ([left, top, near], [right, bottom, far]) = (extent.low, extent.high);
+        let near = if near > 1.0 { near } else { 1.0 };
+        let far = if far > near { far } else { near };
+        let farthest = |side: f64| self.rig.focal_px * side / if side < 0.0 { near } else { far };
+        let nearest = |side: f64| self.rig.focal_px * side / if side < 0.0 { far } else { near };
+        let cell = |px: f64, center: f64, cells: usize| {
+            let at = (px + center) / CELL_PX as f64;
+            if at < 0.0 { 0 } else { (at as usize).min(cells) }
+        };
+        let (rig, columns, rows) = (self.rig, self.columns, self.rows);
+        let bounds = Bounds {
+            left: cell(farthest(left), rig.center_u_px, columns),
+            right: (cell(nearest(right), rig.center_u_px, columns) + 1).min(columns),
+            top: cell(farthest(top), rig.center_v_px, rows),
+            bottom: (cell(nearest(bottom), rig.center_v_px, rows) + 1).min(rows),
+        };
+        (bounds.left < bounds.right && bounds.top < bounds.bottom).then_some(bounds)
+    }
+
+    /// Fills cells between two marked ones, left and right or above and below.
+    fn close(&self, bounds: &Bounds, cells: &mut [u8]) {
+        let is_marked =
+            |cells: &[u8], column: usize, row: usize| bounds.contains(column, row) && cells.get(row * self.columns + column) == Some(&1);
+        for (column, row) in bounds.cells() {
+            let is_between = (is_marked(cells, column.wrapping_sub(1), row) && is_marked(cells, column + 1, row))
+                || (is_marked(cells, column, row.wrapping_sub(1)) && is_marked(cells, column, row + 1));
+            if let Some(cell) = cells.get_mut(row * self.columns + column).filter(|cell| is_between && **cell == 0) {
+                *cell = 2;
+            }
+        }
+    }
+
+    /// The pixels of the marked cells.
+    fn pixels(&self, bounds: &Bounds, cells: &[u8]) -> Option<PixelBox> {
+        let marked = || bounds.cells().filter(|(column, row)| cells.get(row * self.columns + column).is_some_and(|cell| *cell > 0));
+        let (left, right) = (marked().map(|(column, _)| column).min()?, marked().map(|(column, _)| column).max()?);
+        let (top, bottom) = (marked().map(|(_, row)| row).min()?, marked().map(|(_, row)| row).max()?);
+        let side = |first: usize, last: usize, size: usize| ((last + 1) * CELL_PX).min(size) - first * CELL_PX;
+        Some(PixelBox {
+            left: (left * CELL_PX) as i32,
+            top: (top * CELL_PX) as i32,
+            width: side(left, right, self.disparity_q8.width()) as i32,
+            height: side(top, bottom, self.disparity_q8.height()) as i32,
+        })
+    }
+
+    /// Whether the cell of a pixel is marked.
+    pub fn is_marked(&self, cells: &[u8], u: i32, v: i32) -> bool {
+        let cell = usize::try_from(u).ok().zip(usize::try_from(v).ok()).map(|(u, v)| v / CELL_PX * self.columns + u / CELL_PX);
+        cell.and_then(|cell| cells.get(cell)).is_some_and(|cell| *cell > 0)
+    }
+}
+
+/// Cells of a rectangle: columns `left .. right`, rows `top .. bottom`.
+#[derive(Clone, Copy)]
+struct Bounds {
+    left: usize,
+    right: usize,
+    top: usize,
+    bottom: usize,
+}
+
+impl Bounds {
+    fn contains(&self, column: usize, row: usize) -> bool {
+        (self.left..self.right).contains(&column) && (self.top..self.bottom).contains(&row)
+    }
+
+    fn cells(self) -> impl Iterator<Item = (usize, usize)> {
+        (self.top..self.bottom).flat_map(move |row| (self.left..self.right).map(move |column| (column, row)))
+    }
+}
+
+/// An extent with its margins.
+fn widened(extent: &Extent) -> Extent {
+    let depth_m = extent.center().z;
+    let mut reach = *extent;
+    for (axis, ((low, high), margin_m)) in reach.low.iter_mut().zip(&mut reach.high).zip(MARGIN_M).enumerate() {
+        let margin_m = margin_m + if axis == 2 { DEPTH_MARGIN * depth_m * depth_m } else { 0.0 };
+        (*low, *high) = (*low - margin_m, *high + margin_m);
+    }
+    reach
+}

@@ -1,0 +1,233 @@
+//! Moving objects among static points, with closed answers.
+
+use super::*;
+use crate::{
+    geometry::Transform,
+    memory::SLAB_ALIGN,
+    random::Random,
+    tracking::{Detected, Detection, TrackReport, TrackingConfig},
+};
+use std::{vec, vec::Vec};
+
+const WIDTH: usize = 400;
+const HEIGHT: usize = 120;
+const RIG: StereoRig = StereoRig { focal_px: 300.0, center_u_px: 200.0, center_v_px: 50.0, baseline_m: 0.5 };
+const CAPACITY: Capacity = Capacity { image_width: WIDTH, image_height: HEIGHT, ..Capacity::TINY };
+/// Height of the camera above the ground, m.
+const GROUND_M: f64 = 1.6;
+
+/// A box whose front is 1.8 m wide and 1.4 m high, on the ground at `[x, z]`.
+#[derive(Clone, Copy)]
+struct Car {
+    at: [f64; 2],
+    motion: [f64; 2],
+}
+
+impl Car {
+    fn at_frame(&self, frame: u32) -> [f64; 2] {
+        let [x, z] = self.at;
+        let [dx, dz] = self.motion.map(|motion| motion * f64::from(frame));
+        [x + dx, z + dz]
+    }
+}
+
+fn project([x, y, z]: [f64; 3]) -> [[f32; 2]; 2] {
+    let per_m = RIG.focal_px / z;
+    let (u, v) = (x * per_m + RIG.center_u_px, y * per_m + RIG.center_v_px);
+    [[u as f32, v as f32], [(u - RIG.baseline_m * per_m) as f32, v as f32]]
+}
+
+/// A world of a ground, a wall 40 m ahead and cars; the camera moves forward by `step_m` a frame.
+struct World {
+    cars: Vec<Car>,
+    step_m: f64,
+    noise_px: f32,
+}
+
+impl World {
+    fn camera_z(&self, frame: u32) -> f64 {
+        self.step_m * f64::from(frame)
+    }
+
+    /// Depth and what is seen at a pixel: 0 the background, n the n-th car.
+    fn cast(&self, frame: u32, u: usize, v: usize) -> (f64, usize) {
+        let [x, y] = [(u as f64 - RIG.center_u_px) / RIG.focal_px, (v as f64 - RIG.center_v_px) / RIG.focal_px];
+        let mut best = (40.0, 0);
+        if y > 0.0 && GROUND_M / y < best.0 {
+            best.0 = GROUND_M / y;
+        }
+        for (number, car) in (1..).zip(&self.cars) {
+            let [car_x, car_z] = car.at_frame(frame);
+            let z = car_z - self.camera_z(frame);
+            let inside = (x * z - car_x).abs() < 0.9 && y * z < GROUND_M && y * z > GROUND_M - 1.4;
+            if z > 1.0 && inside && z < best.0 {
+                best = (z, number);
+            }
+        }
+        best
+    }
+
+    fn disparity(&self, frame: u32) -> Vec<u16> {
+        let of = |at: usize| (RIG.focal_baseline_px_m() / self.cast(frame, at % WIDTH, at / WIDTH).0 * 256.0) as u16;
+        (0..WIDTH * HEIGHT).map(of).collect()
+    }
+
+    /// Matches from the frame before, on a grid of the current frame.
+    fn matches(&self, frame: u32) -> Vec<Match> {
+        let mut random = Random::new(u64::from(frame));
+        let mut matches = Vec::new();
+        for (u, v) in (4..HEIGHT).step_by(5).flat_map(|v| (4..WIDTH).step_by(6).map(move |u| (u, v))) {
+            let (z, number) = self.cast(frame, u, v);
+            let now = [(u as f64 - RIG.center_u_px) * z / RIG.focal_px, (v as f64 - RIG.center_v_px) * z / RIG.focal_px, z];
+            let motion = number.checked_sub(1).map_or([0.0; 2], |car| self.cars[car].motion);
+            let before = [now[0] - motion[0], now[1], z - motion[1] + self.step_m];
+            let mut noise = || (random.below(2001) as f32 / 1000.0 - 1.0) * self.noise_px;
+            let [current_left, current_right] = project(now).map(|[u, v]| [u + noise(), v + noise()]);
+            let [previous_left, previous_right] = project(before).map(|[u, v]| [u + noise(), v + noise()]);
+            matches.push(Match { previous_left, previous_right, current_left, current_right });
+        }
+        matches
+    }
+
+    fn camera(&self, frame: u32) -> CameraMotion {
+        CameraMotion {
+            t_world_camera: Transform::from_translation([0.0, 0.0, self.camera_z(frame)]),
+            t_current_previous: (frame > 0).then(|| Transform::from_translation([0.0, 0.0, -self.step_m])),
+        }
+    }
+
+    /// Runs `frames` frames, with the detections `detect` returns, and shows the tracks and the report of each.
+    fn run(&self, frames: u32, mut detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
+        let config = TrackingConfig {
+            segmentation: SegmentationConfig { enabled: true, ..SegmentationConfig::default() },
+            area_min_px: 0,
+            track_area_min_px: 0,
+            ..TrackingConfig::default()
+        };
+        let bytes = Tracker::bytes(&CAPACITY) + crate::egomotion::Estimator::bytes(&CAPACITY);
+        let mut slab = vec![0u8; bytes + SLAB_ALIGN];
+        let mut carver = Carver::new(&mut slab, bytes).unwrap();
+        let mut tracker = Tracker::new_in(&CAPACITY, &config, &mut carver);
+        let mut estimator = crate::egomotion::Estimator::new_in(&CAPACITY, &mut carver);
+        (0..frames)
+            .map(|frame| {
+                let (matches, disparity) = (if frame > 0 { self.matches(frame) } else { Vec::new() }, self.disparity(frame));
+                let disparity_q8 = View::new(&disparity, WIDTH, HEIGHT).unwrap();
+                let owned = detect(frame);
+                let detections: Vec<Detection<'_>> = owned
+                    .iter()
+                    .map(|(pixels, mask)| Detection {
+                        class: Class::Car,
+                        score: 0.8,
+                        left: pixels.left,
+                        top: pixels.top,
+                        width: pixels.width as u32,
+                        height: pixels.height as u32,
+                        mask,
+                    })
+                    .collect();
+                let camera = self.camera(frame);
+                let detected: Detected<'_, '_> = tracker.detect(frame, &detections, [WIDTH, HEIGHT]);
+                let assigned = detected.assign_matches(FrameMatches { refined: &matches, sparse: &[] });
+                let tracked = assigned.segment_motion(&RIG, &camera, disparity_q8).estimate_motions(&RIG, &camera, None, &mut estimator);
+                let report = tracked.commit().segmentation;
+                (tracker.tracks().collect(), report)
+            })
+            .collect()
+    }
+
+    /// The mask of the first car, in its box.
+    fn mask(&self, frame: u32) -> (PixelBox, Vec<u8>) {
+        let on_car = |u: i32, v: i32| self.cast(frame, u as usize, v as usize).1 == 1;
+        let pixels = || (0..HEIGHT as i32).flat_map(|v| (0..WIDTH as i32).map(move |u| (u, v))).filter(|&(u, v)| on_car(u, v));
+        let (left, right) = (pixels().map(|(u, _)| u).min().unwrap(), pixels().map(|(u, _)| u).max().unwrap());
+        let (top, bottom) = (pixels().map(|(_, v)| v).min().unwrap(), pixels().map(|(_, v)| v).max().unwrap());
+        let mask = (top..=bottom).flat_map(|v| (left..=right).map(move |u| (u, v))).map(|(u, v)| u8::from(on_car(u, v))).collect();
+        (PixelBox { left, top, width: right + 1 - left, height: bottom + 1 - top }, mask)
+    }
+
+    /// Intersection over union of a box with the pixels of the first car.
+    fn overlap(&self, frame: u32, pixels: &PixelBox) -> f32 {
+        let on_car: Vec<(i32, i32)> = (0..WIDTH * HEIGHT)
+            .filter(|at| self.cast(frame, at % WIDTH, at / WIDTH).1 == 1)
+            .map(|at| ((at % WIDTH) as i32, (at / WIDTH) as i32))
+            .collect();
+        let both = on_car.iter().filter(|&&(u, v)| pixels.contains(u, v)).count() as i64;
+        both as f32 / (on_car.len() as i64 + pixels.area() - both) as f32
+    }
+}
+
+fn nothing(_: u32) -> Vec<(PixelBox, Vec<u8>)> {
+    Vec::new()
+}
+
+const OVERTAKING: Car = Car { at: [2.5, 9.0], motion: [0.0, 1.4] };
+const PARKED: Car = Car { at: [-3.0, 16.0], motion: [0.0, 0.0] };
+
+#[test]
+fn an_overtaking_car_is_found_by_its_motion_in_the_third_frame_and_a_parked_one_never() {
+    let world = World { cars: vec![OVERTAKING, PARKED], step_m: 0.8, noise_px: 0.2 };
+    let frames = world.run(10, nothing);
+    for (frame, (tracks, report)) in (0..).zip(&frames) {
+        assert_eq!(tracks.len(), usize::from(frame > 1), "frame {frame}: {report:?}");
+        let Some(track) = tracks.first() else { continue };
+        assert_eq!(track.class, Class::MovingObject);
+        let overlap = world.overlap(frame, &track.pixels);
+        assert!(track.detected && overlap > 0.7, "frame {frame}: {overlap} {:?}", track.pixels);
+    }
+    let track = frames[9].0[0];
+    assert_eq!(track.state, crate::tracking::MotionState::Dynamic);
+    assert!((track.speed_m_s.unwrap()[0] - 14.0).abs() < 0.5, "{:?}", track.speed_m_s);
+}
+
+#[test]
+fn where_nothing_moves_nothing_is_found() {
+    for step_m in [0.0, 0.4, 1.2] {
+        let world = World { cars: vec![PARKED, Car { at: [2.0, 12.0], ..PARKED }], step_m, noise_px: 0.3 };
+        for (frame, (tracks, report)) in world.run(8, nothing).iter().enumerate() {
+            assert_eq!((tracks.len(), report.groups), (0, 0), "frame {frame} at {step_m} m: {report:?}");
+        }
+    }
+}
+
+#[test]
+fn a_masked_car_is_not_found_twice() {
+    let world = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.2 };
+    let mask = |frame: u32| vec![world.mask(frame)];
+    for (frame, (tracks, report)) in world.run(6, mask).iter().enumerate() {
+        assert_eq!((tracks.len(), report.instances), (1, 0), "frame {frame}: {report:?}");
+    }
+}
+
+#[test]
+fn a_detector_that_comes_later_takes_the_track_over() {
+    let world = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.2 };
+    let mask = |frame: u32| if frame < 5 { Vec::new() } else { vec![world.mask(frame)] };
+    let frames = world.run(8, mask);
+    let (tracks, report) = &frames[7];
+    assert_eq!((tracks.len(), tracks[0].id, tracks[0].class, report.instances), (1, 1, Class::Car, 0));
+}
+
+#[test]
+fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
+    let world = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.2 };
+    let static_world = World { cars: vec![Car { motion: [0.0, 0.0], ..OVERTAKING }], step_m: 0.8, noise_px: 0.2 };
+    let mut hypotheses = vec![Hypothesis::default(); HYPOTHESES_MAX];
+    let mut followed = Hypotheses::new(&mut hypotheses);
+    let config = SegmentationConfig::default();
+    let model = |camera: &CameraMotion| StaticModel::new(&config, &RIG, &camera.t_current_previous.unwrap(), [0.25, 0.0]);
+    let bytes = MotionSegmenter::bytes(&CAPACITY);
+    let mut slab = vec![0u8; bytes + SLAB_ALIGN];
+    let mut carver = Carver::new(&mut slab, bytes).unwrap();
+    let mut segmenter = MotionSegmenter::new_in(&CAPACITY, &mut carver);
+    core::mem::swap(&mut segmenter.hypotheses, &mut followed);
+    let mut confirmed = Vec::new();
+    for frame in 1..9 {
+        let shown = if frame < 4 { &world } else { &static_world };
+        let (camera, matches) = (shown.camera(frame), shown.matches(frame));
+        let owner = vec![OwnerCode::default(); matches.len()];
+        segmenter.observe(&model(&camera), &camera, &matches, &owner);
+        confirmed.push(segmenter.hypotheses.all().iter().filter(|hypothesis| hypothesis.is_confirmed()).count());
+    }
+    assert_eq!(confirmed, [0, 1, 1, 1, 1, 1, 0, 0]);
+}
