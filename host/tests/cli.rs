@@ -3,7 +3,7 @@
 
 mod binary;
 
-use binary::{CALIB, dynvox, names, rig, output_text};
+use binary::{CALIB, dynvox, names, output_text, rig};
 use image::{GrayImage, Luma};
 use std::fs;
 use std::process::Output;
@@ -98,7 +98,8 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
     fs::write(root.path().join("rig/calib.txt"), CALIB).unwrap();
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result"]);
     assert!(
-        output_text(&run).contains("do not fit profile tiny") && output_text(&run).contains("--profile small, or shrink the images with --scale 0.5")
+        output_text(&run).contains("do not fit profile tiny")
+            && output_text(&run).contains("--profile small, or shrink the images with --scale 0.5")
     );
     assert!(output_text(&run).contains("desktop") && output_text(&run).contains("path, s"), "the table is shown");
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--scale", "0.5", "--quiet"]);
@@ -112,7 +113,11 @@ fn a_strict_run_fails_at_the_first_frame_that_affects_the_map_and_names_the_caus
     let run = |more: &[&str]| dynvox(root.path(), &[&["run", "--out", "result"], &street[..], more].concat());
     let strict = run(&["--strict"]);
     assert_eq!(strict.status.code(), Some(1));
-    assert!(output_text(&strict).contains("frame 0: map affected: ") && output_text(&strict).contains("block requests refused"), "{}", output_text(&strict));
+    assert!(
+        output_text(&strict).contains("frame 0: map affected: ") && output_text(&strict).contains("block requests refused"),
+        "{}",
+        output_text(&strict)
+    );
     assert!(names(root.path()).is_empty(), "nothing half-written");
     let coarse = ["--set", "volume.voxel_size_m=0.2"];
     assert!(run(&[&["--strict"], &coarse[..]].concat()).status.success(), "a map that fits is harmed by nothing");
@@ -153,7 +158,11 @@ fn more_resident_memory_than_allowed_ends_the_run_with_a_sentence() {
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--out", "result", "--rss-limit-mib", "1"]);
     if cfg!(target_os = "linux") {
         assert_eq!(run.status.code(), Some(1));
-        assert!(output_text(&run).contains("more than the 1048576 allowed") && output_text(&run).contains("--rss-limit-mib"), "{}", output_text(&run));
+        assert!(
+            output_text(&run).contains("more than the 1048576 allowed") && output_text(&run).contains("--rss-limit-mib"),
+            "{}",
+            output_text(&run)
+        );
     }
 }
 
@@ -222,7 +231,11 @@ fn a_written_street_is_mapped_as_a_kitti_folder() {
     let digest = |output: &Output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["digest"].clone();
     assert_eq!(digest(&from_disk), digest(&from_memory), "PNG files lose nothing");
     let refused = dynvox(root.path(), &["synth", "--out", "x", "--set", "street.width=1"]);
-    assert!(!refused.status.success() && output_text(&refused).contains("width") && !root.path().join("x").exists(), "{}", output_text(&refused));
+    assert!(
+        !refused.status.success() && output_text(&refused).contains("width") && !root.path().join("x").exists(),
+        "{}",
+        output_text(&refused)
+    );
 }
 
 #[test]
@@ -263,7 +276,11 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
     fs::write(root.path().join("street/sequences/00/velodyne/000001.bin"), [0; 17]).unwrap();
     assert!(run(&["street", "--images", "colour", "--out", "e"]).status.success());
     let refused = run(&["street", "--images", "colour", "--evaluate", "lidar", "--out", "f"]);
-    assert!(output_text(&refused).contains("000001.bin") && output_text(&refused).contains("whole number of points"), "{}", output_text(&refused));
+    assert!(
+        output_text(&refused).contains("000001.bin") && output_text(&refused).contains("whole number of points"),
+        "{}",
+        output_text(&refused)
+    );
     rig(root.path(), 2);
     let refused = run(&["rig", "--evaluate", "lidar", "--out", "g"]);
     assert!(output_text(&refused).contains("velodyne/") && !root.path().join("g").exists(), "{}", output_text(&refused));
@@ -445,7 +462,11 @@ fn a_closed_pipe_or_a_full_device_is_an_error_and_no_panic() {
     drop(reader);
     let run = std::process::Command::new(env!("CARGO_BIN_EXE_dynvox")).arg("budget").stdout(writer).output().unwrap();
     assert_eq!(run.status.code(), Some(1), "{}", output_text(&run));
-    assert!(output_text(&run).contains("standard output cannot be written") && !output_text(&run).contains("panicked"), "{}", output_text(&run));
+    assert!(
+        output_text(&run).contains("standard output cannot be written") && !output_text(&run).contains("panicked"),
+        "{}",
+        output_text(&run)
+    );
 }
 
 #[test]

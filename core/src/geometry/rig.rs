@@ -141,7 +141,7 @@ impl StereoRig {
     pub fn triangulate(&self, seen: &StereoObservation) -> Option<[f64; 3]> {
         let disparity = seen.disparity_px();
         // False for NaN as well.
-        if !(disparity >= DISPARITY_MIN_PX && disparity < f64::INFINITY && seen.v_px.is_finite()) {
+        if !((DISPARITY_MIN_PX..f64::INFINITY).contains(&disparity) && seen.v_px.is_finite()) {
             return None;
         }
         let per_px = self.baseline_m / disparity;

@@ -15,8 +15,8 @@ impl Tracker<'_> {
             masks,
             tracks,
             segmenter,
-            // Given by the caller, or of one frame alone.
-            config: _,
+            config,
+            // Of one frame alone.
             instances: _,
             owner: _,
             sparse_owner: _,
@@ -27,6 +27,9 @@ impl Tracker<'_> {
         } = self;
         masks.current_mut().visit(visitor);
         tracks.visit(visitor);
-        segmenter.visit(visitor);
+        // Without it the state is what it was before there was any.
+        if config.segmentation.enabled {
+            segmenter.visit(visitor);
+        }
     }
 }

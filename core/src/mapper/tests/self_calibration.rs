@@ -52,7 +52,7 @@ fn shifted((pixels, width, height): Grey, by_px: f64) -> Grey {
         let (row, column) = (at / width, (at % width) as i64 + whole as i64 - 1);
         let pixel = |k: i64| f64::from(pixels[row * width + (column + k).clamp(0, width as i64 - 1) as usize]);
         let sum: f64 = (0..4).zip(weights).map(|(k, weight)| weight * pixel(k)).sum();
-        sum.round().clamp(0.0, 255.0) as u8
+        sum.round() as u8
     };
     ((0..width * height).map(moved).collect(), width, height)
 }

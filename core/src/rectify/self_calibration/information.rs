@@ -22,7 +22,7 @@ pub(super) struct FrameInformation<const P: usize> {
     pub vector: [f64; P],
 }
 
-#[expect(clippy::indexing_slicing, reason = "all indices run below C or P, the lengths of all rows")]
+#[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below C or P, the lengths of all rows")]
 impl<const C: usize> Sums<C> {
     pub(super) const ZERO: Self = Self([[0.0; C]; C]);
 
@@ -81,7 +81,7 @@ pub(super) struct Prior<const P: usize> {
     pub frame_sigma: [f64; P],
 }
 
-#[expect(clippy::indexing_slicing, reason = "all indices run below P, the length of all rows")]
+#[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below P, the length of all rows")]
 impl<const P: usize> Information<P> {
     pub(super) const NONE: Self = Self { matrix: [[0.0; P]; P], vector: [0.0; P] };
 
@@ -130,7 +130,7 @@ impl<const P: usize> Information<P> {
 }
 
 /// What a positive definite matrix turns into `right`; `None` where it is not positive definite.
-#[expect(clippy::indexing_slicing, reason = "all indices run below P, the length of all rows")]
+#[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below P, the length of all rows")]
 fn solve<const P: usize>(matrix: &[[f64; P]; P], right: [f64; P]) -> Option<[f64; P]> {
     let (mut upper, mut solution) = (*matrix, right);
     for k in 0..P {

@@ -114,7 +114,7 @@ impl SelfCalibrationReport {
     /// The correction as it was found; `None` while too little is known.
     pub fn found(&self) -> Option<DisparityCorrection> {
         let applies = self.applied_offset_px != 0.0 || libm::fabs(self.offset_px) > APPLY_ABOVE_PX;
-        self.known.then(|| DisparityCorrection {
+        self.known.then_some(DisparityCorrection {
             offset_px: if applies { self.offset_px } else { 0.0 },
             slope_px: self.slope_px,
             quartic_px: self.quartic_px,

@@ -34,7 +34,7 @@ impl Ground {
             let slope = SLOPE_STEP * f64::from(step);
             let mut votes = [0u32; HEIGHTS];
             for [x, y, z] in lattice.points_below_horizon() {
-                if z < NEAR_M || z > FAR_M || libm::fabs(x) > SIDE_M {
+                if !(NEAR_M..=FAR_M).contains(&z) || libm::fabs(x) > SIDE_M {
                     continue;
                 }
                 let bin = (y - slope * z - HEIGHT_MIN_M) / HEIGHT_STEP_M;

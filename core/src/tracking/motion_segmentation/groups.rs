@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// Most candidates of a frame.
 pub(super) const CANDIDATES_MAX: usize = 1024;
 /// Most groups of a frame.
-pub(super) const GROUPS_MAX: usize = 64;
+pub(super) const GROUPS_MAX: usize = 32;
 
 /// Distance in the image at which two candidates may be neighbours, m, and at least, px.
 const NEIGHBOUR_M: f64 = 0.9;

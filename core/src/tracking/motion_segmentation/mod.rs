@@ -11,7 +11,7 @@
 //!
 //! Matches assigned to an instance of the detector are left out: an object is not found twice.
 //!
-//! Memory: 48 bytes for each of 1,024 candidates, a byte a match, 5 bytes for each 4 x 4 px of the image, 88 bytes for each of 64
+//! Memory: 44 bytes for each of 1,024 candidates, a byte a match, 5 bytes for each 4 x 4 px of the image, 88 bytes for each of 64
 //! hypotheses. Time: a triangulation and projection a match, a comparison for each pair of candidates, and the cells of each mask.
 //!
 //! # What can go wrong
