@@ -37,7 +37,7 @@ pub struct AllocationReport {
     pub unlisted: u32,
     /// Most blocks the index had to compare to find one, or to find it missing.
     pub probes_most: u32,
-    /// Blocks that left to make room, and such that came back.
+    /// Blocks evicted for others, and blocks loaded again.
     pub eviction: EvictionReport,
 }
 
@@ -124,7 +124,7 @@ impl Volume<'_> {
             self.pool.free(slot);
             return None;
         }
-        self.history.born(slot, self.visible.frame());
+        self.history.allocated_at(slot, self.visible.frame());
         Some(slot)
     }
 

@@ -140,7 +140,7 @@ impl<'s> Blocks<'s> {
         }
     }
 
-    /// Visits the block in a slot: its place, its voxels and what they were last summed up to. The digest of a block that was made and
+    /// Visits the block in a slot: its coordinates, its voxels and what they were last summed up to. The digest of a block that was made and
     /// never fused is 0, which its voxels would not tell.
     pub(super) fn visit(&mut self, slot: Slot, visitor: &mut impl Visitor) {
         let Self { header, voxels, colour } = self;

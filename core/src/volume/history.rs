@@ -1,7 +1,7 @@
 //! Which blocks were visible in each of the last frames: the paper's fixed-lag window (Section III-F).
 //!
 //! A ring of bit sets over the pool's slots, one per frame. A slot that was freed and given out again since is told apart by the frame its
-//! block was born in. Walking a set visits slots in ascending order, on every machine.
+//! block was allocated in. Walking a set visits slots in ascending order, on every machine.
 //!
 //! Memory: `frames * ceil(blocks / 64) * 8` bytes, one more set for what a frame could not finish, and 4 bytes a block: 1.7 MiB for 200
 //! frames of 70,000 blocks, where lists of coordinates would take 13.7 MiB (docs/decisions/0005-history-of-bit-sets.md). Time: one bit
@@ -20,7 +20,7 @@ pub struct VisibleHistory<'s> {
     /// What has been taken out of the ring and not been visited yet.
     due: &'s mut [u64],
     /// The frame each slot's block was made in.
-    born: &'s mut [u32],
+    allocated_at: &'s mut [u32],
     /// Frame number of the oldest set, and how many there are.
     oldest: u32,
     len: usize,
@@ -46,7 +46,7 @@ impl<'s> VisibleHistory<'s> {
             sets: carver.alloc("volume.history", capacity.history_frames * words),
             words,
             due: carver.alloc("volume.history_due", words),
-            born: carver.alloc("volume.born", capacity.blocks),
+            allocated_at: carver.alloc("volume.born", capacity.blocks),
             oldest: 0,
             len: 0,
             peak: 0,
@@ -74,15 +74,15 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// Notes that the block in `slot` was made in `frame`.
-    pub(super) fn born(&mut self, slot: Slot, frame: u32) {
-        if let Some(born) = self.born.get_mut(slot.index()) {
-            *born = frame;
+    pub(super) fn allocated_at(&mut self, slot: Slot, frame: u32) {
+        if let Some(allocated_at) = self.allocated_at.get_mut(slot.index()) {
+            *allocated_at = frame;
         }
     }
 
     /// Notes that the block in `slot` is gone: it is no longer due, and what the ring says of it is void.
-    pub(super) fn gone(&mut self, slot: Slot) {
-        self.born(slot, u32::MAX);
+    pub(super) fn on_free(&mut self, slot: Slot) {
+        self.allocated_at(slot, u32::MAX);
         if let Some(word) = self.due.get_mut(slot.index() / 64) {
             *word &= !(1 << (slot.get() % 64));
         }
@@ -120,7 +120,7 @@ impl<'s> VisibleHistory<'s> {
                 let bit = bits.trailing_zeros();
                 bits &= bits - 1;
                 let slot = i * 64 + bit as usize;
-                if self.born.get(slot).is_some_and(|&born| born <= frame) {
+                if self.allocated_at.get(slot).is_some_and(|&allocated_at| allocated_at <= frame) {
                     *due |= 1 << bit;
                 }
             }
@@ -128,10 +128,10 @@ impl<'s> VisibleHistory<'s> {
         Some(frame)
     }
 
-    /// Visits every field, in a pool of which `slots` slots were ever given out.
+    /// Visits every field, in a pool that gave out `slots` slots at most.
     pub(super) fn visit(&mut self, slots: usize, visitor: &mut impl Visitor) {
         let (capacity, used) = (self.capacity(), slots.div_ceil(64));
-        let Self { sets, words, due, born, oldest, len, peak } = self;
+        let Self { sets, words, due, allocated_at, oldest, len, peak } = self;
         visitor.u32(oldest);
         visitor.count(len, capacity);
         visitor.count(peak, capacity);
@@ -140,7 +140,7 @@ impl<'s> VisibleHistory<'s> {
             visitor.u64s(sets.get_mut(at..at + used).unwrap_or(&mut []));
         }
         visitor.u64s(due.get_mut(..used).unwrap_or(&mut []));
-        visitor.u32s(born.get_mut(..slots).unwrap_or(&mut []));
+        visitor.u32s(allocated_at.get_mut(..slots).unwrap_or(&mut []));
     }
 
     /// The oldest frame in the ring.

@@ -10,7 +10,7 @@ use super::{BlockCoord, Full, Slot};
 use crate::memory::{Carver, OneShot, region_bytes};
 use hashbrown::HashTable;
 
-/// Room for the control group that hashbrown appends, and for aligning the control bytes.
+/// Space for the control group that hashbrown appends, and for aligning the control bytes.
 const GROUP_BYTES: usize = 64;
 
 /// The index.
@@ -92,7 +92,7 @@ impl<'s> BlockIndex<'s> {
         Ok(())
     }
 
-    /// Strikes the block at `coord`. Whether it was there.
+    /// Removes the block at `coord`. Whether it was there.
     pub fn remove(&mut self, coord: BlockCoord, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> bool {
         match self.table.find_entry(hash(coord), |&slot| coord_of(slot) == Some(coord)) {
             Ok(entry) => {

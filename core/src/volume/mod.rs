@@ -115,13 +115,13 @@ impl<'s> Volume<'s> {
         Sampler::new(&self.index, &self.blocks)
     }
 
-    /// Digest of the places and contents of all blocks, whatever the order they were made in: the wrapping sum of theirs.
+    /// Digest of the coordinates and contents of all blocks, in any order they were made: the wrapping sum of theirs.
     pub fn digest(&self) -> u64 {
         self.digest
     }
 
     /// Sums a block up anew after its content changed, and corrects the map's digest by the difference.
-    fn sum_up(&mut self, slot: Slot) {
+    fn update_digest(&mut self, slot: Slot) {
         let at = slot.index();
         if let (Some(header), Some(voxels)) = (self.blocks.header.get_mut(at), self.blocks.voxels.get(at)) {
             let new = fuse::block_digest(header.coord(), voxels, self.blocks.colour.get(at));

@@ -1,6 +1,6 @@
 //! A pool of numbered slots with a free list.
 //!
-//! The pool hands out positions, not memory: whoever owns the payload keeps it in arrays of the same length.
+//! The pool hands out positions, not memory: the owner of the payload keeps it in arrays of the same length.
 //!
 //! Memory: 4 bytes and 1 bit per slot (a free-list entry, whether the slot is taken). Time: constant; a walk over the slots taken visits
 //! 64 of them a step where none is. Order: a new pool gives out 0, 1, 2, …; a freed slot is the next one given out.

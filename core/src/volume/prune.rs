@@ -51,7 +51,7 @@ impl Volume<'_> {
         report
     }
 
-    /// Prunes everything still in the window, as at the end of a drive.
+    /// Prunes everything still in the window, as at the end of a run.
     pub fn finish(&mut self) -> PruneReport {
         let mut report = PruneReport::default();
         while self.history.expire().is_some() {}
@@ -83,31 +83,31 @@ impl Volume<'_> {
         report.carried_over = self.history.due();
     }
 
-    /// Resets the faint voxels of a block, and frees it when nothing is left. How many were reset, and whether it was freed.
+    /// Resets the voxels of low weight in a block, and frees it when nothing is left. How many were reset, and whether it was freed.
     pub(super) fn prune_block(&mut self, slot: Slot, prune_weight: u8) -> (u32, bool) {
         let at = slot.index();
-        // Most blocks are known to hold nothing faint without a look at them.
+        // Most blocks are known to hold no voxel of low weight without reading them.
         let by_distance = self.config.prune_distance > 0.0;
         if !by_distance && self.blocks.header.get(at).is_some_and(|header| header.min_weight > prune_weight) {
             return (0, false);
         }
         let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else { return (0, false) };
         let census = Census::of(weight, prune_weight);
-        // A block that leaves is not cleared: whoever takes its slot does that.
-        if census.kept == 0 {
+        // A block that leaves is not cleared: the next block in its slot does that.
+        if census.remaining == 0 {
             self.free_block(slot);
-            return (census.faint, true);
+            return (census.low_weight, true);
         }
-        if census.faint > 0 {
-            reset_faint(prune_weight, sdf, weight, self.blocks.colour.get_mut(at));
+        if census.low_weight > 0 {
+            reset_low_weight(prune_weight, sdf, weight, self.blocks.colour.get_mut(at));
         }
         let far = by_distance && nearest(sdf, weight) > self.config.prune_distance;
         if far {
             self.free_block(slot);
-        } else if census.faint > 0 {
-            self.sum_up(slot);
+        } else if census.low_weight > 0 {
+            self.update_digest(slot);
         }
-        (census.faint, far)
+        (census.low_weight, far)
     }
 
     /// Takes a block out of the map.
@@ -115,8 +115,8 @@ impl Volume<'_> {
         let Some(coord) = self.blocks.coord(slot) else { return };
         self.index.remove(coord, |slot| self.blocks.coord(slot));
         self.digest = self.digest.wrapping_sub(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));
-        self.history.gone(slot);
-        self.recency.strike(slot);
+        self.history.on_free(slot);
+        self.recency.remove(slot);
         self.pool.free(slot);
     }
 }
@@ -125,9 +125,9 @@ impl Volume<'_> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Census {
     /// Voxels seen, but at most `prune_weight` times.
-    faint: u32,
+    low_weight: u32,
     /// Voxels seen more often.
-    kept: u32,
+    remaining: u32,
 }
 
 /// Voxels counted at a time: their number fits into a byte, so that the count runs in vectors of bytes.
@@ -136,29 +136,29 @@ const GROUP: usize = 128;
 impl Census {
     /// Counts a block's voxels. Pruning reads nothing else of most blocks it visits, so this is its cost.
     fn of(weight: &[u8; BLOCK_VOXELS], prune_weight: u8) -> Self {
-        let mut census = Self { faint: 0, kept: 0 };
+        let mut census = Self { low_weight: 0, remaining: 0 };
         for group in weight.as_chunks::<GROUP>().0 {
             // Weight 0 becomes 255, which no prune weight exceeds.
-            census.faint += u32::from(group.iter().map(|&weight| u8::from(weight.wrapping_sub(1) < prune_weight)).sum::<u8>());
-            census.kept += u32::from(group.iter().map(|&weight| u8::from(weight > prune_weight)).sum::<u8>());
+            census.low_weight += u32::from(group.iter().map(|&weight| u8::from(weight.wrapping_sub(1) < prune_weight)).sum::<u8>());
+            census.remaining += u32::from(group.iter().map(|&weight| u8::from(weight > prune_weight)).sum::<u8>());
         }
         census
     }
 }
 
 /// Resets voxels seen at most `prune_weight` times.
-fn reset_faint(
+fn reset_low_weight(
     prune_weight: u8,
     sdf: &mut [i16; BLOCK_VOXELS],
     weight: &mut [u8; BLOCK_VOXELS],
     planes: Option<&mut [[u8; BLOCK_VOXELS]; 3]>,
 ) {
-    let kept = |weight: u8| weight > prune_weight;
+    let remaining = |weight: u8| weight > prune_weight;
     for plane in planes.into_iter().flatten() {
-        plane.iter_mut().zip(weight.iter()).for_each(|(channel, &weight)| *channel = if kept(weight) { *channel } else { 0 });
+        plane.iter_mut().zip(weight.iter()).for_each(|(channel, &weight)| *channel = if remaining(weight) { *channel } else { 0 });
     }
-    sdf.iter_mut().zip(weight.iter()).for_each(|(sdf, &weight)| *sdf = if kept(weight) { *sdf } else { 0 });
-    weight.iter_mut().for_each(|weight| *weight = if kept(*weight) { *weight } else { 0 });
+    sdf.iter_mut().zip(weight.iter()).for_each(|(sdf, &weight)| *sdf = if remaining(weight) { *sdf } else { 0 });
+    weight.iter_mut().for_each(|weight| *weight = if remaining(*weight) { *weight } else { 0 });
 }
 
 /// Smallest |distance| of the seen voxels, as a share of the truncation.

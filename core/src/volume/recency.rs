@@ -44,7 +44,7 @@ impl<'s> Recency<'s> {
         if self.ends[NEWER] == link(slot) {
             return;
         }
-        self.strike(slot);
+        self.remove(slot);
         let last = self.ends[NEWER];
         self.link(link(slot), [last, 0]);
         self.set(last, NEWER, link(slot));
@@ -52,7 +52,7 @@ impl<'s> Recency<'s> {
     }
 
     /// Takes `slot` out of the list; nothing happens when it is not in it.
-    pub(super) fn strike(&mut self, slot: Slot) {
+    pub(super) fn remove(&mut self, slot: Slot) {
         let Some(&[older, newer]) = self.links.get(slot.index()) else { return };
         let alone = self.ends == [link(slot); 2];
         if [older, newer] == [0; 2] && !alone {
@@ -63,7 +63,7 @@ impl<'s> Recency<'s> {
         self.link(link(slot), [0; 2]);
     }
 
-    /// Visits every field, in a pool of which `slots` slots were ever given out.
+    /// Visits every field, in a pool that gave out `slots` slots at most.
     pub(super) fn visit(&mut self, slots: usize, visitor: &mut impl Visitor) {
         let Self { links, ends } = self;
         visitor.u32s(ends);
@@ -106,7 +106,7 @@ mod tests {
             let slot = Slot::new(random.below(SLOTS));
             model.retain(|&other| other != slot);
             if random.below(3) == 0 {
-                recency.strike(slot);
+                recency.remove(slot);
             } else {
                 recency.touch(slot);
                 model.push(slot);

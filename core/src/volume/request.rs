@@ -158,7 +158,7 @@ impl<'a> Rays<'a> {
         (self.offset[1] + row) % PIXEL_STEP
     }
 
-    /// Walks a band's rays until it ends or its list may have no room for another one.
+    /// Walks a band's rays until it ends or its list may be too short for another one.
     pub fn walk(&self, band: &mut Band<'_>) {
         let [corner, per_column, per_row] = self.rays;
         while band.next[0] < band.end {

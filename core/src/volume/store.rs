@@ -2,14 +2,14 @@
 //!
 //! When a block is to be made and no slot is free, the block unseen for longest leaves, unless it was visible in this frame or the last:
 //! then the pool is too small for what is in view, and the new block is refused. What is still within the pruning window when it leaves is
-//! pruned first, as it would have been had it stayed. Constant work per block made, whatever the size of the map.
+//! pruned first, as it would have been had it stayed. Constant work per block made, for maps of any size.
 
 use super::{BLOCK_VOXELS, BlockCoord, Slot, Volume, block::Voxels, config::WhenFull};
 
 /// A block as it leaves the map.
 #[derive(Clone, Copy, Debug)]
 pub struct LeavingBlock<'b> {
-    /// Its place.
+    /// Its coordinates.
     pub coord: BlockCoord,
     /// Signed distances.
     pub sdf: &'b [i16; BLOCK_VOXELS],
@@ -22,7 +22,7 @@ pub struct LeavingBlock<'b> {
 /// A block to be filled with what was kept of it. All zero as it comes.
 #[derive(Debug)]
 pub struct ReturningBlock<'b> {
-    /// Its place.
+    /// Its coordinates.
     pub coord: BlockCoord,
     /// Signed distances.
     pub sdf: &'b mut [i16; BLOCK_VOXELS],
@@ -70,7 +70,7 @@ pub struct EvictionReport {
 }
 
 impl Volume<'_> {
-    /// Makes room by letting the block unseen for longest leave. Whether there is room now.
+    /// Evicts the block unseen for longest. Whether a slot is free now.
     pub(super) fn evict<S: BlockStore>(&mut self, store: &mut S, report: &mut EvictionReport) -> bool {
         let Some(slot) = self.recency.oldest() else { return false };
         if self.config.when_full == WhenFull::Refuse || self.visible.was_lately(slot) {
@@ -102,7 +102,7 @@ impl Volume<'_> {
         })
     }
 
-    /// Lets every block leave, in slot order, as at the end of a drive.
+    /// Lets every block leave, in slot order, as at the end of a run.
     pub fn stream_out<S: BlockStore>(&mut self, store: &mut S) -> EvictionReport {
         let mut report = EvictionReport::default();
         let mut from = 0;
@@ -139,7 +139,7 @@ impl Volume<'_> {
         let colour = self.blocks.colour.get_mut(at);
         let returned = store.bring_back(ReturningBlock { coord, sdf, weight, colour });
         if returned {
-            self.sum_up(slot);
+            self.update_digest(slot);
         }
         returned
     }

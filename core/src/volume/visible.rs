@@ -1,7 +1,7 @@
 //! The blocks visible in the current frame.
 //!
 //! A block is visible when the frame's depth runs through it, or when it was visible in the frame before and still lies in the picture:
-//! the second is what carves free space where noise once put a surface.
+//! the second is what clears space where noise once put a surface.
 //!
 //! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
 
@@ -88,7 +88,7 @@ impl<'s> VisibleList<'s> {
         self.before.get(..self.before_len)?.get(i).copied()
     }
 
-    /// Visits every field, in a pool of which `end` slots were ever given out.
+    /// Visits every field, in a pool that gave out `end` slots at most.
     pub(super) fn visit(&mut self, end: usize, visitor: &mut impl Visitor) {
         let Self {
             slots,

@@ -40,8 +40,8 @@ impl Volume<'_> {
         audit.require(self.visible.slots().iter().all(|slot| slot.index() < end), "every visible slot was given out");
     }
 
-    /// Enters the blocks that were read into the index, in slot order, and sums their digests. Whether they can be: no place twice, room for all. Nothing that
-    /// comes later depends on the order the index was filled in: it only ever answers for one place, and nothing walks it.
+    /// Inserts the blocks that were read into the index, in slot order, and sums their digests. Whether they can be: no coordinates twice,
+    /// space for all. Nothing that comes later depends on the order of insertion: the index answers for one block, and nothing walks it.
     pub(crate) fn rebuild(&mut self) -> bool {
         for slot in self.pool.live() {
             let Some(coord) = self.blocks.coord(slot) else { return false };

@@ -1,6 +1,6 @@
 //! The map as triangles, handed out one by one: marching cubes (Lorensen, Cline, 1987) with a table that cannot crack.
 //!
-//! A cell spans eight neighbouring lattice points. A cell of which one was never seen gives nothing: the mesh ends where knowledge
+//! A cell spans eight neighbouring lattice points. A cell with a corner that was never observed gives nothing: the mesh ends where knowledge
 //! ends. A lattice point with a distance of 0 or below lies inside. A vertex lies on the edge between an inside and an outside point, where
 //! the distance between them is 0 if it runs straight; it is computed from the edge alone, always from the lower point to the upper, so
 //! that all cells and blocks around an edge give the same bits. Triangles with two equal corners, as distances of exactly 0 make them, are
@@ -46,12 +46,12 @@ impl Volume<'_> {
         self.triangles_of(config, |_| true, sink)
     }
 
-    /// As [`Volume::triangles`], of the blocks that `wanted` picks alone; the others only lend their points. So a map can be drawn piece by
+    /// As [`Volume::triangles`], of the blocks that `is_selected` picks alone; the others only lend their points. So a map can be drawn piece by
     /// piece: a block's triangles need the blocks after it on each axis, and no more.
-    pub fn triangles_of(&self, config: &MeshConfig, wanted: impl Fn(BlockCoord) -> bool, sink: &mut impl FnMut(Triangle)) -> u64 {
+    pub fn triangles_of(&self, config: &MeshConfig, is_selected: impl Fn(BlockCoord) -> bool, sink: &mut impl FnMut(Triangle)) -> u64 {
         let mut count = 0;
         for slot in self.pool().live() {
-            if let Some(coord) = self.blocks().coord(slot).filter(|&coord| wanted(coord)) {
+            if let Some(coord) = self.blocks().coord(slot).filter(|&coord| is_selected(coord)) {
                 let patch = Patch::load(self, slot, coord, config.min_weight);
                 patch.cells(|cell, inside| count += patch.polygonise(cell, inside, sink));
             }
@@ -93,10 +93,10 @@ impl<'v, 's> Patch<'v, 's> {
     fn copy(&mut self, n: usize, min_weight: u8) {
         let Some(slot) = self.slots.get(n).copied().flatten() else { return };
         let (Some(sdf), Some(weight)) = (self.blocks.sdf(slot), self.blocks.weight(slot)) else { return };
-        let places = |axis: usize| if n >> axis & 1 == 1 { BLOCK_SIDE..SIDE } else { 0..BLOCK_SIDE };
-        let columns = places(0);
-        for z in places(2) {
-            for y in places(1) {
+        let span = |axis: usize| if n >> axis & 1 == 1 { BLOCK_SIDE..SIDE } else { 0..BLOCK_SIDE };
+        let columns = span(0);
+        for z in span(2) {
+            for y in span(1) {
                 let from = (y % BLOCK_SIDE) * BLOCK_SIDE + (z % BLOCK_SIDE) * BLOCK_SIDE * BLOCK_SIDE;
                 let to = (y + z * SIDE) * SIDE;
                 let Some(to) = self.sdf.get_mut(to + columns.start..to + columns.end) else { return };
@@ -112,11 +112,11 @@ impl<'v, 's> Patch<'v, 's> {
     #[expect(clippy::indexing_slicing, reason = "y and z stay below 8, so the rows beside them below 81")]
     fn cells(&self, mut visit: impl FnMut([usize; 3], usize)) {
         // Bit x of a row: the point was seen; it lies inside.
-        let mut seen = [0u16; SIDE * SIDE];
+        let mut observed = [0u16; SIDE * SIDE];
         let mut inside = [0u16; SIDE * SIDE];
-        for ((row, seen), inside) in self.sdf.as_chunks::<SIDE>().0.iter().zip(&mut seen).zip(&mut inside) {
+        for ((row, observed), inside) in self.sdf.as_chunks::<SIDE>().0.iter().zip(&mut observed).zip(&mut inside) {
             for (x, &sdf) in row.iter().enumerate() {
-                *seen |= u16::from(sdf != UNSEEN) << x;
+                *observed |= u16::from(sdf != UNSEEN) << x;
                 *inside |= u16::from(sdf <= 0) << x;
             }
         }
@@ -125,10 +125,10 @@ impl<'v, 's> Patch<'v, 's> {
                 let row = y + z * SIDE;
                 let four = |bits: &[u16; SIDE * SIDE]| [bits[row], bits[row + 1], bits[row + SIDE], bits[row + SIDE + 1]];
                 let rows = four(&inside);
-                let all_seen = four(&seen).iter().fold(u16::MAX, |all, bits| all & bits);
+                let all_observed = four(&observed).iter().fold(u16::MAX, |all, bits| all & bits);
                 let any = rows.iter().fold(0, |any, bits| any | bits);
                 let all = rows.iter().fold(u16::MAX, |all, bits| all & bits);
-                let mut crossed = all_seen & all_seen >> 1 & (any | any >> 1) & !(all & all >> 1) & 0xFF;
+                let mut crossed = all_observed & all_observed >> 1 & (any | any >> 1) & !(all & all >> 1) & 0xFF;
                 while crossed != 0 {
                     let x = crossed.trailing_zeros() as usize;
                     crossed &= crossed - 1;
@@ -177,15 +177,15 @@ impl<'v, 's> Patch<'v, 's> {
         let [at_low, at_high] = [low, high].map(sdf);
         // One is above 0 and the other is not, so they differ.
         let share = at_low / (at_low - at_high);
-        let mut place = [0.0; 3];
-        for ((place, origin), low) in place.iter_mut().zip(self.origin).zip(low) {
-            *place = (origin + low as i32) as f32;
+        let mut position = [0.0; 3];
+        for ((position, origin), low) in position.iter_mut().zip(self.origin).zip(low) {
+            *position = (origin + low as i32) as f32;
         }
-        if let Some(along) = place.get_mut(axis) {
+        if let Some(along) = position.get_mut(axis) {
             *along += share;
         }
         Vertex {
-            position_m: place.map(|c| self.voxel_size_m * c),
+            position_m: position.map(|c| self.voxel_size_m * c),
             colour: mix(self.colour(low), self.colour(high), share),
         }
     }

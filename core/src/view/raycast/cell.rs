@@ -14,7 +14,7 @@ pub(super) struct Corners {
     /// Signed distances.
     pub sdf: [f32; 8],
     /// Which were seen often enough, a bit per corner.
-    pub seen: u8,
+    pub observed: u8,
 }
 
 impl Corners {
@@ -23,7 +23,7 @@ impl Corners {
     #[expect(clippy::indexing_slicing, reason = "masks keep corners below 8")]
     pub fn complete(&self) -> Option<[f32; 8]> {
         let mut known = [0.0; 8];
-        (0..).zip(&mut known).for_each(|(corner, known)| *known = f32::from(self.seen >> corner & 1));
+        (0..).zip(&mut known).for_each(|(corner, known)| *known = f32::from(self.observed >> corner & 1));
         let slope = |low: [usize; 4], step: usize| {
             let (mut sum, mut edges) = (0.0, 0.0);
             for low in low {
@@ -95,7 +95,7 @@ impl Field {
 
 /// A ray's way through a cell, from where it enters to where it leaves, in the cell's own coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Passage {
+pub(super) struct RaySegment {
     from: [f32; 3],
     to: [f32; 3],
 }
@@ -103,7 +103,7 @@ pub(super) struct Passage {
 /// In place of an axis: within a cell, not on a wall.
 pub(super) const NO_AXIS: usize = 3;
 
-impl Passage {
+impl RaySegment {
     /// The way between two depths through a cell that the ray enters and leaves across `axes` ([`NO_AXIS`] where it begins within), given
     /// where the ray would be at depth 0 from the cell's first corner. Coordinates on these walls are exactly 0 or 1.
     #[inline(always)]
@@ -205,9 +205,9 @@ mod tests {
         let plane = |corner: usize| 100.0 + 300.0 * (corner & 1) as f32 - 50.0 * (corner >> 1 & 1) as f32 - 700.0 * (corner >> 2) as f32;
         let whole: [f32; 8] = core::array::from_fn(plane);
         let mut told = 0;
-        for seen in 0..=u8::MAX {
-            let sdf = core::array::from_fn(|corner| if seen >> corner & 1 == 1 { plane(corner) } else { 9_999.0 });
-            if let Some(corners) = (Corners { sdf, seen }).complete() {
+        for observed in 0..=u8::MAX {
+            let sdf = core::array::from_fn(|corner| if observed >> corner & 1 == 1 { plane(corner) } else { 9_999.0 });
+            if let Some(corners) = (Corners { sdf, observed }).complete() {
                 told += 1;
                 corners.iter().zip(whole).for_each(|(sdf, whole)| assert!((sdf - whole).abs() < 1e-3));
             }

@@ -15,7 +15,7 @@ const SLACK_PX: f32 = 0.02;
 
 /// The camera as rays and boxes need it.
 #[derive(Clone, Debug)]
-pub(super) struct Eye {
+pub(super) struct RayCamera {
     /// The camera's block: local block coordinates count from here.
     pub base: [i32; 3],
     /// The camera, in local lattice units.
@@ -48,7 +48,7 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-impl Eye {
+impl RayCamera {
     /// `None` when the pose is no rigid motion or beyond the map, or the rig is absurd.
     pub fn new(view: &Viewpoint, voxel_size_m: f32) -> Option<Self> {
         view.rig.validate().ok()?;
@@ -90,8 +90,8 @@ impl Eye {
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     pub fn extent(&self, center: [f32; 3], half: [f32; 3], near_m: f32, far_m: f32) -> Option<Extent> {
         let from_eye = [center[0] - self.origin[0], center[1] - self.origin[1], center[2] - self.origin[2]];
-        let seen = |axis: usize| (dot(self.rows[axis], from_eye), dot(self.reaches[axis], half));
-        let (across, down, (z, z_reach)) = (seen(0), seen(1), seen(2));
+        let projected = |axis: usize| (dot(self.rows[axis], from_eye), dot(self.reaches[axis], half));
+        let (across, down, (z, z_reach)) = (projected(0), projected(1), projected(2));
         let depth_m = [max_f32(z - z_reach, near_m), min_f32(z + z_reach, far_m)];
         if depth_m[0] > depth_m[1] {
             return None;

@@ -1,9 +1,9 @@
 //! One ray's way to the surface.
 
 use super::{
-    cell::{Corners, Field, NO_AXIS, Passage, mean, within},
-    eye::{Depth, Eye, Ray, depth_from_m, depth_in_m},
-    spot::{CORNER_STRIDES, Spot, WALLS, Wall},
+    cell::{Corners, Field, NO_AXIS, RaySegment, mean, within},
+    eye::{Depth, Ray, RayCamera, depth_from_m, depth_in_m},
+    spot::{CORNER_STRIDES, CellFace, CellIndex, FACES},
     surface::Surface,
 };
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks, Slot};
@@ -28,12 +28,12 @@ pub(super) struct Hit {
 pub(super) struct Marcher<'a, 's> {
     pub surface: &'a Surface<'s>,
     pub blocks: &'a Blocks<'s>,
-    pub eye: &'a Eye,
+    pub eye: &'a RayCamera,
     pub min_weight: u8,
 }
 
 /// A block that a ray is in.
-struct Here<'a> {
+struct BlockContext<'a> {
     ray: &'a Ray,
     /// The slots of the block (0) and of those after it.
     slots: &'a [Slot; 8],
@@ -43,10 +43,10 @@ struct Here<'a> {
     offset: [f32; 3],
 }
 
-impl Here<'_> {
+impl BlockContext<'_> {
     /// Where the ray would be at depth 0, from a cell's first corner.
     #[inline(always)]
-    fn offset(&self, spot: Spot) -> [f32; 3] {
+    fn offset(&self, spot: CellIndex) -> [f32; 3] {
         let [x, y, z] = self.offset;
         [x - spot.coordinate(0) as f32, y - spot.coordinate(1) as f32, z - spot.coordinate(2) as f32]
     }
@@ -55,9 +55,9 @@ impl Here<'_> {
 /// A ray's way through one crossed cell.
 #[derive(Clone, Copy)]
 struct Step {
-    spot: Spot,
+    spot: CellIndex,
     /// Whether all corners were seen.
-    whole: bool,
+    fully_observed: bool,
     from: Depth,
     to: Depth,
     /// The axes across which the ray enters, or [`NO_AXIS`], and leaves.
@@ -66,7 +66,7 @@ struct Step {
 
 /// The field where a ray left the last crossed cell, and the depth of that place.
 #[derive(Clone, Copy, Default)]
-struct Trail {
+struct PreviousSample {
     value: f32,
     depth: Depth,
 }
@@ -74,7 +74,7 @@ struct Trail {
 /// Where the surface was met.
 struct Crossing<'a> {
     slots: &'a [Slot; 8],
-    spot: Spot,
+    spot: CellIndex,
     /// The field's gradient there.
     gradient: [f32; 3],
     /// The place in the cell.
@@ -89,11 +89,12 @@ impl Marcher<'_, '_> {
     pub fn cast(&self, u: usize, v: usize, [from_m, to_m]: [f32; 2]) -> Option<Hit> {
         let ray = &self.eye.ray(u, v);
         let (mut from, last) = (depth_from_m(from_m), depth_from_m(to_m));
-        let [turn_x, turn_y, turn_z] = [Spot::turn(0, ray.ahead[0]), Spot::turn(1, ray.ahead[1]), Spot::turn(2, ray.ahead[2])];
+        let [delta_x, delta_y, delta_z] =
+            [CellIndex::delta(0, ray.ahead[0]), CellIndex::delta(1, ray.ahead[1]), CellIndex::delta(2, ray.ahead[2])];
         let [stride_x, stride_y, stride_z] = [ray.stride(0), ray.stride(1), ray.stride(2)];
         let (mut block, mut spot, [mut next_x, mut next_y, mut next_z]) = begin(ray, from);
         let mut entered = NO_AXIS;
-        let mut trail = Trail::default();
+        let mut trail = PreviousSample::default();
         for _ in 0..MAX_BLOCKS {
             let Some(entry) = self.surface.entry(block) else {
                 (from, entered) = ray.leaves(block);
@@ -104,7 +105,7 @@ impl Marcher<'_, '_> {
                 continue;
             };
             let (cells, slots) = self.surface.block(entry)?;
-            let here = Here { ray, slots, sdf: self.blocks.sdf(slots[0])?, offset: ray.offset(block) };
+            let here = BlockContext { ray, slots, sdf: self.blocks.sdf(slots[0])?, offset: ray.offset(block) };
             for _ in 0..MAX_CELLS {
                 // Ties go to the first axis; the cells of no depth between them stop no ray.
                 let (to, axis) = if next_x <= next_y {
@@ -117,15 +118,21 @@ impl Marcher<'_, '_> {
                 let (layer, bit) = spot.bit();
                 let layer = &cells[layer];
                 if layer.crossed >> bit & 1 == 1 && to > from {
-                    let step = Step { spot, whole: layer.whole >> bit & 1 == 1, from, to, axes: [entered, axis] };
+                    let step = Step {
+                        spot,
+                        fully_observed: layer.fully_observed >> bit & 1 == 1,
+                        from,
+                        to,
+                        axes: [entered, axis],
+                    };
                     if let Some(crossing) = self.through(&here, step, &mut trail) {
                         return (crossing.depth_m <= to_m).then(|| self.hit(&crossing));
                     }
                 }
                 match axis {
-                    0 => (next_x, spot) = (next_x + stride_x, spot.turned(turn_x)),
-                    1 => (next_y, spot) = (next_y + stride_y, spot.turned(turn_y)),
-                    _ => (next_z, spot) = (next_z + stride_z, spot.turned(turn_z)),
+                    0 => (next_x, spot) = (next_x + stride_x, spot.plus(delta_x)),
+                    1 => (next_y, spot) = (next_y + stride_y, spot.plus(delta_y)),
+                    _ => (next_z, spot) = (next_z + stride_z, spot.plus(delta_z)),
                 }
                 (from, entered) = (to, axis);
                 if spot.is_outside() {
@@ -145,10 +152,10 @@ impl Marcher<'_, '_> {
     /// Looks for the surface in a crossed cell: the field must fall from above 0 to 0 or below.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    fn through<'h>(&self, here: &Here<'h>, step: Step, trail: &mut Trail) -> Option<Crossing<'h>> {
+    fn through<'h>(&self, here: &BlockContext<'h>, step: Step, trail: &mut PreviousSample) -> Option<Crossing<'h>> {
         let axis = step.axes[1];
         let last = self.wall_value(here, step, axis, step.to, here.ray.ahead[axis] as u32);
-        let before = core::mem::replace(trail, Trail { value: last, depth: step.to });
+        let before = core::mem::replace(trail, PreviousSample { value: last, depth: step.to });
         if last > 0.0 {
             return None;
         }
@@ -158,7 +165,7 @@ impl Marcher<'_, '_> {
 
     /// The field where the ray enters a cell.
     #[inline(never)]
-    fn first_value(&self, here: &Here<'_>, step: Step, before: Trail) -> f32 {
+    fn first_value(&self, here: &BlockContext<'_>, step: Step, before: PreviousSample) -> f32 {
         let axis = step.axes[0];
         if before.depth == step.from {
             // Taken over from the cell before: should the two have guessed differently at a corner never seen, no ray slips through.
@@ -175,17 +182,17 @@ impl Marcher<'_, '_> {
     /// that was not seen completes the parallelogram of the others; with fewer, the cell has to tell.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3, the masks keep blocks below 8 and voxels below 512")]
-    fn wall_value(&self, here: &Here<'_>, step: Step, axis: usize, depth: Depth, upper: u32) -> f32 {
-        let wall = &WALLS[axis];
-        let corner = step.spot.turned(upper * wall.turn);
-        let [a, b, c, d] = if corner.shares_block(wall.far) && step.whole {
+    fn wall_value(&self, here: &BlockContext<'_>, step: Step, axis: usize, depth: Depth, upper: u32) -> f32 {
+        let wall = &FACES[axis];
+        let corner = step.spot.plus(upper * wall.delta);
+        let [a, b, c, d] = if corner.shares_block(wall.far) && step.fully_observed {
             let slot_sdf = if corner.is_in_own_block() { Some(here.sdf) } else { self.blocks.sdf(here.slots[corner.block() & 7]) };
             let Some(sdf) = slot_sdf else { return 0.0 };
             let voxel = corner.voxel();
             let value = |stride: usize| f32::from(sdf[(voxel + stride) & 511]);
             [value(0), value(wall.stride_u), value(wall.stride_v), value(wall.stride_u + wall.stride_v)]
         } else {
-            match self.wall_corners(here, corner, wall, step.whole) {
+            match self.wall_corners(here, corner, wall, step.fully_observed) {
                 Some(corners) => corners,
                 None => return self.guessed_value(here, step, depth),
             }
@@ -199,33 +206,38 @@ impl Marcher<'_, '_> {
 
     /// The corners of a wall that lies in several blocks or may not wholly be seen; `None` when two or more are unseen.
     #[inline(never)]
-    fn wall_corners(&self, here: &Here<'_>, corner: Spot, wall: &Wall, whole: bool) -> Option<[f32; 4]> {
-        let points = [corner, corner.turned(wall.far - wall.turn_v), corner.turned(wall.turn_v), corner.turned(wall.far)];
+    fn wall_corners(&self, here: &BlockContext<'_>, corner: CellIndex, wall: &CellFace, fully_observed: bool) -> Option<[f32; 4]> {
+        let points = [corner, corner.plus(wall.far - wall.delta_v), corner.plus(wall.delta_v), corner.plus(wall.far)];
         let [a, b, c, d] = points;
-        let [a, b, c, d] = [self.point(here, a, whole), self.point(here, b, whole), self.point(here, c, whole), self.point(here, d, whole)];
+        let [a, b, c, d] = [
+            self.point(here, a, fully_observed),
+            self.point(here, b, fully_observed),
+            self.point(here, c, fully_observed),
+            self.point(here, d, fully_observed),
+        ];
         completed([a, b, c, d])
     }
 
     /// The distance at a point, if it was seen.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
-    fn point(&self, here: &Here<'_>, point: Spot, whole: bool) -> Option<f32> {
+    fn point(&self, here: &BlockContext<'_>, point: CellIndex, fully_observed: bool) -> Option<f32> {
         let slot = here.slots[point.block() & 7];
         let voxel = point.voxel() & 511;
         let sdf = f32::from(self.blocks.sdf(slot)?[voxel]);
-        (whole || self.blocks.weight(slot)?[voxel] >= self.min_weight).then_some(sdf)
+        (fully_observed || self.blocks.weight(slot)?[voxel] >= self.min_weight).then_some(sdf)
     }
 
     /// The field where the ray enters or leaves a cell, corners guessed where they were not seen; 0, which stops no ray, where nothing tells it.
     #[inline(never)]
-    fn guessed_value(&self, here: &Here<'_>, step: Step, depth: Depth) -> f32 {
+    fn guessed_value(&self, here: &BlockContext<'_>, step: Step, depth: Depth) -> f32 {
         let Some(corners) = self.corners(here, step) else { return 0.0 };
         mean(&corners, passage(here, step).end(depth == step.to))
     }
 
     /// The place in a cell at which the field falls to 0.
     #[inline(never)]
-    fn crossing<'h>(&self, here: &Here<'h>, step: Step, first: f32, last: f32) -> Option<Crossing<'h>> {
+    fn crossing<'h>(&self, here: &BlockContext<'h>, step: Step, first: f32, last: f32) -> Option<Crossing<'h>> {
         let field = Field::new(&self.corners(here, step)?);
         let passage = passage(here, step);
         let share = passage.root(&field, first, last);
@@ -249,26 +261,26 @@ impl Marcher<'_, '_> {
     /// Distances at the corners of a cell, guessed where they were not seen.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "the mask keeps blocks below 8")]
-    fn corners(&self, here: &Here<'_>, step: Step) -> Option<[f32; 8]> {
-        let in_one_block = step.spot.shares_block(Spot::FAR);
-        if in_one_block && step.whole {
+    fn corners(&self, here: &BlockContext<'_>, step: Step) -> Option<[f32; 8]> {
+        let in_one_block = step.spot.shares_block(CellIndex::FAR);
+        if in_one_block && step.fully_observed {
             return Some(step.spot.corner_values(here.sdf)?.map(f32::from));
         }
         let mut corners = Corners::default();
         if in_one_block {
             let weights = step.spot.corner_values(self.blocks.weight(here.slots[0])?)?;
             corners.sdf = step.spot.corner_values(here.sdf)?.map(f32::from);
-            (0..).zip(weights).for_each(|(corner, weight)| corners.seen |= u8::from(weight >= self.min_weight) << corner);
+            (0..).zip(weights).for_each(|(corner, weight)| corners.observed |= u8::from(weight >= self.min_weight) << corner);
         } else {
             for (corner, (sdf, point)) in corners.sdf.iter_mut().zip(step.spot.corners()).enumerate() {
                 let slot = here.slots[point.block() & 7];
                 if let Some(value) = self.blocks.sdf(slot).and_then(|sdfs| sdfs.get(point.voxel())) {
                     *sdf = f32::from(*value);
-                    corners.seen |= u8::from(step.whole || self.is_seen(slot, point.voxel())) << corner;
+                    corners.observed |= u8::from(step.fully_observed || self.is_seen(slot, point.voxel())) << corner;
                 }
             }
         }
-        if step.whole { Some(corners.sdf) } else { corners.complete() }
+        if step.fully_observed { Some(corners.sdf) } else { corners.complete() }
     }
 
     /// Turns a crossing into what the images keep.
@@ -292,12 +304,12 @@ impl Marcher<'_, '_> {
     #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
     fn colour(&self, crossing: &Crossing<'_>) -> ([u8; 3], u8) {
         let (spot, slots) = (crossing.spot, crossing.slots);
-        let nearest = spot.turned(Spot::steps(crossing.place.map(|c| u32::from(c >= 0.5))));
+        let nearest = spot.plus(CellIndex::steps(crossing.place.map(|c| u32::from(c >= 0.5))));
         let weight = self.blocks.weight(slots[nearest.block() & 7]).map_or(0, |weights| weights[nearest.voxel() & 511]);
         let mut colours = Colours::default();
         let counts = counts(crossing.place);
-        if spot.shares_block(Spot::FAR) {
-            let window = |plane| Spot::window(spot, plane);
+        if spot.shares_block(CellIndex::FAR) {
+            let window = |plane| CellIndex::window(spot, plane);
             if let Some([red, green, blue]) = self.blocks.colour(slots[0])
                 && let (Some(red), Some(green), Some(blue)) = (window(red), window(green), window(blue))
             {
@@ -354,17 +366,17 @@ impl Colours {
 
 /// The block, the cell in it, and the depths at which the cell is left, for a ray just after a depth.
 #[inline]
-fn begin(ray: &Ray, depth: Depth) -> ([i32; 3], Spot, [Depth; 3]) {
+fn begin(ray: &Ray, depth: Depth) -> ([i32; 3], CellIndex, [Depth; 3]) {
     let cell = ray.cell_at(depth);
-    ([cell[0] >> 3, cell[1] >> 3, cell[2] >> 3], Spot::new(cell), ray.exits(cell))
+    ([cell[0] >> 3, cell[1] >> 3, cell[2] >> 3], CellIndex::new(cell), ray.exits(cell))
 }
 
 #[inline(always)]
-fn passage(here: &Here<'_>, step: Step) -> Passage {
-    Passage::new(here.ray, here.offset(step.spot), [depth_in_m(step.from), depth_in_m(step.to)], step.axes)
+fn passage(here: &BlockContext<'_>, step: Step) -> RaySegment {
+    RaySegment::new(here.ray, here.offset(step.spot), [depth_in_m(step.from), depth_in_m(step.to)], step.axes)
 }
 
-/// The corners a, b, c, d of a wall (a and d face each other), one of which may be told by the others.
+/// The corners a, b, c, d of a wall (a and d face each other), one may follow from the others.
 #[inline]
 pub(super) fn completed(corners: [Option<f32>; 4]) -> Option<[f32; 4]> {
     match corners {

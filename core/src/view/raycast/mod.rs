@@ -7,13 +7,13 @@
 //! of a cell were never seen, the plane through the others stands in.
 //!
 //! Speed comes from not looking, never from looking less well: before rays start, the blocks in view are reduced to bits for the cells
-//! that have corners on both sides (`signs`, `surface`), and these to the range of depths each eight pixels can meet (`ranges`). A cell
+//! that have corners on both sides (`signs`, `surface`), and these to the range of depths each two pixels can meet (`ranges`). A cell
 //! without its bit cannot stop a ray, so leaving it out changes nothing; the tests compare with a walk through every cell.
 //!
 //! Several maps make one picture: [`Raycaster::cast`] begins it and [`Raycaster::cast_over`] adds what lies nearer, so that each pixel shows the
 //! nearest surface and says whose it is. Of equal depths the map added first is seen.
 //!
-//! Memory: 12 bytes a pixel for the images, 8 bytes for eight pixels, 300 bytes per `visible_blocks` and 8 bytes for the next power of two
+//! Memory: 12 bytes a pixel for the images, 8 bytes for two pixels, 300 bytes per `visible_blocks` and 8 bytes for the next power of two
 //! of twice their number. Time: linear in blocks in view and in pixels.
 //!
 //! When more blocks are in view than `visible_blocks`, the picture ends nearer, and the report says where.
@@ -39,7 +39,7 @@ use crate::{
     volume::{Slot, Viewpoint, Volume},
 };
 use core::fmt;
-use eye::Eye;
+use eye::RayCamera;
 use march::Marcher;
 use ranges::Ranges;
 use surface::Surface;
@@ -79,7 +79,7 @@ pub struct RaycastReport {
     pub pixels: u32,
     /// Blocks in view, within the far limit.
     pub blocks_in_view: u32,
-    /// How many of them there was no room for, so that the picture ends at `far_m`.
+    /// How many of them did not fit, so that the picture ends at `far_m`.
     pub blocks_left_out: u32,
     /// The far limit, m: the configured one unless blocks were left out.
     pub far_m: f32,
@@ -195,7 +195,7 @@ impl<'s> Raycaster<'s> {
         self.draw(volume, view, Layer::Over(layer), executor)
     }
 
-    /// Draws a map into a picture for which there is room.
+    /// Draws a map into a picture that fits.
     fn draw<E: Executor>(
         &mut self,
         volume: &Volume<'_>,
@@ -203,7 +203,7 @@ impl<'s> Raycaster<'s> {
         layer: Layer,
         executor: &E,
     ) -> Result<RaycastReport, RaycastError> {
-        let eye = Eye::new(view, volume.config().voxel_size_m).ok_or(RaycastError::Viewpoint)?;
+        let eye = RayCamera::new(view, volume.config().voxel_size_m).ok_or(RaycastError::Viewpoint)?;
         let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
         let near_m = self.config.near_m;
         let in_view = self.surface.find(volume, &eye, [near_m, self.config.far_m], min_weight, executor);
@@ -215,7 +215,7 @@ impl<'s> Raycaster<'s> {
         }
         let marcher = Marcher { surface: &self.surface, blocks: volume.blocks(), eye: &eye, min_weight };
         let ranges = &self.ranges;
-        let whole = Band {
+        let picture = Band {
             first_row: 0,
             depth_m: self.depth_m,
             normal: self.normal,
@@ -226,7 +226,7 @@ impl<'s> Raycaster<'s> {
         .split(view.height, view.width)
         .0;
         let rows = view.height.div_ceil(4);
-        let (high, low) = whole.split(2 * rows, view.width);
+        let (high, low) = picture.split(2 * rows, view.width);
         let ((a, b), (c, d)) = (high.split(rows, view.width), low.split(rows, view.width));
         // Sky and road go together, so that two threads have about the same to do.
         let hits = each(executor, [a, d, b, c], |rows| band(&marcher, ranges, layer, rows));

@@ -4,7 +4,7 @@
 //! may cover. Rays then begin right before the surface.
 
 use super::{
-    eye::{AXES, Extent, Eye},
+    eye::{AXES, Extent, RayCamera},
     signs::Cells,
     surface::Surface,
 };
@@ -17,7 +17,8 @@ use crate::{
 /// Width of a tile, px, as a shift.
 pub(super) const TILE_SHIFT: usize = 1;
 
-/// Depth ranges by tile: a tile is 8 px wide and one row high, for depth changes fast from row to row of a road.
+/// Depth ranges by tile, 2 px wide and one row high: depth changes fast from row to row of a road, and all rays of a tile begin where
+/// the nearest of them may.
 #[derive(Debug)]
 pub(super) struct Ranges<'s> {
     /// Nearest and farthest depth, m; farthest 0: nothing.
@@ -41,14 +42,14 @@ impl<'s> Ranges<'s> {
         }
     }
 
-    /// Whether a picture of this size has room.
+    /// Whether a picture of this size fits.
     pub fn fit(&self, width: usize, height: usize) -> bool {
         width.div_ceil(1 << TILE_SHIFT).checked_mul(height).is_some_and(|tiles| tiles <= self.depth_m.len())
     }
 
     /// Enters the crossed cells of all blocks in view.
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn find(&mut self, surface: &Surface<'_>, eye: &Eye, [near_m, far_m]: [f32; 2]) {
+    pub fn find(&mut self, surface: &Surface<'_>, eye: &RayCamera, [near_m, far_m]: [f32; 2]) {
         self.columns = eye.width.div_ceil(1 << TILE_SHIFT);
         if let Some(tiles) = self.depth_m.get_mut(..self.columns * eye.height) {
             tiles.fill([f32::MAX, 0.0]);
@@ -80,7 +81,7 @@ impl<'s> Ranges<'s> {
         }
     }
 
-    /// The ranges of a picture row, a tile each for eight columns.
+    /// The ranges of a picture row, a tile each for two columns.
     pub fn row(&self, v: usize) -> &[[f32; 2]] {
         self.depth_m.get(v * self.columns..(v + 1) * self.columns).unwrap_or(&[])
     }
@@ -99,9 +100,9 @@ fn for_each_box(cells: &Cells, mut visit: impl FnMut([i32; 3], [i32; 3])) {
             parts &= parts - 1;
             // Bits 0 and 1 are the first row, 8 and 9 the second.
             let [lower, upper] = [lower, upper].map(|layer| (layer >> corner) as u32 & 0x0303);
-            let seen = lower | upper;
-            let [left, right] = [seen & 0x0101, seen & 0x0202].map(|bits| i32::from(bits != 0));
-            let [first, second] = [seen & 0x0003, seen & 0x0300].map(|bits| i32::from(bits != 0));
+            let occupied = lower | upper;
+            let [left, right] = [occupied & 0x0101, occupied & 0x0202].map(|bits| i32::from(bits != 0));
+            let [first, second] = [occupied & 0x0003, occupied & 0x0300].map(|bits| i32::from(bits != 0));
             let [lower, upper] = [lower, upper].map(|bits| i32::from(bits != 0));
             let base = [(corner & 7) as i32, (corner >> 3) as i32, z];
             // An end without cells moves the box's wall in by one.

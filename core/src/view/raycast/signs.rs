@@ -21,14 +21,14 @@ pub(super) fn of_block(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS], m
     let [before, behind] = &mut signs;
     let layers = sdf.as_chunks::<LAYER_VOXELS>().0.iter().zip(weight.as_chunks::<LAYER_VOXELS>().0);
     for ((sdf, weight), (before, behind)) in layers.zip(before.iter_mut().zip(behind)) {
-        let (mut is_before, mut is_seen) = ([0u8; LAYER_VOXELS], [0u8; LAYER_VOXELS]);
-        for (((is_before, is_seen), &sdf), &weight) in is_before.iter_mut().zip(&mut is_seen).zip(sdf).zip(weight) {
-            *is_seen = u8::from(weight >= min_weight);
+        let (mut is_before, mut is_observed) = ([0u8; LAYER_VOXELS], [0u8; LAYER_VOXELS]);
+        for (((is_before, is_observed), &sdf), &weight) in is_before.iter_mut().zip(&mut is_observed).zip(sdf).zip(weight) {
+            *is_observed = u8::from(weight >= min_weight);
             *is_before = u8::from(sdf > 0);
         }
-        let seen = packed(&is_seen);
-        *before = seen & packed(&is_before);
-        *behind = seen & !*before;
+        let observed = packed(&is_observed);
+        *before = observed & packed(&is_before);
+        *behind = observed & !*before;
     }
     signs
 }
@@ -58,8 +58,8 @@ fn joined(points: [Layers; 8], join: impl Fn(u64, u64) -> u64) -> Layers {
 pub(super) struct CellLayer {
     /// Those the surface runs through: with a corner before it and one behind.
     pub crossed: u64,
-    /// Those of which all corners were seen.
-    pub whole: u64,
+    /// Those whose corners were all observed.
+    pub fully_observed: u64,
 }
 
 /// The cells of a block.
@@ -67,17 +67,17 @@ pub(super) type Cells = [CellLayer; BLOCK_SIDE];
 
 /// The cells of a block, given the signs of its points (0) and of those after it in x (1), y (2), z (4).
 pub(super) fn cells(signs: [&[Layers; 2]; 8]) -> Cells {
-    let [mut before, mut behind, mut seen] = [[[0; BLOCK_SIDE]; 8]; 3];
-    for (signs, ((before, behind), seen)) in signs.iter().zip(before.iter_mut().zip(&mut behind).zip(&mut seen)) {
+    let [mut before, mut behind, mut observed] = [[[0; BLOCK_SIDE]; 8]; 3];
+    for (signs, ((before, behind), observed)) in signs.iter().zip(before.iter_mut().zip(&mut behind).zip(&mut observed)) {
         [*before, *behind] = **signs;
-        seen.iter_mut().zip(before.iter().zip(behind.iter())).for_each(|(seen, (before, behind))| *seen = before | behind);
+        observed.iter_mut().zip(before.iter().zip(behind.iter())).for_each(|(observed, (before, behind))| *observed = before | behind);
     }
     let before = joined(before, |a, b| a | b);
     let behind = joined(behind, |a, b| a | b);
-    let whole = joined(seen, |a, b| a & b);
+    let fully_observed = joined(observed, |a, b| a & b);
     let mut cells = [CellLayer::default(); BLOCK_SIDE];
-    for (cells, ((before, behind), whole)) in cells.iter_mut().zip(before.into_iter().zip(behind).zip(whole)) {
-        *cells = CellLayer { crossed: before & behind, whole };
+    for (cells, ((before, behind), fully_observed)) in cells.iter_mut().zip(before.into_iter().zip(behind).zip(fully_observed)) {
+        *cells = CellLayer { crossed: before & behind, fully_observed };
     }
     cells
 }
@@ -100,19 +100,19 @@ mod tests {
             let signs: [_; 8] = core::array::from_fn(|n| of_block(&sdf[n], &weight[n], 2));
             let cells = cells(signs.each_ref());
             for cell in 0..BLOCK_VOXELS {
-                let (mut before, mut behind, mut whole) = (false, false, true);
+                let (mut before, mut behind, mut fully_observed) = (false, false, true);
                 for corner in 0..8 {
                     let [x, y, z] = [0, 1, 2].map(|axis| (cell >> (3 * axis) & 7) + (corner >> axis & 1));
                     let block = x / 8 + 2 * (y / 8) + 4 * (z / 8);
                     let voxel = x % 8 + 8 * (y % 8) + 64 * (z % 8);
-                    let seen = weight[block][voxel] >= 2;
-                    whole &= seen;
-                    before |= seen && sdf[block][voxel] > 0;
-                    behind |= seen && sdf[block][voxel] <= 0;
+                    let observed = weight[block][voxel] >= 2;
+                    fully_observed &= observed;
+                    before |= observed && sdf[block][voxel] > 0;
+                    behind |= observed && sdf[block][voxel] <= 0;
                 }
                 let layer = cells[cell >> 6];
-                let bits = [layer.crossed, layer.whole].map(|layer| layer >> (cell & 63) & 1 == 1);
-                assert_eq!(bits, [before && behind, whole]);
+                let bits = [layer.crossed, layer.fully_observed].map(|layer| layer >> (cell & 63) & 1 == 1);
+                assert_eq!(bits, [before && behind, fully_observed]);
             }
         }
     }

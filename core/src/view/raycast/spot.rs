@@ -4,7 +4,7 @@ use crate::volume::BLOCK_VOXELS;
 
 /// A lattice point or cell of a block: `x + 32 y + 1024 z` with 8 added to each coordinate, from -1 (7) to 8 (16).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Spot {
+pub(super) struct CellIndex {
     at: u32,
 }
 
@@ -22,18 +22,18 @@ const VOXEL_STRIDES: [usize; 3] = [1, 8, 64];
 /// Voxels from a cell's first corner to each of them.
 pub(super) const CORNER_STRIDES: [usize; 8] = [0, 1, 8, 9, 64, 65, 72, 73];
 
-/// How a cell's walls across one axis are laid out.
+/// How a cell's faces across one axis are laid out.
 #[derive(Debug)]
-pub(super) struct Wall {
+pub(super) struct CellFace {
     /// The other axes.
     pub u: usize,
     /// The other axes.
     pub v: usize,
-    /// From the lower wall to the upper.
-    pub turn: u32,
-    /// From a wall's first corner along `v`.
-    pub turn_v: u32,
-    /// From a wall's first corner to its last.
+    /// From the lower face to the upper.
+    pub delta: u32,
+    /// From a face's first corner along `v`.
+    pub delta_v: u32,
+    /// From a face's first corner to its last.
     pub far: u32,
     /// From voxel to voxel along `u`.
     pub stride_u: usize,
@@ -42,22 +42,22 @@ pub(super) struct Wall {
 }
 
 /// By axis.
-pub(super) static WALLS: [Wall; 3] = [wall(0, 1, 2), wall(1, 0, 2), wall(2, 0, 1)];
+pub(super) static FACES: [CellFace; 3] = [face(0, 1, 2), face(1, 0, 2), face(2, 0, 1)];
 
 #[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
-const fn wall(axis: usize, u: usize, v: usize) -> Wall {
-    Wall {
+const fn face(axis: usize, u: usize, v: usize) -> CellFace {
+    CellFace {
         u,
         v,
-        turn: UNITS[axis],
-        turn_v: UNITS[v],
+        delta: UNITS[axis],
+        delta_v: UNITS[v],
         far: UNITS[u] + UNITS[v],
         stride_u: VOXEL_STRIDES[u],
         stride_v: VOXEL_STRIDES[v],
     }
 }
 
-impl Spot {
+impl CellIndex {
     /// From a cell's first corner to its last.
     pub const FAR: u32 = UNITS[0] + UNITS[1] + UNITS[2];
 
@@ -67,7 +67,7 @@ impl Spot {
         Self { at: Self::steps(cell.map(|c| c as u32 & 7)) + INSIDE }
     }
 
-    /// Steps along the axes as one number for [`Self::turned`].
+    /// Steps along the axes as one number for [`Self::plus`].
     #[inline(always)]
     pub fn steps([x, y, z]: [u32; 3]) -> u32 {
         x | y << FIELD | z << (2 * FIELD)
@@ -75,13 +75,13 @@ impl Spot {
 
     /// One step along an axis, upwards if `ahead` is 1, downwards if 0.
     #[inline(always)]
-    pub fn turn(axis: usize, ahead: i32) -> u32 {
+    pub fn delta(axis: usize, ahead: i32) -> u32 {
         ((2 * ahead - 1) as u32) << (FIELD * axis as u32)
     }
 
     #[inline(always)]
-    pub fn turned(self, turn: u32) -> Self {
-        Self { at: self.at.wrapping_add(turn) }
+    pub fn plus(self, delta: u32) -> Self {
+        Self { at: self.at.wrapping_add(delta) }
     }
 
     /// Whether the last step led out of the block.
@@ -121,14 +121,14 @@ impl Spot {
 
     /// Whether the point some steps on lies in the same block.
     #[inline(always)]
-    pub fn shares_block(self, turn: u32) -> bool {
-        (self.at ^ (self.at + turn)) & BEYOND == 0
+    pub fn shares_block(self, delta: u32) -> bool {
+        (self.at ^ (self.at + delta)) & BEYOND == 0
     }
 
     /// The corners of the cell.
     #[inline(always)]
     pub fn corners(self) -> [Self; 8] {
-        [0, 1, 2, 3, 4, 5, 6, 7].map(|corner: u32| self.turned(Self::steps([corner & 1, corner >> 1 & 1, corner >> 2])))
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|corner: u32| self.plus(Self::steps([corner & 1, corner >> 1 & 1, corner >> 2])))
     }
 
     /// The block a step led to, relative to the one left, and the place in it.
@@ -145,7 +145,7 @@ impl Spot {
         voxels.get(self.voxel()..)?.first_chunk()
     }
 
-    /// The corners of a cell all of which lie in the block.
+    /// The corners of a cell whose corners all lie in the block.
     #[inline(always)]
     pub fn corner_values<T: Copy>(self, voxels: &[T; BLOCK_VOXELS]) -> Option<[T; 8]> {
         let window = self.window(voxels)?;

@@ -1,10 +1,10 @@
 //! The blocks in view and the cells of each that the surface runs through.
 //!
-//! Made anew for every picture: blocks are culled, their signs turned into bits, the bits of neighbours joined into crossed cells. Then a
+//! Made anew for every picture: blocks are culled, their signs become bits, the bits of neighbours joined into crossed cells. Then a
 //! ray asks one bit per cell, and most blocks not at all: only those with crossed cells remain in the table.
 
 use super::{
-    eye::Eye,
+    eye::RayCamera,
     signs::{self, Cells},
 };
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
 
 /// No block.
 pub(super) const NONE: Slot = Slot::new(u32::MAX);
-/// Parts of the far limit by which it is shortened when more blocks are in view than there is room for.
+/// Parts of the far limit by which it is shortened when more blocks are in view than fit.
 const RANGE_STEPS: usize = 64;
 
 /// Blocks in view, by entry, in slot order.
@@ -23,7 +23,7 @@ const RANGE_STEPS: usize = 64;
 pub(super) struct Surface<'s> {
     /// Block coordinates relative to the camera's block.
     local: &'s mut [[i32; 3]],
-    /// The block's own slot and those of the blocks after it in x (1), y (2), z (4); [`NONE`] where there is none.
+    /// The block's own slot and those of the blocks after it in x (1), y (2), z (4); [`NONE`] where no block is.
     slots: &'s mut [[Slot; 8]],
     signs: &'s mut [[signs::Layers; 2]],
     cells: &'s mut [Cells],
@@ -39,7 +39,7 @@ pub(super) struct Surface<'s> {
 pub(super) struct InView {
     /// Blocks.
     pub blocks: u32,
-    /// The far limit for which there was room, m.
+    /// The far limit up to which all fit, m.
     pub far_m: f32,
 }
 
@@ -81,7 +81,7 @@ impl<'s> Surface<'s> {
     }
 
     /// Finds the blocks in view and the cells the surface runs through.
-    pub fn find<E: Executor>(&mut self, volume: &Volume<'_>, eye: &Eye, limits_m: [f32; 2], min_weight: u8, executor: &E) -> InView {
+    pub fn find<E: Executor>(&mut self, volume: &Volume<'_>, eye: &RayCamera, limits_m: [f32; 2], min_weight: u8, executor: &E) -> InView {
         let in_view = self.cull(volume, eye, limits_m);
         self.index(|_| true);
         self.read_signs(volume, min_weight, executor);
@@ -90,8 +90,8 @@ impl<'s> Surface<'s> {
         in_view
     }
 
-    /// Lists the blocks of which a cell or a neighbour's corner may be in the picture.
-    fn cull(&mut self, volume: &Volume<'_>, eye: &Eye, [near_m, far_m]: [f32; 2]) -> InView {
+    /// Lists the blocks that have a cell, or a neighbour with a corner, that may be in the picture.
+    fn cull(&mut self, volume: &Volume<'_>, eye: &RayCamera, [near_m, far_m]: [f32; 2]) -> InView {
         // Cells of the block before this one end at this block's first points: the box is one longer on that side.
         let half = (BLOCK_SIDE as f32 + 1.0) * 0.5;
         let blocks = volume.pool().live().filter_map(|slot| {
@@ -113,7 +113,7 @@ impl<'s> Surface<'s> {
         if count as usize <= self.local.len() {
             return InView { blocks: count, far_m };
         }
-        // No room for all: see less far, rather than full of holes.
+        // Not all fit: see less far, rather than full of holes.
         let mut room = self.local.len() as u32;
         let steps = by_range.iter().take_while(|&&step| room.checked_sub(step).map(|left| room = left).is_some()).count();
         let far_m = steps as f32 / steps_per_m;
@@ -131,18 +131,18 @@ impl<'s> Surface<'s> {
     }
 
     /// Fills the table with the entries whose cells are `wanted`.
-    fn index(&mut self, wanted: impl Fn(&Cells) -> bool) {
-        let count = self.cells.iter().take(self.len).filter(|cells| wanted(cells)).count();
+    fn index(&mut self, is_kept: impl Fn(&Cells) -> bool) {
+        let count = self.cells.iter().take(self.len).filter(|cells| is_kept(cells)).count();
         let len = Self::table_len(count);
         self.shift = 64 - len.trailing_zeros();
         let Some(table) = self.table.get_mut(..len) else { return };
         table.fill(0);
         for ((entry, local), cells) in (1u64..).zip(self.local.iter()).zip(self.cells.iter()).take(self.len) {
-            if !wanted(cells) {
+            if !is_kept(cells) {
                 continue;
             }
             let key = key(*local);
-            let mut at = place(key, self.shift);
+            let mut at = bucket(key, self.shift);
             // At most half full: an empty place is found.
             for _ in 0..len {
                 if let Some(slot) = table.get_mut(at)
@@ -195,7 +195,7 @@ impl<'s> Surface<'s> {
     #[inline]
     pub fn entry(&self, block: [i32; 3]) -> Option<usize> {
         let key = key(block);
-        let mut at = place(key, self.shift);
+        let mut at = bucket(key, self.shift);
         let mask = (1usize << (64 - self.shift)) - 1;
         loop {
             let found = *self.table.get(at)?;
@@ -227,6 +227,6 @@ impl<'s> Surface<'s> {
 }
 
 #[inline]
-fn place(key: u64, shift: u32) -> usize {
+fn bucket(key: u64, shift: u32) -> usize {
     (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> shift) as usize
 }

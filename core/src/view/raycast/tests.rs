@@ -9,7 +9,7 @@ use crate::{
         tests::analytic::{Told, cuboid, empty, fill},
     },
 };
-use cell::{Corners, Field, NO_AXIS, Passage, mean, within};
+use cell::{Corners, Field, NO_AXIS, RaySegment, mean, within};
 use eye::{AXES, depth_from_m, depth_in_m};
 use nalgebra::{Point3, Vector3};
 use std::{boxed::Box, vec, vec::Vec};
@@ -248,18 +248,18 @@ fn a_ray_that_begins_behind_a_surface_or_comes_out_of_unseen_space_at_its_back_m
 fn a_sheet_one_lattice_point_thick_stops_every_ray_at_every_angle() {
     let sheet = |point: [i32; 3]| Some((if point[2] == 60 { -0.002 } else { 0.75 }, 1, [0; 3]));
     let volume = filled([-12, -5, 5], [12, 5, 8], sheet);
-    for turn in [0.0, 0.5, 1.0] {
+    for delta in [0.0, 0.5, 1.0] {
         let mut caster = raycaster(6_000, &RaycastConfig::default());
-        caster.cast(&volume, &at([0.0, turn, 0.0], [-4.0 * turn, 0.0, 1.5]), &Serial).unwrap();
+        caster.cast(&volume, &at([0.0, delta, 0.0], [-4.0 * delta, 0.0, 1.5]), &Serial).unwrap();
         let depth = caster.depth_m().unwrap();
         for u in (0..160).step_by(3) {
             let ray = Vector3::new((u as f64 - RIG.center_u_px) / RIG.focal_px, 0.0, 1.0);
-            let world = Transform::new(Vector3::new(0.0, turn, 0.0), Vector3::zeros()).rotate(ray);
+            let world = Transform::new(Vector3::new(0.0, delta, 0.0), Vector3::zeros()).rotate(ray);
             let truth = 1.5 / world.z;
-            let x = -4.0 * turn + world.x * truth;
+            let x = -4.0 * delta + world.x * truth;
             if world.z > 0.1 && x.abs() < 4.5 {
                 let seen = f64::from(depth.get(u, 48).unwrap());
-                assert!((seen - truth) * world.z < 0.05 && seen > 0.0, "column {u}, turn {turn}: {seen} for {truth}");
+                assert!((seen - truth) * world.z < 0.05 && seen > 0.0, "column {u}, delta {delta}: {seen} for {truth}");
             }
         }
     }
@@ -318,7 +318,7 @@ fn rough(seed: u64) -> Volume<'static> {
 
 /// One pixel, the obvious way: every cell from the nearest depth to the farthest, corners looked up in the index one by one.
 fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize, v: usize) -> Option<f32> {
-    let eye = Eye::new(view, VOXEL_M).unwrap();
+    let eye = RayCamera::new(view, VOXEL_M).unwrap();
     let ray = eye.ray(u, v);
     let mut sampler = volume.sampler();
     let far = depth_from_m(config.far_m);
@@ -335,17 +335,17 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
             let point = AXES.map(|axis| cell[axis] + 8 * eye.base[axis] + (corner >> axis & 1) as i32);
             if let Some(sample) = sampler.voxel(point).filter(|sample| sample.weight >= config.min_weight) {
                 corners.sdf[corner] = f32::from(sample.sdf);
-                corners.seen |= 1 << corner;
+                corners.observed |= 1 << corner;
             }
         }
-        let is_seen = |corner: usize| corners.seen >> corner & 1 == 1;
+        let is_seen = |corner: usize| corners.observed >> corner & 1 == 1;
         let any = |wanted: fn(f32) -> bool| (0..8).any(|corner| is_seen(corner) && wanted(corners.sdf[corner]));
         // A cell belongs to the block of its first corner: without that there is none.
         let own = BlockCoord::of_lattice(AXES.map(|axis| cell[axis] + 8 * eye.base[axis])).and_then(|coord| volume.find(coord));
         if own.is_some() && to > from && any(|sdf| sdf > 0.0) && any(|sdf| sdf <= 0.0) {
             let block = ray.offset(cell.map(|c| c >> 3));
             let offset = AXES.map(|axis| block[axis] - (cell[axis] & 7) as f32);
-            let passage = Passage::new(&ray, offset, [from, to].map(depth_in_m), [entered.unwrap_or(NO_AXIS), axis]);
+            let passage = RaySegment::new(&ray, offset, [from, to].map(depth_in_m), [entered.unwrap_or(NO_AXIS), axis]);
             let guessed = corners.complete();
             let value = |wall: Option<(usize, usize)>, depth| {
                 if let Some((axis, upper)) = wall {

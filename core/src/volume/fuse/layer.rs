@@ -1,7 +1,7 @@
 //! The kernel: 64 voxels at a time, those of a block with one z.
 //!
-//! Each loop does one thing to all of them and has no branches: that is what becomes vector
-//! instructions. Loops over eight voxels are unrolled before they can.
+//! Each loop applies one operation to all of them and has no branches: that is what becomes
+//! vector instructions. Loops over eight voxels are unrolled before they can.
 
 use super::{Fusion, SHARES};
 use crate::{

@@ -167,7 +167,7 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
                 assert_eq!(volume.blocks.voxels[slot.index()].weight[7], old, "a block is as it was left, in the map or brought back");
                 if random.below(4) > 0 {
                     volume.blocks.voxels[slot.index()].weight.fill(old.saturating_add(1));
-                    volume.sum_up(slot);
+                    volume.update_digest(slot);
                     model.insert(coord, old.saturating_add(1));
                 }
             }

@@ -71,7 +71,7 @@ impl Volume<'_> {
     /// Flips a bit of a voxel, 0 to 15 of its distance, 16 to 23 of its weight, and lets the digest know.
     pub(crate) fn flip(&mut self, slot: Slot, voxel: usize, bit: u32) {
         self.flip_behind_its_back(slot, voxel, bit);
-        self.sum_up(slot);
+        self.update_digest(slot);
     }
 
     /// The same as a fault of the memory would do it.

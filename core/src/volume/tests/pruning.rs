@@ -18,7 +18,7 @@ fn plant(volume: &mut Volume<'_>, coord: BlockCoord, weight: impl Fn(usize) -> u
         volume.blocks.voxels[at].weight[voxel] = weight(voxel);
         volume.blocks.voxels[at].sdf[voxel] = 100 + voxel as i16;
     }
-    volume.sum_up(slot);
+    volume.update_digest(slot);
     slot
 }
 
@@ -38,11 +38,11 @@ fn coords(from: i32, count: i32) -> Vec<BlockCoord> {
 fn frees_faint_blocks_lag_frames_after_they_were_seen_and_leaves_the_others_alone() {
     with_volume(&CAPACITY, &pruning(2, 10), |volume| {
         volume.visible.begin_frame();
-        let faint: Vec<Slot> = coords(0, 60).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
+        let low_weight: Vec<Slot> = coords(0, 60).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
         let firm: Vec<Slot> = coords(100, 40).into_iter().map(|coord| plant(volume, coord, |_| 5)).collect();
         let before: Vec<_> =
             firm.iter().map(|&slot| (volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight)).collect();
-        faint.iter().chain(&firm).for_each(|&slot| volume.visible.mark(slot).unwrap());
+        low_weight.iter().chain(&firm).for_each(|&slot| volume.visible.mark(slot).unwrap());
         volume.visible.sort(volume.pool.high_water());
         assert_eq!(volume.prune(), PruneReport::default());
         for _ in 1..10 {
