@@ -218,7 +218,7 @@ fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
     with(&blocks, b"dynvox", "map.blocks is not as the run left it");
     for (args, sentence) in [
         (vec!["run", "--resume", "out/it", "--profile", "small"], "cannot be used with"),
-        (vec!["run", "--resume", "nowhere"], "no run to nowhere can be resumed"),
+        (vec!["run", "--resume", "nowhere"], "can be resumed: there is no such run"),
         (vec!["run", "--snapshot-every", "0", "--out", "x"], "--snapshot-every must be at least 1"),
         (vec!["run", "--snapshot-every", "9", "--evaluate", "exact"], "cannot be used with"),
     ] {

@@ -1,6 +1,6 @@
 //! Growing functions of one number: up to where they grow, and their inverse.
 
-/// Most steps of [`inverse`]. Each is at most half as long as the one before, so that as many leave less than a rounding error.
+/// Most Newton steps of the inverse. Each is at most half as long as the one before, so that as many leave less than a rounding error.
 pub const MAX_STEPS: usize = 64;
 /// Places at which [`growing_until`] looks.
 const PLACES: u32 = 512;

@@ -41,7 +41,7 @@ fn encoded(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
     png
 }
 
-/// Points over the darkened image, each a spot in the colour of its error: see [`error_colour`].
+/// Points over the darkened image, each a spot in the colour of its error.
 pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample, f32)>) -> Vec<u8> {
     let (width, height) = (grey.width(), grey.height());
     // A few steps of grey, so that the file stays small.

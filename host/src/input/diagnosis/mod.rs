@@ -1,7 +1,7 @@
 //! Examining images before the first is mapped: rectification, exchanged or identical cameras, order, exposure.
 //!
-//! Ten pairs spread over the sequence are matched patch by patch without the rule that rows agree ([`patches`]), and a run of consecutive left
-//! images is compared as thumbnails ([`order`]). What makes a map meaningless is refused, what is doubtful is a warning. Too few matches give
+//! Ten pairs spread over the sequence are matched patch by patch without the rule that rows agree (`patches`), and a run of consecutive left
+//! images is compared as thumbnails (`order`). What makes a map meaningless is refused, what is doubtful is a warning. Too few matches give
 //! no verdict.
 
 mod order;
