@@ -95,14 +95,17 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
         GrayImage::new(640, 192).save(root.path().join("rig").join(side).join("0.png")).unwrap();
     }
     fs::write(root.path().join("rig/calib.txt"), CALIB).unwrap();
-    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result"]);
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--force"]);
     assert!(
         output_text(&run).contains("do not fit profile tiny")
             && output_text(&run).contains("--profile small, or shrink the images with --scale 0.5")
     );
     assert!(output_text(&run).contains("desktop") && output_text(&run).contains("path, s"), "the table is shown");
-    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--scale", "0.5", "--quiet"]);
-    assert!(run.status.success(), "black images are a value, not a failure: {}", output_text(&run));
+    let half = ["run", "rig", "--profile", "tiny", "--out", "result", "--scale", "0.5", "--quiet"];
+    let refused = dynvox(root.path(), &half);
+    assert_eq!(refused.status.code(), Some(3), "black images are refused: {}", output_text(&refused));
+    let forced = dynvox(root.path(), &[&half[..], &["--force"]].concat());
+    assert!(forced.status.success(), "with --force they are mapped: {}", output_text(&forced));
 }
 
 #[test]
@@ -118,7 +121,9 @@ fn a_strict_run_fails_at_the_first_frame_that_affects_the_map_and_names_the_caus
         output_text(&strict)
     );
     assert!(names(root.path()).is_empty(), "nothing half-written");
-    let coarse = ["--set", "volume.voxel_size_m=0.2"];
+    let full = run(&["--strict", "--set", "volume.voxel_size_m=0.2"]);
+    assert!(output_text(&full).contains("objects refused"), "{}", output_text(&full));
+    let coarse = ["--set", "volume.voxel_size_m=0.2", "--instances", "none"];
     assert!(run(&[&["--strict"], &coarse[..]].concat()).status.success(), "a map that fits is harmed by nothing");
     let lenient = run(&["--overwrite"]);
     assert!(lenient.status.success(), "{}", output_text(&lenient));

@@ -98,6 +98,9 @@ impl fmt::Display for CapacityProblem {
 
 impl core::error::Error for CapacityProblem {}
 
+/// Frames of the pruning window where the budget is small.
+const SHORT_HISTORY_FRAMES: usize = 64;
+
 impl Capacity {
     /// The largest capacity of at most `bytes` for images of `width` x `height` px: `capacity.bytes() <= bytes`, always.
     ///
@@ -207,7 +210,7 @@ impl<'o> Question<'o> {
             matches: (pixels / 40).max(1_000),
             blocks: 0,
             visible_blocks: 0,
-            history_frames: if self.bytes >= 96 << 20 { 200 } else { 64 },
+            history_frames: if self.bytes >= 96 << 20 { 200 } else { SHORT_HISTORY_FRAMES },
             detections: MAX_DETECTIONS,
             mask_words: pixels / 8 + 1,
             tracks: 64,
@@ -223,7 +226,9 @@ impl<'o> Question<'o> {
         let base = self.image_only(self.options.colour.unwrap_or(false));
         let objects = self.options.objects.unwrap_or(0);
         let (object_blocks, crop_pixels) = if objects > 0 { (150, self.width * self.height / 2) } else { (0, 0) };
-        self.with_blocks(&Capacity { objects, object_blocks, crop_pixels, ..base }, MIN_BLOCKS)
+        // The short window at every budget: the least that is named must be enough when it is asked for.
+        let history_frames = SHORT_HISTORY_FRAMES;
+        self.with_blocks(&Capacity { objects, object_blocks, crop_pixels, history_frames, ..base }, MIN_BLOCKS)
     }
 
     /// The image, objects in their share, and as many blocks as fit; no block where nothing is left for them.

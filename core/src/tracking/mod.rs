@@ -134,7 +134,7 @@ impl<'s> Tracker<'s> {
             owner: carver.alloc("tracking.owner", capacity.matches),
             sparse_owner: carver.alloc("tracking.sparse_owner", capacity.matches),
             guided_matches: carver.alloc("tracking.guided_matches", GUIDED_MATCHES_MAX),
-            segmenter: MotionSegmenter::new_in(capacity, carver),
+            segmenter: carver.group("tracking.segmentation", |carver| MotionSegmenter::new_in(capacity, carver)),
             frame: 0,
             size: [0; 2],
             report: TrackingReport::default(),

@@ -98,6 +98,7 @@ impl FrameRow {
     /// What affected the map in this frame, in words.
     pub fn cause(&self) -> String {
         let (allocation, motion, masks) = (&self.report.allocation, self.motion(), &self.mask_refusals);
+        let instances = &self.report.instances;
         let guessed = self.held().then(|| format!("no motion estimate ({}), the frame was not fused", motion.replace('_', " ")));
         let counts = [
             (allocation.refused, "block requests refused, the pool is full"),
@@ -106,6 +107,14 @@ impl FrameRow {
             (allocation.eviction.lost, "blocks evicted and not stored"),
             (masks.missing, "frame without masks"),
             (masks.beyond, "masks beyond the source's limits"),
+            (instances.detections.refused() + instances.segmentation.refused, "detections refused"),
+            (instances.tracks.refused, "tracks refused, the table is full"),
+            (instances.tracks.masks_lost, "masks of unseen tracks lost"),
+            (instances.objects.refused, "objects refused, all volumes are in use"),
+            (instances.objects.blocks_refused, "blocks of objects refused"),
+            (instances.objects.crops_dropped, "crops of objects dropped"),
+            (self.report.internal_faults, "internal faults: please report them"),
+            (u32::from(self.report.self_calibration.is_uncorrected()), "disparity offset that is known and not corrected"),
         ];
         let counted = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
         guessed.into_iter().chain(counted).collect::<Vec<_>>().join("; ")

@@ -22,6 +22,8 @@ pub struct HealthSection {
     pub detections: DetectionCount,
     /// Tracks and object volumes for which there was no memory.
     pub tracks_refused: u64,
+    /// Contradictions that the core found in what it keeps; each is a fault of dynvox.
+    pub internal_faults: u64,
 }
 
 /// Counts refusals.
@@ -41,6 +43,7 @@ impl Observer for HealthObserver {
         sums.mask_refusals.add(&row.mask_refusals);
         sums.detections = sum(sums.detections, &instances.detections);
         sums.tracks_refused += u64::from(instances.tracks.refused + instances.objects.refused);
+        sums.internal_faults += u64::from(row.report.internal_faults);
         Ok(())
     }
 

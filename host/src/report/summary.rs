@@ -172,6 +172,7 @@ struct HealthSummary {
     depth_values_refused: u64,
     detections_refused: u64,
     tracks_refused: u64,
+    internal_faults: u64,
     worst_severity: &'static str,
 }
 
@@ -269,6 +270,7 @@ impl HealthSummary {
             depth_values_refused: health.depth_values_refused,
             detections_refused: u64::from(health.detections.refused()),
             tracks_refused: health.tracks_refused,
+            internal_faults: health.internal_faults,
             worst_severity: health.worst.name(),
         }
     }

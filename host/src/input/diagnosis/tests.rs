@@ -58,10 +58,12 @@ fn a_clean_pair_gives_no_finding_and_each_fault_is_named() {
 
 #[test]
 fn the_size_of_the_fault_stands_in_the_sentence_and_decides_on_refusal() {
-    let left = image(texture);
     let said = |rows: f64| {
-        let pair = Pair::of(&left, &image(|u, v| texture(u + 12.0, v - rows)));
-        let findings = judge(&[pair]);
+        let pairs = [0.0, 400.0, 800.0].map(|shift| {
+            let left = image(|u, v| texture(u + shift, v));
+            Pair::of(&left, &image(|u, v| texture(u + shift + 12.0, v - rows)))
+        });
+        let findings = judge(&pairs);
         (findings[0].refused, findings[0].message.clone())
     };
     let (refused, message) = said(3.0);

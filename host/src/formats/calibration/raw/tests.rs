@@ -203,7 +203,7 @@ fn damaged_numbers_are_named_with_the_next_action() {
             assert!(message.contains(word), "{word}: {message}");
         }
     };
-    says(kalibr("458.6", ".nan"), &["intrinsics holds", "not a finite number"]);
+    says(kalibr("458.6", ".nan"), &["non-finite", "line 5", "Check that the file is whole"]);
     says(kalibr("458.6", "0.0"), &["focal length is not a positive number", "above 0"]);
     says(
         kalibr("intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\ncam1", "resolution: [752, 480]\ncam1"),
