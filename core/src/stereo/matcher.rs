@@ -225,7 +225,7 @@ impl<'s> StereoMatcher<'s> {
     pub fn correct<E: Executor>(&mut self, correction: ColumnCorrection, executor: &E) {
         let (width, height) = (self.width, self.height);
         each(executor, Bands::of(height).split_mut(self.disparity, width), |rows: &mut [u16]| {
-            rows.chunks_exact_mut(width).for_each(|row| correction.correct_row(row));
+            rows.chunks_exact_mut(width.max(1)).for_each(|row| correction.correct_row(row));
         });
     }
 

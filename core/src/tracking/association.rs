@@ -204,7 +204,7 @@ impl<'s> TrackTable<'s> {
         let Some((oldest, _)) = undetected.max_by_key(|&(at, track)| (frame.wrapping_sub(track.last_frame), usize::MAX - at)) else {
             return false;
         };
-        self.tracks.copy_within(oldest + 1..self.len, oldest);
+        remove_at(self.tracks.get_mut(..self.len).unwrap_or_default(), oldest);
         self.len -= 1;
         // The tracks behind it moved up.
         for instance in instances.iter_mut() {
@@ -247,4 +247,11 @@ fn affinity(config: &TrackingConfig, frame: u32, instance: &Instance, track: &Tr
         Overlap::Box => instance.mask.pixels.overlap(&track.mask.pixels),
     };
     overlap * libm::sqrtf(instance.score * track.score) * discount
+}
+
+/// Moves the items behind `at` up by one; the last stays where it is.
+pub(super) fn remove_at<T: Copy>(items: &mut [T], at: usize) {
+    let Some(behind) = items.get_mut(at..) else { return };
+    let Some(mut carried) = behind.last().copied() else { return };
+    behind.iter_mut().rev().for_each(|slot| core::mem::swap(slot, &mut carried));
 }

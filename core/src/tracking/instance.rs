@@ -200,7 +200,8 @@ fn select_best(
                 continue;
             }
         }
-        let inserted = best.insert(at, candidate).is_ok();
+        // The condition is for the compiler, which does not see it.
+        let inserted = at <= best.len() && best.insert(at, candidate).is_ok();
         debug_assert!(inserted, "at most {most} candidates stay");
     }
     best

@@ -8,14 +8,12 @@ fn solve(bytes: usize, (width, height): (usize, usize), options: &BudgetOptions)
     Capacity::for_budget(bytes, width, height, options)
 }
 
-/// One block more.
+/// One block more, and one more in sight where blocks bound what is in sight.
 fn grown(capacity: &Capacity) -> Capacity {
     let blocks = capacity.blocks + 1;
-    Capacity {
-        blocks,
-        visible_blocks: capacity.visible_blocks.min(blocks - blocks / 5),
-        ..*capacity
-    }
+    let bounded = capacity.visible_blocks == capacity.blocks - capacity.blocks / 5;
+    let visible_blocks = if bounded { blocks - blocks / 5 } else { capacity.visible_blocks };
+    Capacity { blocks, visible_blocks, ..*capacity }
 }
 
 #[test]

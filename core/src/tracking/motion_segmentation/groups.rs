@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// Most candidates of a frame.
 pub(super) const CANDIDATES_MAX: usize = 1024;
 /// Most groups of a frame.
-pub(super) const GROUPS_MAX: usize = 32;
+pub(super) const GROUPS_MAX: usize = 16;
 
 /// Distance in the image at which two candidates may be neighbours, m, and at least, px.
 const NEIGHBOUR_M: f64 = 0.9;
@@ -211,34 +211,66 @@ pub(super) fn select<'m>(
     merge(groups)
 }
 
+/// The candidates of one group, and memory for one number of each.
+struct Members<'m> {
+    candidates: &'m [Candidate],
+    first: u32,
+    count: usize,
+    values: &'m mut [f32],
+}
+
+impl Members<'_> {
+    /// The value that so many of a thousand members do not exceed, in the order of `f32::total_cmp`. Selected bit by
+    /// bit: sorting would recurse.
+    fn percentile(&mut self, permille: usize, of: impl Fn(&Candidate) -> f32) -> Option<f64> {
+        let values = self.values.get_mut(..self.count)?;
+        let members = self.candidates.iter().filter(|candidate| candidate.parent == self.first);
+        values.iter_mut().zip(members).for_each(|(value, member)| *value = of(member));
+        let rank = (self.count.saturating_sub(1)) * permille / 1000;
+        let mut selected = 0u32;
+        for bit in (0..u32::BITS).rev() {
+            let candidate = selected | 1 << bit;
+            if values.iter().filter(|value| ordered(**value) < candidate).count() <= rank {
+                selected = candidate;
+            }
+        }
+        Some(f64::from(from_ordered(selected)))
+    }
+}
+
+/// The bits of a float, changed so that their order is that of `f32::total_cmp`.
+fn ordered(value: f32) -> u32 {
+    let bits = value.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
+/// Undoes [`ordered`].
+fn from_ordered(bits: u32) -> f32 {
+    f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits })
+}
+
 /// A group's median motion and extent, if it has enough members, moves and is not too large.
 fn describe(config: &SegmentationConfig, candidates: &[Candidate], first: u32, values: &mut [f32]) -> Option<Group> {
-    let members = || candidates.iter().filter(move |candidate| candidate.parent == first);
-    let count = members().count();
-    let mut percentile = |of: &dyn Fn(&Candidate) -> f32, permille: usize| -> Option<f64> {
-        let values = values.get_mut(..count)?;
-        values.iter_mut().zip(members()).for_each(|(value, member)| *value = of(member));
-        let (_, value, _) = values.select_nth_unstable_by((count - 1) * permille / 1000, f32::total_cmp);
-        Some(f64::from(*value))
-    };
+    let count = candidates.iter().filter(|candidate| candidate.parent == first).count();
     if count < 3 {
         return None;
     }
-    let depth_m = percentile(&|member| member.point_m[2], 500)?;
+    let mut members = Members { candidates, first, count, values };
+    let depth_m = members.percentile(500, |member| member.point_m[2])?;
     let least = if depth_m > f64::from(config.sparse_from_m) { config.far_members_min } else { config.members_min };
     if count < usize::from(least) {
         return None;
     }
     let motion_m = Vector3::new(
-        percentile(&|member| member.motion_m[0], 500)?,
-        percentile(&|member| member.motion_m[1], 500)?,
-        percentile(&|member| member.motion_m[2], 500)?,
+        members.percentile(500, |member| member.motion_m[0])?,
+        members.percentile(500, |member| member.motion_m[1])?,
+        members.percentile(500, |member| member.motion_m[2])?,
     );
-    let depth_sigma_m = percentile(&|member| member.depth_sigma_m, 500)?;
+    let depth_sigma_m = members.percentile(500, |member| member.depth_sigma_m)?;
     let mut extent = Extent::default();
     for (axis, (low, high)) in extent.low.iter_mut().zip(&mut extent.high).enumerate() {
-        let of = move |member: &Candidate| member.point_m.get(axis).copied().unwrap_or(0.0);
-        (*low, *high) = (percentile(&of, 50)?, percentile(&of, 950)?);
+        let of = |member: &Candidate| member.point_m.get(axis).copied().unwrap_or(0.0);
+        (*low, *high) = (members.percentile(50, of)?, members.percentile(950, of)?);
     }
     let is_small = extent.low.iter().zip(&extent.high).zip(EXTENT_MAX_M).all(|((low, high), most)| high - low <= most);
     let moves = motion_m.norm() > f64::from(config.motion_min_m) + MOTION_PER_SQUARED_DEPTH * depth_m * depth_m;
@@ -246,10 +278,13 @@ fn describe(config: &SegmentationConfig, candidates: &[Candidate], first: u32, v
 }
 
 /// Merges groups of one motion that lie close together: a near car has several.
-fn merge(mut groups: Vec<Group, GROUPS_MAX>) -> Vec<Group, GROUPS_MAX> {
+fn merge(groups: Vec<Group, GROUPS_MAX>) -> Vec<Group, GROUPS_MAX> {
     let mut merged = Vec::<Group, GROUPS_MAX>::new();
-    groups.sort_unstable_by_key(|group| (u32::MAX - group.members, group.first));
-    for group in &groups {
+    // The largest first, by a key that no two groups share.
+    let key = |group: &Group| (u32::MAX - group.members, group.first);
+    let mut last = None;
+    while let Some(group) = groups.iter().filter(|group| last.is_none_or(|last| key(group) > last)).min_by_key(|group| key(group)) {
+        last = Some(key(group));
         let is_same = |other: &&mut Group| {
             (other.motion_m - group.motion_m).norm() < MERGE_MOTION_M && other.extent.gap(&group.extent) < MERGE_DISTANCE_M
         };

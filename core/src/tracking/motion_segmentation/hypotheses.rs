@@ -4,7 +4,7 @@ use super::{
     SegmentationConfig,
     groups::{Extent, GROUPS_MAX, Group},
 };
-use crate::{geometry::Transform, state::Visitor};
+use crate::{geometry::Transform, state::Visitor, tracking::association::remove_at};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
@@ -190,7 +190,7 @@ impl<'s> Hypotheses<'s> {
     /// Drops the hypothesis at that position.
     pub fn remove(&mut self, index: usize) {
         if index < self.len {
-            self.table.copy_within(index + 1..self.len, index);
+            remove_at(self.table.get_mut(..self.len).unwrap_or_default(), index);
             self.len -= 1;
         }
     }

@@ -118,13 +118,8 @@ impl Marcher<'_, '_> {
                 let (layer, bit) = spot.bit();
                 let layer = &cells[layer];
                 if layer.crossed >> bit & 1 == 1 && to > from {
-                    let step = Step {
-                        spot,
-                        fully_observed: layer.fully_observed >> bit & 1 == 1,
-                        from,
-                        to,
-                        axes: [entered, axis],
-                    };
+                    let fully_observed = layer.fully_observed >> bit & 1 == 1;
+                    let step = Step { spot, fully_observed, from, to, axes: [entered, axis] };
                     if let Some(crossing) = self.through(&here, step, &mut trail) {
                         return (crossing.depth_m <= to_m).then(|| self.hit(&crossing));
                     }

@@ -38,7 +38,7 @@ impl<'a> Horizon<'a> {
         let [columns, _] = columns_rows(shift);
         let [coarse_columns, _] = columns_rows(shift + LEVEL_SHIFT);
         greatest(depth_m.rows(), shift, columns, fine);
-        greatest(fine.chunks(columns), LEVEL_SHIFT, coarse_columns, coarse);
+        greatest(fine.chunks(columns.max(1)), LEVEL_SHIFT, coarse_columns, coarse);
         Some(Self {
             fine: Tiles { depth_m: fine, columns, shift },
             coarse: Tiles { depth_m: coarse, columns: coarse_columns, shift: shift + LEVEL_SHIFT },

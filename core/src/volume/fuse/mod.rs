@@ -92,6 +92,8 @@ struct Fusion<'a> {
 }
 
 impl<'a> Fusion<'a> {
+    // Never inlined: the copies of its tables must not stay in the caller's frame.
+    #[inline(never)]
     fn new(config: &'a VolumeConfig, view: &Viewpoint, seen: Observation<'a>, horizon: Option<Horizon<'a>>) -> Self {
         let (camera_from_world, camera) = view.camera_from_world();
         let voxel_m = f64::from(config.voxel_size_m);
