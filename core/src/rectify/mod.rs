@@ -10,7 +10,7 @@
 //!
 //! Memory, from `Capacity`, where it has raw pixels: 4 bytes a rectified pixel and camera for the map, 1 for the image, an eighth for the
 //! mask, 3 for colour. Raw images stay with the caller.
-//! Time: making the maps takes two projections a rectified pixel; a frame 2 reads of two bytes and four multiplications a pixel.
+//! Time: making the maps takes one projection a rectified pixel and camera; a frame 2 reads of two bytes and four multiplications a pixel.
 //! What can go wrong: a rig that cannot be rectified ([`RectifyProblem`]), a lens with absurd parameters ([`LensProblem`]), images that do
 //! not fit the capacity ([`RectifierError`]): all before the first frame. A frame of another size is refused by the mapper.
 //!

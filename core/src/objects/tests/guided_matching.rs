@@ -1,9 +1,9 @@
-//! A closer inspect, at a wall of a textured room that a detector takes for a car.
+//! Guided matching, on a wall of a textured box that a detector takes for a car.
 
 use super::*;
 use crate::scene_flow::{FlowMatcher, SceneFlowConfig, test_scene};
 
-/// Depth of the room's far wall at the origin, m.
+/// Depth of the box's far wall at the origin, m.
 const WALL_M: f64 = 14.0;
 /// A piece of it.
 const PIECE: PixelBox = PixelBox { left: 150, top: 60, width: 90, height: 40 };
