@@ -8,7 +8,7 @@ use dynvox_core::{
     Capacity, Config, Mapper, Serial,
     memory::SLAB_ALIGN,
     objects::NoSink,
-    volume::{BLOCK_VOXELS, BlockStore, LeavingBlock, ReturningBlock},
+    volume::{BLOCK_VOXELS, BlockStore, EvictedBlock, LoadedBlock},
 };
 use std::collections::HashMap;
 
@@ -17,12 +17,12 @@ use std::collections::HashMap;
 struct Memory(HashMap<[i16; 3], ([i16; BLOCK_VOXELS], [u8; BLOCK_VOXELS])>);
 
 impl BlockStore for Memory {
-    fn keep(&mut self, block: LeavingBlock<'_>) -> bool {
+    fn store(&mut self, block: EvictedBlock<'_>) -> bool {
         self.0.insert([block.coord.x, block.coord.y, block.coord.z], (*block.sdf, *block.weight));
         true
     }
 
-    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
+    fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         let Some((sdf, weight)) = self.0.get(&[block.coord.x, block.coord.y, block.coord.z]) else { return false };
         (*block.sdf, *block.weight) = (*sdf, *weight);
         true

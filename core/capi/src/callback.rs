@@ -2,7 +2,7 @@
 
 use core::ffi::c_void;
 use dynvox_core::view::Triangle;
-use dynvox_core::volume::{BlockStore, LeavingBlock, ReturningBlock};
+use dynvox_core::volume::{BlockStore, EvictedBlock, LoadedBlock};
 
 /// An evicted block of 8 x 8 x 8 voxels; x runs fastest, then y, then z. Valid during the call.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +51,7 @@ impl DynvoxStore {
 }
 
 impl BlockStore for DynvoxStore {
-    fn keep(&mut self, block: LeavingBlock<'_>) -> bool {
+    fn store(&mut self, block: EvictedBlock<'_>) -> bool {
         let Some(store) = self.store else { return false };
         let block = DynvoxBlock {
             coord: [block.coord.x, block.coord.y, block.coord.z],
@@ -62,7 +62,7 @@ impl BlockStore for DynvoxStore {
         store(self.context, &raw const block)
     }
 
-    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
+    fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         let Some(load) = self.load else { return false };
         let block = DynvoxLoadedBlock {
             coord: [block.coord.x, block.coord.y, block.coord.z],

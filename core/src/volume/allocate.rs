@@ -101,7 +101,7 @@ impl Volume<'_> {
                     return;
                 };
                 report.made += 1;
-                report.eviction.returned += u32::from(self.bring_back(slot, coord, store));
+                report.eviction.returned += u32::from(self.load_into(slot, coord, store));
                 slot
             }
         };

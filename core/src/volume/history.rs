@@ -88,8 +88,8 @@ impl<'s> VisibleHistory<'s> {
         }
     }
 
-    /// Enters the slots visible in `frame`, which must follow the last one entered. The ring must not be full.
-    pub(super) fn enter(&mut self, frame: u32, visible: &[Slot]) {
+    /// Appends the slots visible in `frame`, which must follow the last frame of the ring. The ring must not be full.
+    pub(super) fn push(&mut self, frame: u32, visible: &[Slot]) {
         if self.len == 0 {
             self.oldest = frame;
         }

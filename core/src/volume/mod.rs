@@ -33,7 +33,7 @@ pub use pool::{Full, Slot, SlotPool};
 pub use prune::PruneReport;
 pub use recency::Recency;
 pub use sampler::{Sampler, VoxelSample};
-pub use store::{BlockStore, EvictionReport, LeavingBlock, NoStore, ReturningBlock};
+pub use store::{BlockStore, EvictedBlock, EvictionReport, LoadedBlock, NoStore};
 pub use viewpoint::Viewpoint;
 pub use visible::VisibleList;
 

@@ -43,7 +43,7 @@ impl Volume<'_> {
         if self.history.len() == self.history.capacity() && self.history.expire().is_some() {
             report.early += u32::from(self.history.capacity() < self.config.prune_lag as usize);
         }
-        self.history.enter(frame, self.visible.slots());
+        self.history.push(frame, self.visible.slots());
         while self.history.oldest().is_some_and(|oldest| frame.wrapping_sub(oldest) >= self.config.prune_lag) {
             self.history.expire();
         }

@@ -71,20 +71,20 @@ impl<'s> Recency<'s> {
     }
 
     fn link(&mut self, entry: u32, links: [u32; 2]) {
-        if let Some(place) = entry.checked_sub(1).and_then(|slot| self.links.get_mut(slot as usize)) {
-            *place = links;
+        if let Some(entry_links) = entry.checked_sub(1).and_then(|slot| self.links.get_mut(slot as usize)) {
+            *entry_links = links;
         }
     }
 
     /// Sets the link of `entry` on one side; beyond the list lie its ends.
     fn set(&mut self, entry: u32, side: usize, to: u32) {
-        let place = match entry.checked_sub(1) {
+        let neighbour = match entry.checked_sub(1) {
             Some(slot) => self.links.get_mut(slot as usize).and_then(|links| links.get_mut(side)),
             // What follows the missing newer neighbour of the oldest is the oldest end, and the other way round.
             None => self.ends.get_mut(1 - side),
         };
-        if let Some(place) = place {
-            *place = to;
+        if let Some(neighbour) = neighbour {
+            *neighbour = to;
         }
     }
 }

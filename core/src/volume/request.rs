@@ -18,7 +18,7 @@ const PIXEL_STEP: usize = 2;
 const CACHE_BITS: u32 = 11;
 const CACHE_ENTRIES: usize = 1 << CACHE_BITS;
 const LIST_ENTRIES: usize = 2_048;
-const _: () = assert!(LIST_ENTRIES >= MAX_BLOCKS_PER_RAY, "a list has room for a ray");
+const _: () = assert!(LIST_ENTRIES >= MAX_BLOCKS_PER_RAY, "a list holds a ray");
 
 /// A block relative to the camera's, in one word that is never 0.
 #[derive(Clone, Copy)]
@@ -117,7 +117,7 @@ impl Band<'_> {
     fn meet(&mut self, block: [i32; 3]) {
         let tag = Tag::of(block);
         let entry = self.cache.get_mut(tag.entry());
-        debug_assert!(entry.is_some() && self.len < self.list.len(), "a cache has an entry for each tag, and the list has room for a ray");
+        debug_assert!(entry.is_some() && self.len < self.list.len(), "a cache has an entry for each tag, and the list holds a ray");
         if let (Some(entry), Some(request)) = (entry, self.list.get_mut(self.len))
             && *entry != tag.0
         {

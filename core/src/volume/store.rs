@@ -8,7 +8,7 @@ use super::{BLOCK_VOXELS, BlockCoord, Slot, Volume, block::Voxels, config::WhenF
 
 /// A block as it leaves the map.
 #[derive(Clone, Copy, Debug)]
-pub struct LeavingBlock<'b> {
+pub struct EvictedBlock<'b> {
     /// Its coordinates.
     pub coord: BlockCoord,
     /// Signed distances.
@@ -19,9 +19,9 @@ pub struct LeavingBlock<'b> {
     pub colour: Option<&'b [[u8; BLOCK_VOXELS]; 3]>,
 }
 
-/// A block to be filled with what was kept of it. All zero as it comes.
+/// A block to be filled from the store; all zero before.
 #[derive(Debug)]
-pub struct ReturningBlock<'b> {
+pub struct LoadedBlock<'b> {
     /// Its coordinates.
     pub coord: BlockCoord,
     /// Signed distances.
@@ -32,25 +32,26 @@ pub struct ReturningBlock<'b> {
     pub colour: Option<&'b mut [[u8; BLOCK_VOXELS]; 3]>,
 }
 
-/// A caller's memory for blocks: the sink they leave into and the source they come back from.
+/// The caller's memory for blocks: evicted blocks are stored in it and loaded from it.
 pub trait BlockStore {
-    /// Keeps a block that leaves the map; keeping it again replaces what was kept. `false` when it cannot be kept: then it is lost, and counted.
-    fn keep(&mut self, block: LeavingBlock<'_>) -> bool;
+    /// Stores a block that leaves the map; the last one stored at its coordinates counts. `false` when it cannot be stored: it is lost,
+    /// and counted.
+    fn store(&mut self, block: EvictedBlock<'_>) -> bool;
 
-    /// Fills in a block that is made again; `false` when nothing was kept of it, and then it must be left as it came.
-    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool;
+    /// Fills a block that is made again; `false` when none is stored at its coordinates, and then the block stays all zero.
+    fn load(&mut self, block: LoadedBlock<'_>) -> bool;
 }
 
-/// Keeps nothing.
+/// Stores nothing: every block that leaves the map is lost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoStore;
 
 impl BlockStore for NoStore {
-    fn keep(&mut self, _: LeavingBlock<'_>) -> bool {
+    fn store(&mut self, _: EvictedBlock<'_>) -> bool {
         false
     }
 
-    fn bring_back(&mut self, _: ReturningBlock<'_>) -> bool {
+    fn load(&mut self, _: LoadedBlock<'_>) -> bool {
         false
     }
 }
@@ -83,9 +84,9 @@ impl Volume<'_> {
                 return true;
             }
         }
-        match self.leaving(slot) {
+        match self.evicted(slot) {
             Some(block) if block.weight.iter().all(|&weight| weight == 0) => report.empty += 1,
-            Some(block) if store.keep(block) => report.kept += 1,
+            Some(block) if store.store(block) => report.kept += 1,
             _ => report.lost += 1,
         }
         self.free_block(slot);
@@ -93,8 +94,8 @@ impl Volume<'_> {
     }
 
     /// What a slot holds.
-    fn leaving(&self, slot: Slot) -> Option<LeavingBlock<'_>> {
-        Some(LeavingBlock {
+    fn evicted(&self, slot: Slot) -> Option<EvictedBlock<'_>> {
+        Some(EvictedBlock {
             coord: self.blocks.coord(slot)?,
             sdf: self.blocks.sdf(slot)?,
             weight: self.blocks.weight(slot)?,
@@ -108,9 +109,9 @@ impl Volume<'_> {
         let mut from = 0;
         while let Some(slot) = self.pool.next_live(from) {
             from = slot.get() + 1;
-            match self.leaving(slot) {
+            match self.evicted(slot) {
                 Some(block) if block.weight.iter().all(|&weight| weight == 0) => report.empty += 1,
-                Some(block) if store.keep(block) => report.kept += 1,
+                Some(block) if store.store(block) => report.kept += 1,
                 _ => report.lost += 1,
             }
             self.free_block(slot);
@@ -118,26 +119,26 @@ impl Volume<'_> {
         report
     }
 
-    /// Takes what `store` kept of the block at `coord` into the map, as when a map on disk is looked at piece by piece. Whether the block
-    /// is in the map now; where nothing was kept of it, or no slot is free, it is not.
+    /// Loads the block stored at `coord` into the map, as when a map on disk is viewed part by part. Whether the block is in the map
+    /// now; where none is stored, or no slot is free, it is not.
     pub fn load<S: BlockStore>(&mut self, coord: BlockCoord, store: &mut S) -> bool {
         if self.find(coord).is_some() {
             return true;
         }
         let Some(slot) = self.make(coord) else { return false };
-        let came = self.bring_back(slot, coord, store);
-        if !came {
+        let loaded = self.load_into(slot, coord, store);
+        if !loaded {
             self.free_block(slot);
         }
-        came
+        loaded
     }
 
-    /// Fills a block that was just made with what the store kept of it.
-    pub(super) fn bring_back<S: BlockStore>(&mut self, slot: Slot, coord: BlockCoord, store: &mut S) -> bool {
+    /// Fills a block that was just made from the store.
+    pub(super) fn load_into<S: BlockStore>(&mut self, slot: Slot, coord: BlockCoord, store: &mut S) -> bool {
         let at = slot.index();
         let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else { return false };
         let colour = self.blocks.colour.get_mut(at);
-        let returned = store.bring_back(ReturningBlock { coord, sdf, weight, colour });
+        let returned = store.load(LoadedBlock { coord, sdf, weight, colour });
         if returned {
             self.update_digest(slot);
         }

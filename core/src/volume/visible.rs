@@ -111,8 +111,8 @@ impl<'s> VisibleList<'s> {
     /// entered instead of comparing them: no more work than a sort, and no depth that depends on the list.
     pub(super) fn sort(&mut self, end: usize) {
         let entered = (0..).zip(self.last_visible.iter().take(end)).filter(|(_, last)| **last == self.frame);
-        for (place, (slot, _)) in self.slots.iter_mut().take(self.len).zip(entered) {
-            *place = Slot::new(slot);
+        for (target, (slot, _)) in self.slots.iter_mut().take(self.len).zip(entered) {
+            *target = Slot::new(slot);
         }
     }
 

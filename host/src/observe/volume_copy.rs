@@ -4,7 +4,7 @@ use crate::slab::HostSlab;
 use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
 use dynvox_core::view::{MeshConfig, Triangle};
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, LeavingBlock, ReturningBlock, Volume, VolumeConfig};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock, Volume, VolumeConfig};
 use std::io::{Error, ErrorKind};
 
 /// The blocks of a volume, in its order.
@@ -77,11 +77,11 @@ impl VolumeCopy {
 struct One<'b>(&'b Block);
 
 impl BlockStore for One<'_> {
-    fn keep(&mut self, _: LeavingBlock<'_>) -> bool {
+    fn store(&mut self, _: EvictedBlock<'_>) -> bool {
         false
     }
 
-    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
+    fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         (*block.sdf, *block.weight) = (self.0.sdf, self.0.weight);
         if let Some(colour) = block.colour {
             *colour = self.0.colour;

@@ -5,7 +5,7 @@ use super::{FolderError, RunFolder};
 use crate::formats::{Mesh, PlyWriter};
 use crate::observe::StoreStats;
 use dynvox_core::view::Triangle;
-use dynvox_core::volume::{BlockCoord, BlockStore, EvictionReport, LeavingBlock, ReturningBlock};
+use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
 use dynvox_core::{Capacity, Config, Mapper};
 use hashbrown::HashSet;
 use std::fs::File;
@@ -27,12 +27,12 @@ pub struct Streaming {
 pub struct DiskStore(Option<BlockFile<File>>);
 
 impl BlockStore for DiskStore {
-    fn keep(&mut self, block: LeavingBlock<'_>) -> bool {
-        self.0.as_mut().is_some_and(|file| file.keep(block))
+    fn store(&mut self, block: EvictedBlock<'_>) -> bool {
+        self.0.as_mut().is_some_and(|file| file.store(block))
     }
 
-    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
-        self.0.as_mut().is_some_and(|file| file.bring_back(block))
+    fn load(&mut self, block: LoadedBlock<'_>) -> bool {
+        self.0.as_mut().is_some_and(|file| file.load(block))
     }
 }
 

@@ -183,8 +183,8 @@ mod tests {
             let mut used = 0u16;
             case.triangles[..usize::from(case.count)].iter().flatten().for_each(|&edge| used |= 1 << edge);
             for (edge, &start) in EDGE_START.iter().enumerate() {
-                let cut = (inside >> start ^ inside >> (start + (1 << edge_axis(edge)))) & 1 == 1;
-                assert_eq!((used >> edge & 1 == 1, case.edges >> edge & 1 == 1), (cut, cut), "case {inside:08b}, edge {edge}");
+                let is_cut = (inside >> start ^ inside >> (start + (1 << edge_axis(edge)))) & 1 == 1;
+                assert_eq!((used >> edge & 1 == 1, case.edges >> edge & 1 == 1), (is_cut, is_cut), "case {inside:08b}, edge {edge}");
             }
         }
     }

@@ -3,7 +3,7 @@ use crate::{
     random::Random,
     volume::{
         VolumeConfig,
-        tests::analytic::{Told, cuboid, empty, fill},
+        tests::analytic::{LatticeSample, cuboid, empty, fill},
     },
 };
 use std::{collections::BTreeMap, vec::Vec};
@@ -17,13 +17,13 @@ fn mesh(volume: &Volume<'_>) -> Vec<Triangle> {
     triangles
 }
 
-fn filled(low: [i32; 3], high: [i32; 3], tell: impl Fn([i32; 3]) -> Told) -> Volume<'static> {
+fn filled(low: [i32; 3], high: [i32; 3], sample_at: impl Fn([i32; 3]) -> LatticeSample) -> Volume<'static> {
     let mut volume = empty(&VolumeConfig::default(), cuboid(low, high).count());
-    fill(&mut volume, cuboid(low, high), tell);
+    fill(&mut volume, cuboid(low, high), sample_at);
     volume
 }
 
-fn ball(center: [f32; 3], radius: f32) -> impl Fn([i32; 3]) -> Told {
+fn ball(center: [f32; 3], radius: f32) -> impl Fn([i32; 3]) -> LatticeSample {
     move |point| {
         let off: [f32; 3] = core::array::from_fn(|axis| point[axis] as f32 - center[axis]);
         let distance = libm::sqrtf(off.iter().map(|c| c * c).sum()) - radius;
@@ -99,7 +99,7 @@ fn every_place_of_a_small_ball_across_a_block_corner_is_closed() {
     }
 }
 
-/// A field of random distances of which a share is exactly 0, closed off by free space.
+/// A field of random distances closed off by free space; `zeros` percent of them are exactly 0.
 fn noise(seed: u64, zeros: u32) -> Volume<'static> {
     let mut random = Random::new(seed);
     let values: Vec<f32> = (0..16 * 16 * 16)
@@ -125,7 +125,7 @@ fn a_field_of_random_signs_is_watertight() {
 }
 
 #[test]
-fn distances_of_exactly_nothing_open_no_cracks() {
+fn distances_of_exactly_zero_open_no_cracks() {
     for seed in 0..20 {
         let triangles = mesh(&noise(seed, 30));
         assert!(triangles.len() > 3_000);
@@ -140,11 +140,11 @@ fn distances_of_exactly_nothing_open_no_cracks() {
 #[test]
 fn an_unseen_lattice_point_leaves_a_hole_of_the_cells_around_it() {
     let plane = |p: [i32; 3]| ((p[2] as f32 - 3.6) * VOXEL_M, 5, [9; 3]);
-    let whole = mesh(&filled([0; 3], [1, 1, 0], |p| Some(plane(p))));
+    let complete = mesh(&filled([0; 3], [1, 1, 0], |p| Some(plane(p))));
     let holed = mesh(&filled([0; 3], [1, 1, 0], |p| (p != [8, 8, 3]).then(|| plane(p))));
-    assert_eq!(whole.len() - holed.len(), 2 * 4);
+    assert_eq!(complete.len() - holed.len(), 2 * 4);
     // Beyond the last blocks nothing was seen either: 15 cells a side of 16 points.
-    assert_eq!(whole.len(), 2 * 15 * 15);
+    assert_eq!(complete.len(), 2 * 15 * 15);
 }
 
 #[test]
@@ -167,11 +167,11 @@ fn colour_runs_along_the_edge_and_falls_back_to_the_coloured_end() {
 
 #[test]
 fn order_follows_slots_and_two_blocks_agree_on_their_border() {
-    let tell = ball([8.0, 4.1, 4.2], 2.7);
+    let sample_at = ball([8.0, 4.1, 4.2], 2.7);
     let mut there = empty(&VolumeConfig::default(), 2);
-    fill(&mut there, cuboid([0; 3], [1, 0, 0]), &tell);
+    fill(&mut there, cuboid([0; 3], [1, 0, 0]), &sample_at);
     let mut back = empty(&VolumeConfig::default(), 2);
-    fill(&mut back, cuboid([1, 0, 0], [1, 0, 0]).chain(cuboid([0; 3], [0; 3])), &tell);
+    fill(&mut back, cuboid([1, 0, 0], [1, 0, 0]).chain(cuboid([0; 3], [0; 3])), &sample_at);
     let (there, back) = (mesh(&there), mesh(&back));
     assert_manifold(&there);
     let first = there.iter().filter(|t| t.vertices.iter().all(|v| v.position_m[0] <= 8.0 * VOXEL_M)).count();

@@ -112,10 +112,10 @@ impl RaySegment {
         let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
         for axis in AXES {
             let ahead = ray.ahead[axis] as f32;
-            let enters = within(offset[axis], ray.slope[axis], depths_m[0]);
-            let leaves = within(offset[axis], ray.slope[axis], depths_m[1]);
-            from[axis] = if axes[0] == axis { 1.0 - ahead } else { enters };
-            to[axis] = if axes[1] == axis { ahead } else { leaves };
+            let first = within(offset[axis], ray.slope[axis], depths_m[0]);
+            let last = within(offset[axis], ray.slope[axis], depths_m[1]);
+            from[axis] = if axes[0] == axis { 1.0 - ahead } else { first };
+            to[axis] = if axes[1] == axis { ahead } else { last };
         }
         Self { from, to }
     }
@@ -201,17 +201,17 @@ mod tests {
     }
 
     #[test]
-    fn unseen_corners_of_a_plane_are_told_exactly() {
+    fn unseen_corners_of_a_plane_are_completed_exactly() {
         let plane = |corner: usize| 100.0 + 300.0 * (corner & 1) as f32 - 50.0 * (corner >> 1 & 1) as f32 - 700.0 * (corner >> 2) as f32;
-        let whole: [f32; 8] = core::array::from_fn(plane);
-        let mut told = 0;
+        let exact: [f32; 8] = core::array::from_fn(plane);
+        let mut completed = 0;
         for observed in 0..=u8::MAX {
             let sdf = core::array::from_fn(|corner| if observed >> corner & 1 == 1 { plane(corner) } else { 9_999.0 });
             if let Some(corners) = (Corners { sdf, observed }).complete() {
-                told += 1;
-                corners.iter().zip(whole).for_each(|(sdf, whole)| assert!((sdf - whole).abs() < 1e-3));
+                completed += 1;
+                corners.iter().zip(exact).for_each(|(sdf, exact)| assert!((sdf - exact).abs() < 1e-3));
             }
         }
-        assert!(told > 100, "{told} of 256");
+        assert!(completed > 100, "{completed} of 256");
     }
 }

@@ -64,7 +64,7 @@ struct Step {
     axes: [usize; 2],
 }
 
-/// The field where a ray left the last crossed cell, and the depth of that place.
+/// The field where a ray left the last crossed cell, and the depth of that point.
 #[derive(Clone, Copy, Default)]
 struct PreviousSample {
     value: f32,
@@ -77,13 +77,13 @@ struct Crossing<'a> {
     spot: CellIndex,
     /// The field's gradient there.
     gradient: [f32; 3],
-    /// The place in the cell.
-    place: [f32; 3],
+    /// The point within the cell.
+    point: [f32; 3],
     depth_m: f32,
 }
 
 impl Marcher<'_, '_> {
-    /// The first place between two depths at which the ray comes from seen free space through the surface.
+    /// The first point between two depths at which the ray comes from seen free space through the surface.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "a layer is below 8, axes are below 3")]
     pub fn cast(&self, u: usize, v: usize, [from_m, to_m]: [f32; 2]) -> Option<Hit> {
@@ -230,20 +230,20 @@ impl Marcher<'_, '_> {
         mean(&corners, passage(here, step).end(depth == step.to))
     }
 
-    /// The place in a cell at which the field falls to 0.
+    /// The point in a cell at which the field falls to 0.
     #[inline(never)]
     fn crossing<'h>(&self, here: &BlockContext<'h>, step: Step, first: f32, last: f32) -> Option<Crossing<'h>> {
         let field = Field::new(&self.corners(here, step)?);
         let passage = passage(here, step);
         let share = passage.root(&field, first, last);
-        let place = passage.at(share);
+        let point = passage.at(share);
         let (from_m, to_m) = (depth_in_m(step.from), depth_in_m(step.to));
         let depth_m = from_m + (to_m - from_m) * share;
         Some(Crossing {
             slots: here.slots,
             spot: step.spot,
-            gradient: field.gradient(place),
-            place,
+            gradient: field.gradient(point),
+            point,
             depth_m,
         })
     }
@@ -299,10 +299,10 @@ impl Marcher<'_, '_> {
     #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
     fn colour(&self, crossing: &Crossing<'_>) -> ([u8; 3], u8) {
         let (spot, slots) = (crossing.spot, crossing.slots);
-        let nearest = spot.plus(CellIndex::steps(crossing.place.map(|c| u32::from(c >= 0.5))));
+        let nearest = spot.plus(CellIndex::steps(crossing.point.map(|c| u32::from(c >= 0.5))));
         let weight = self.blocks.weight(slots[nearest.block() & 7]).map_or(0, |weights| weights[nearest.voxel() & 511]);
         let mut colours = Colours::default();
-        let counts = counts(crossing.place);
+        let counts = counts(crossing.point);
         if spot.shares_block(CellIndex::FAR) {
             let window = |plane| CellIndex::window(spot, plane);
             if let Some([red, green, blue]) = self.blocks.colour(slots[0])
@@ -324,10 +324,10 @@ impl Marcher<'_, '_> {
     }
 }
 
-/// What each corner of a cell counts at a place in it, in 256ths.
+/// What each corner of a cell counts at a point in it, in 256ths.
 #[inline(always)]
-fn counts(place: [f32; 3]) -> [u32; 8] {
-    let [x, y, z] = [(place[0] * 256.0) as i32 as u32, (place[1] * 256.0) as i32 as u32, (place[2] * 256.0) as i32 as u32];
+fn counts(point: [f32; 3]) -> [u32; 8] {
+    let [x, y, z] = [(point[0] * 256.0) as i32 as u32, (point[1] * 256.0) as i32 as u32, (point[2] * 256.0) as i32 as u32];
     let (nx, ny, nz) = (256 - x, 256 - y, 256 - z);
     let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
     let count = |area: u32, height: u32| (area * height) >> 16;

@@ -64,13 +64,13 @@ impl<'s> Ranges<'s> {
                     half[axis] = 0.5 * (high - low) + 0.01;
                 }
                 if let Some(extent) = eye.extent(center, half, near_m, far_m) {
-                    self.enter(&extent);
+                    self.widen(&extent);
                 }
             });
         }
     }
 
-    fn enter(&mut self, extent: &Extent) {
+    fn widen(&mut self, extent: &Extent) {
         let [first, last] = extent.columns.map(|column| column >> TILE_SHIFT);
         for row in extent.rows[0]..=extent.rows[1] {
             let start = row * self.columns;

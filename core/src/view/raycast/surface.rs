@@ -108,21 +108,21 @@ impl<'s> Surface<'s> {
             if let Some(step) = by_range.get_mut(((depth_m * steps_per_m) as usize).min(RANGE_STEPS - 1)) {
                 *step += 1;
             }
-            self.enter(slot, local);
+            self.push(slot, local);
         }
         if count as usize <= self.local.len() {
             return InView { blocks: count, far_m };
         }
         // Not all fit: see less far, rather than full of holes.
-        let mut room = self.local.len() as u32;
-        let steps = by_range.iter().take_while(|&&step| room.checked_sub(step).map(|left| room = left).is_some()).count();
+        let mut space = self.local.len() as u32;
+        let steps = by_range.iter().take_while(|&&step| space.checked_sub(step).map(|left| space = left).is_some()).count();
         let far_m = steps as f32 / steps_per_m;
         self.len = 0;
-        blocks.filter(|(_, _, depth_m)| ((depth_m * steps_per_m) as usize) < steps).for_each(|(slot, local, _)| self.enter(slot, local));
+        blocks.filter(|(_, _, depth_m)| ((depth_m * steps_per_m) as usize) < steps).for_each(|(slot, local, _)| self.push(slot, local));
         InView { blocks: count, far_m }
     }
 
-    fn enter(&mut self, slot: Slot, block: [i32; 3]) {
+    fn push(&mut self, slot: Slot, block: [i32; 3]) {
         if let (Some(local), Some(slots)) = (self.local.get_mut(self.len), self.slots.get_mut(self.len)) {
             *local = block;
             *slots = [slot, NONE, NONE, NONE, NONE, NONE, NONE, NONE];

@@ -83,9 +83,9 @@ mod tests {
     #[test]
     fn never_says_less_than_the_greatest_depth_of_the_pixels_asked_for() {
         let mut random = Random::new(3);
-        for (width, height, room) in [(1, 1, 2), (37, 21, 100), (320, 96, 600), (320, 96, 20), (100, 70, 2)] {
+        for (width, height, space) in [(1, 1, 2), (37, 21, 100), (320, 96, 600), (320, 96, 20), (100, 70, 2)] {
             let depth_m: Vec<f32> = (0..width * height).map(|_| random.below(3) as f32 * random.below(1_000) as f32).collect();
-            let (image, mut memory) = (View::new(&depth_m, width, height).unwrap(), vec![7.0; room]);
+            let (image, mut memory) = (View::new(&depth_m, width, height).unwrap(), vec![7.0; space]);
             let horizon = Horizon::new(image, &mut memory).unwrap();
             for _ in 0..500 {
                 let mut span = |size: usize| {

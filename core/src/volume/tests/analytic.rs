@@ -7,8 +7,8 @@ use crate::{
 };
 use std::{boxed::Box, vec};
 
-/// What a formula says of a lattice point: signed distance in m, weight, colour. `None`: never seen.
-pub type Told = Option<(f32, u8, [u8; 3])>;
+/// A lattice point's signed distance in m, weight and colour. `None`: never observed.
+pub type LatticeSample = Option<(f32, u8, [u8; 3])>;
 
 /// An empty map for `blocks` blocks on memory that is never given back.
 pub fn empty(config: &VolumeConfig, blocks: usize) -> Volume<'static> {
@@ -20,8 +20,8 @@ pub fn empty(config: &VolumeConfig, blocks: usize) -> Volume<'static> {
     Volume::new_in(&capacity, config, &mut carver)
 }
 
-/// Adds the blocks of `coords` in order, filled by `tell`, which is given lattice points.
-pub fn fill(volume: &mut Volume<'_>, coords: impl IntoIterator<Item = BlockCoord>, tell: impl Fn([i32; 3]) -> Told) {
+/// Adds the blocks of `coords` in order, filled by `sample_at`, which is given lattice points.
+pub fn fill(volume: &mut Volume<'_>, coords: impl IntoIterator<Item = BlockCoord>, sample_at: impl Fn([i32; 3]) -> LatticeSample) {
     let scale = 32_767.0 / volume.config.truncation_m;
     for coord in coords {
         let slot = volume.pool.take().unwrap();
@@ -31,7 +31,7 @@ pub fn fill(volume: &mut Volume<'_>, coords: impl IntoIterator<Item = BlockCoord
         let origin = coord.origin();
         for voxel in 0..BLOCK_VOXELS {
             let [x, y, z] = [voxel & 7, voxel >> 3 & 7, voxel >> 6].map(|c| c as i32);
-            if let Some((sdf_m, weight, colour)) = tell([origin[0] + x, origin[1] + y, origin[2] + z]) {
+            if let Some((sdf_m, weight, colour)) = sample_at([origin[0] + x, origin[1] + y, origin[2] + z]) {
                 volume.blocks.voxels[slot].sdf[voxel] = libm::roundf(clamp_f32(sdf_m * scale, -32_767.0, 32_767.0)) as i16;
                 volume.blocks.voxels[slot].weight[voxel] = weight;
                 (0..3).for_each(|c| volume.blocks.colour[slot][c][voxel] = colour[c]);

@@ -1,4 +1,4 @@
-//! A pool too small for the drive, and a store beside it.
+//! A pool too small for the run, and a store for what it evicts.
 
 use super::*;
 use crate::random::Random;
@@ -14,21 +14,21 @@ struct Content {
 
 /// A store that keeps everything, or refuses everything.
 #[derive(Default)]
-struct Shelf {
+struct MemoryStore {
     blocks: BTreeMap<BlockCoord, Content>,
-    is_shut: bool,
+    is_closed: bool,
 }
 
-impl BlockStore for Shelf {
-    fn keep(&mut self, block: LeavingBlock<'_>) -> bool {
-        if !self.is_shut {
+impl BlockStore for MemoryStore {
+    fn store(&mut self, block: EvictedBlock<'_>) -> bool {
+        if !self.is_closed {
             let colour = block.colour.map_or(vec![], |planes| planes.as_flattened().to_vec());
             self.blocks.insert(block.coord, Content { sdf: block.sdf.to_vec(), weight: block.weight.to_vec(), colour });
         }
-        !self.is_shut
+        !self.is_closed
     }
 
-    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
+    fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         let Some(kept) = self.blocks.remove(&block.coord) else { return false };
         block.sdf.copy_from_slice(&kept.sdf);
         block.weight.copy_from_slice(&kept.weight);
@@ -39,8 +39,8 @@ impl BlockStore for Shelf {
     }
 }
 
-/// Drives a corridor with a bumpy end wall to the given places, then lets everything out. The map, and the reports of all frames summed.
-fn drive(blocks: usize, config: &VolumeConfig, places_m: &[f64], shelf: &mut Shelf) -> EvictionReport {
+/// Maps a corridor with a bumpy end wall from the given positions, then evicts every block. Returns the sum of the reports of all frames.
+fn run(blocks: usize, config: &VolumeConfig, positions_m: &[f64], store: &mut MemoryStore) -> EvictionReport {
     let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i % 251) as u8).collect();
     let mut sum = EvictionReport::default();
     with_volume(&Capacity { blocks, ..CAPACITY }, config, |volume| {
@@ -52,11 +52,11 @@ fn drive(blocks: usize, config: &VolumeConfig, places_m: &[f64], shelf: &mut She
                 returned: sum.returned + report.returned,
             };
         };
-        for (i, &z) in places_m.iter().enumerate() {
+        for (i, &z) in positions_m.iter().enumerate() {
             let depth_m: Vec<f32> = bumpy_depth().iter().map(|depth| depth * 0.5 + 0.01 * (i % 3) as f32).collect();
             let view = view([0.0; 3], [0.0, 0.0, z]);
             let seen = observation(&depth_m, &grey);
-            let report = volume.allocate(&view, seen.depth_m, shelf, &Serial);
+            let report = volume.allocate(&view, seen.depth_m, store, &Serial);
             assert_eq!(report.refused, 0);
             add(&mut sum, report.eviction);
             volume.fuse(&view, seen, &Serial);
@@ -64,7 +64,7 @@ fn drive(blocks: usize, config: &VolumeConfig, places_m: &[f64], shelf: &mut She
             assert_eq!(volume.pool.len(), volume.index.len());
         }
         volume.finish();
-        add(&mut sum, volume.stream_out(shelf));
+        add(&mut sum, volume.stream_out(store));
         assert_eq!((volume.pool.len(), volume.digest()), (0, 0), "nothing left, nothing miscounted");
     });
     sum
@@ -81,12 +81,12 @@ fn config(prune_weight: u8) -> VolumeConfig {
 }
 
 #[test]
-fn a_drive_that_needs_five_pools_leaves_the_same_map_as_an_unbounded_one() {
+fn a_run_that_needs_five_pools_leaves_the_same_map_as_an_unbounded_one() {
     let ahead: Vec<f64> = (0..120).map(|i| f64::from(i) * 0.4).collect();
-    let (mut unbounded, mut streamed) = (Shelf::default(), Shelf::default());
-    drive(6_000, &config(0), &ahead, &mut unbounded);
+    let (mut unbounded, mut streamed) = (MemoryStore::default(), MemoryStore::default());
+    run(6_000, &config(0), &ahead, &mut unbounded);
     let pool = unbounded.blocks.len() / 5;
-    let report = drive(pool, &config(0), &ahead, &mut streamed);
+    let report = run(pool, &config(0), &ahead, &mut streamed);
     assert!(unbounded.blocks.len() >= 5 * pool && report.kept as usize >= unbounded.blocks.len());
     assert_eq!((report.lost, report.returned), (0, 0));
     assert!(unbounded.blocks == streamed.blocks, "bit for bit");
@@ -95,9 +95,9 @@ fn a_drive_that_needs_five_pools_leaves_the_same_map_as_an_unbounded_one() {
 #[test]
 fn there_and_back_again_is_the_same_map_too() {
     let way: Vec<f64> = (0..80).chain((0..80).rev()).map(|i| f64::from(i) * 0.4).collect();
-    let (mut unbounded, mut streamed) = (Shelf::default(), Shelf::default());
-    drive(6_000, &config(0), &way, &mut unbounded);
-    let report = drive(unbounded.blocks.len() * 2 / 5, &config(0), &way, &mut streamed);
+    let (mut unbounded, mut streamed) = (MemoryStore::default(), MemoryStore::default());
+    run(6_000, &config(0), &way, &mut unbounded);
+    let report = run(unbounded.blocks.len() * 2 / 5, &config(0), &way, &mut streamed);
     assert!(report.returned > 0 && report.lost == 0);
     assert!(unbounded.blocks == streamed.blocks, "bit for bit");
 }
@@ -105,23 +105,23 @@ fn there_and_back_again_is_the_same_map_too() {
 #[test]
 fn pruning_catches_what_leaves_within_the_window() {
     let ahead: Vec<f64> = (0..120).map(|i| f64::from(i) * 0.4).collect();
-    let (mut unbounded, mut streamed) = (Shelf::default(), Shelf::default());
-    drive(6_000, &config(2), &ahead, &mut unbounded);
-    drive(unbounded.blocks.len() / 5, &config(2), &ahead, &mut streamed);
+    let (mut unbounded, mut streamed) = (MemoryStore::default(), MemoryStore::default());
+    run(6_000, &config(2), &ahead, &mut unbounded);
+    run(unbounded.blocks.len() / 5, &config(2), &ahead, &mut streamed);
     assert!(unbounded.blocks == streamed.blocks, "bit for bit");
     assert!(unbounded.blocks.values().all(|kept| kept.weight.iter().all(|&weight| weight == 0 || weight > 2)));
 }
 
 #[test]
-fn what_a_shut_store_cannot_keep_is_counted_as_lost() {
+fn what_a_closed_store_refuses_is_counted_as_lost() {
     let ahead: Vec<f64> = (0..60).map(|i| f64::from(i) * 0.4).collect();
-    let mut shut = Shelf { is_shut: true, ..Shelf::default() };
-    let report = drive(900, &config(0), &ahead, &mut shut);
+    let mut closed = MemoryStore { is_closed: true, ..MemoryStore::default() };
+    let report = run(900, &config(0), &ahead, &mut closed);
     assert!(report.lost > 900 && report.kept == 0);
 }
 
 #[test]
-fn a_map_told_to_refuse_stays_where_it_is() {
+fn a_map_set_to_refuse_evicts_nothing() {
     let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
     let config = VolumeConfig { when_full: WhenFull::Refuse, ..config(0) };
     with_volume(&Capacity { blocks: 300, ..CAPACITY }, &config, |volume| {
@@ -143,8 +143,8 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
     let capacity = Capacity { blocks: BLOCKS, visible_blocks: BLOCKS, colour: false, ..CAPACITY };
     let config = VolumeConfig { prune_weight: 1, prune_lag: 3, ..VolumeConfig::default() };
     with_volume(&capacity, &config, |volume| {
-        let (mut shelf, mut random) = (Shelf::default(), Random::new(9));
-        // Per block its weight everywhere and the frame it was last seen in; on the shelf or in the map.
+        let (mut store, mut random) = (MemoryStore::default(), Random::new(9));
+        // Per block its weight everywhere and the frame it was last seen in; in the store or in the map.
         let mut model: BTreeMap<BlockCoord, u8> = BTreeMap::new();
         let mut operations = 0;
         while operations < 1_000_000 {
@@ -154,17 +154,17 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
                 operations += 1;
                 let coord = BlockCoord::new(random.below(8) as i32, random.below(8) as i32, 3).unwrap();
                 let (refused, empty) = (report.refused, report.eviction.empty);
-                volume.request(coord.origin().map(|c| c >> 3), [0; 3], &mut shelf, &mut report);
+                volume.request(coord.origin().map(|c| c >> 3), [0; 3], &mut store, &mut report);
                 if report.eviction.empty > empty {
                     // A block of weight 1 left within the window and was pruned on its way.
-                    model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || shelf.blocks.contains_key(coord));
+                    model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || store.blocks.contains_key(coord));
                 }
                 let Some(slot) = volume.find(coord) else {
                     assert!(report.refused > refused);
                     continue;
                 };
                 let old = model.get(&coord).copied().unwrap_or(0);
-                assert_eq!(volume.blocks.voxels[slot.index()].weight[7], old, "a block is as it was left, in the map or brought back");
+                assert_eq!(volume.blocks.voxels[slot.index()].weight[7], old, "a block is as it was left, in the map or loaded");
                 if random.below(4) > 0 {
                     volume.blocks.voxels[slot.index()].weight.fill(old.saturating_add(1));
                     volume.update_digest(slot);
@@ -173,10 +173,10 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
             }
             volume.visible.sort(volume.pool.high_water());
             volume.prune();
-            model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || shelf.blocks.contains_key(coord));
+            model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || store.blocks.contains_key(coord));
             assert_eq!(volume.pool.len(), volume.index.len());
         }
-        let stored = shelf.blocks.iter().map(|(&coord, kept)| (coord, kept.weight[7]));
+        let stored = store.blocks.iter().map(|(&coord, kept)| (coord, kept.weight[7]));
         let live = volume.pool.live().map(|slot| (volume.blocks.coord(slot).unwrap(), volume.blocks.voxels[slot.index()].weight[7]));
         let all: BTreeMap<_, _> = stored.chain(live).filter(|(_, weight)| *weight > 0).collect();
         assert_eq!(all, model);

@@ -187,12 +187,12 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
 
 #[test]
 fn blocks_that_swap_their_contents_or_their_planes_change_the_sum_of_digests() {
-    let places = [BlockCoord { x: 1, y: -2, z: 300 }, BlockCoord { x: -2, y: 1, z: 300 }];
+    let coords = [BlockCoord { x: 1, y: -2, z: 300 }, BlockCoord { x: -2, y: 1, z: 300 }];
     let contents = [(5, 3), (-5, 4)].map(|(sdf, weight)| Voxels { sdf: [sdf; BLOCK_VOXELS], weight: [weight; BLOCK_VOXELS] });
     let planes = [[0; BLOCK_VOXELS], [1; BLOCK_VOXELS], [2; BLOCK_VOXELS]];
     let sum = |order: [usize; 2], planes: &[[u8; BLOCK_VOXELS]; 3]| {
-        let blocks = places.iter().zip(order.map(|at| &contents[at]));
-        blocks.map(|(&place, voxels)| fuse::block_digest(place, voxels, Some(planes))).fold(0u64, u64::wrapping_add)
+        let blocks = coords.iter().zip(order.map(|at| &contents[at]));
+        blocks.map(|(&coord, voxels)| fuse::block_digest(coord, voxels, Some(planes))).fold(0u64, u64::wrapping_add)
     };
     let swapped = [planes[1], planes[0], planes[2]];
     let sums = [sum([0, 1], &planes), sum([1, 0], &planes), sum([0, 0], &planes), sum([1, 1], &planes), sum([0, 1], &swapped)];
@@ -276,7 +276,7 @@ fn a_class_of_weight_zero_stays_out_of_the_map_and_another_counts_thrice() {
 }
 
 #[test]
-fn free_space_is_carved_where_noise_once_put_a_surface() {
+fn a_surface_made_by_noise_becomes_free_space() {
     let grey = vec![50; WIDTH * HEIGHT];
     let config = VolumeConfig { truncation_m: 0.3, ..VolumeConfig::default() };
     with_volume(&CAPACITY, &config, |volume| {

@@ -35,14 +35,14 @@ fn coords(from: i32, count: i32) -> Vec<BlockCoord> {
 }
 
 #[test]
-fn frees_faint_blocks_lag_frames_after_they_were_seen_and_leaves_the_others_alone() {
+fn frees_low_weight_blocks_lag_frames_after_they_were_seen_and_no_others() {
     with_volume(&CAPACITY, &pruning(2, 10), |volume| {
         volume.visible.begin_frame();
         let low_weight: Vec<Slot> = coords(0, 60).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
-        let firm: Vec<Slot> = coords(100, 40).into_iter().map(|coord| plant(volume, coord, |_| 5)).collect();
+        let high_weight: Vec<Slot> = coords(100, 40).into_iter().map(|coord| plant(volume, coord, |_| 5)).collect();
         let before: Vec<_> =
-            firm.iter().map(|&slot| (volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight)).collect();
-        low_weight.iter().chain(&firm).for_each(|&slot| volume.visible.mark(slot).unwrap());
+            high_weight.iter().map(|&slot| (volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight)).collect();
+        low_weight.iter().chain(&high_weight).for_each(|&slot| volume.visible.mark(slot).unwrap());
         volume.visible.sort(volume.pool.high_water());
         assert_eq!(volume.prune(), PruneReport::default());
         for _ in 1..10 {
@@ -61,7 +61,7 @@ fn frees_faint_blocks_lag_frames_after_they_were_seen_and_leaves_the_others_alon
             }
         );
         assert_eq!((volume.pool.len(), volume.index.len()), (40, 40));
-        for (&slot, before) in firm.iter().zip(&before) {
+        for (&slot, before) in high_weight.iter().zip(&before) {
             assert_eq!((volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight), *before);
         }
         let digest = volume.digest();
@@ -109,7 +109,7 @@ fn a_block_far_from_any_surface_goes_only_when_asked() {
 }
 
 #[test]
-fn blocks_left_unread_are_those_with_nothing_faint() {
+fn blocks_left_unread_have_no_voxel_of_low_weight() {
     let depth_m = bumpy_depth();
     let nearer: Vec<f32> = depth_m.iter().map(|depth| 0.95 * depth).collect();
     let grey = vec![7; WIDTH * HEIGHT];
@@ -213,10 +213,10 @@ fn yields_exactly_the_blocks_visible_lag_frames_ago_through_frees_and_reuse() {
                 }
             }
             let mut seen = BTreeSet::new();
-            for (&coord, &(slot, born)) in &model.alive {
+            for (&coord, &(slot, frame_made)) in &model.alive {
                 if random.below(3) > 0 {
                     volume.visible.mark(slot).unwrap();
-                    seen.insert((coord, born));
+                    seen.insert((coord, frame_made));
                 }
             }
             volume.visible.sort(volume.pool.high_water());
@@ -227,13 +227,13 @@ fn yields_exactly_the_blocks_visible_lag_frames_ago_through_frees_and_reuse() {
                 .and_then(|then| model.seen.get(&then))
                 .into_iter()
                 .flatten()
-                .filter(|(coord, born)| model.alive.get(coord).is_some_and(|(_, alive)| alive == born))
+                .filter(|(coord, frame_made)| model.alive.get(coord).is_some_and(|(_, alive)| alive == frame_made))
                 .map(|(coord, _)| *coord)
                 .collect();
             if volume.history.len() == volume.history.capacity() {
                 volume.history.expire();
             }
-            volume.history.enter(now, volume.visible.slots());
+            volume.history.push(now, volume.visible.slots());
             let mut due = BTreeSet::new();
             while let Some(slot) = volume.history.take_due(0) {
                 due.insert(volume.blocks.coord(slot).unwrap());
@@ -267,7 +267,7 @@ fn a_million_blocks_made_and_freed_leak_nothing() {
 }
 
 #[test]
-fn six_blocks_of_one_bucket_can_be_struck_in_any_order() {
+fn six_blocks_of_one_bucket_can_be_removed_in_any_order() {
     let capacity = Capacity { blocks: 64, visible_blocks: 64, colour: false, ..CAPACITY };
     with_volume(&capacity, &pruning(1, 1), |volume| {
         let all = (0..64).flat_map(|x| (0..64).map(move |z| BlockCoord::new(x, 0, z).unwrap()));
@@ -286,10 +286,10 @@ fn six_blocks_of_one_bucket_can_be_struck_in_any_order() {
         assert_eq!(orders.len(), 720);
         for order in orders {
             let slots: Vec<Slot> = mates.iter().map(|&coord| volume.make(coord).unwrap()).collect();
-            for (struck, &which) in order.iter().enumerate() {
+            for (removed, &which) in order.iter().enumerate() {
                 volume.free_block(slots[which]);
                 for (i, (&coord, &slot)) in mates.iter().zip(&slots).enumerate() {
-                    assert_eq!(volume.find(coord), (!order[..=struck].contains(&i)).then_some(slot));
+                    assert_eq!(volume.find(coord), (!order[..=removed].contains(&i)).then_some(slot));
                 }
             }
             assert!(volume.pool.is_empty() && volume.index.is_empty());

@@ -8,7 +8,7 @@
 
 use super::block_index::{BlockIndexOnDisk, Tile, tile_of};
 use super::record::{self, HEADER, Header, LONGEST};
-use dynvox_core::volume::{BlockCoord, BlockStore, LeavingBlock, ReturningBlock};
+use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, LoadedBlock};
 use hashbrown::HashMap;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -359,7 +359,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
 }
 
 impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
-    fn keep(&mut self, block: LeavingBlock<'_>) -> bool {
+    fn store(&mut self, block: EvictedBlock<'_>) -> bool {
         if self.failure.is_some() {
             return false;
         }
@@ -380,7 +380,7 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
         }
     }
 
-    fn bring_back(&mut self, block: ReturningBlock<'_>) -> bool {
+    fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         // The record stays: should the run end before the block is evicted again, it is still stored.
         let Some(at) = self.place(block.coord) else { return false };
         let came = self.fetch(block.coord, at).unwrap_or(false) && record::read(&self.record, block, &mut self.scratch);

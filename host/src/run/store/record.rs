@@ -3,7 +3,7 @@
 //! Header, 24 bytes, little endian: x, y, z (`i16`), flags (`u16`, bit 0: colour), where the last record of the same tile begins (`u64`, 0
 //! none), length of the payload (`u32`), CRC-32 of the first 20 bytes and the payload. Payload: LZ4 of 512 distances (`i16`), 512 weights, and with colour three planes of 512 bytes.
 
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, LeavingBlock, ReturningBlock};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, EvictedBlock, LoadedBlock};
 
 /// Bytes of a record's header.
 pub(super) const HEADER: usize = 24;
@@ -54,7 +54,7 @@ fn checksum(header: &[u8; HEADER], payload: &[u8]) -> u32 {
 }
 
 /// Writes a block into `record`, header and all, as the one after `previous` in its tile. `scratch` is working space.
-pub(super) fn write(block: &LeavingBlock<'_>, previous: u64, scratch: &mut Vec<u8>, record: &mut Vec<u8>) {
+pub(super) fn write(block: &EvictedBlock<'_>, previous: u64, scratch: &mut Vec<u8>, record: &mut Vec<u8>) {
     scratch.clear();
     scratch.extend(block.sdf.iter().flat_map(|sdf| sdf.to_le_bytes()));
     scratch.extend_from_slice(block.weight);
@@ -76,7 +76,7 @@ pub(super) fn write(block: &LeavingBlock<'_>, previous: u64, scratch: &mut Vec<u
 }
 
 /// Fills a block from a payload; `false`, and the block as it was, when the payload is not that of such a block.
-pub(super) fn read(payload: &[u8], block: ReturningBlock<'_>, scratch: &mut Vec<u8>) -> bool {
+pub(super) fn read(payload: &[u8], block: LoadedBlock<'_>, scratch: &mut Vec<u8>) -> bool {
     let wanted = if block.colour.is_some() { COLOURED } else { PLAIN };
     scratch.clear();
     scratch.resize(wanted, 0);

@@ -1,7 +1,7 @@
 //! The store through wear and tear.
 
 use super::{record::HEADER, *};
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, LeavingBlock, ReturningBlock};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock};
 use std::{
     fs,
     io::{self, Cursor, Read, Seek, SeekFrom, Write},
@@ -29,7 +29,7 @@ fn coord(i: u32) -> BlockCoord {
 
 fn keep(store: &mut impl BlockStore, place: u32, seed: u32) -> bool {
     let content = content(seed);
-    store.keep(LeavingBlock {
+    store.store(EvictedBlock {
         coord: coord(place),
         sdf: &content.sdf,
         weight: &content.weight,
@@ -44,7 +44,7 @@ fn is_back(store: &mut impl BlockStore, place: u32, seed: u32) -> bool {
         weight: [0; BLOCK_VOXELS],
         colour: [[0; BLOCK_VOXELS]; 3],
     };
-    let came = store.bring_back(ReturningBlock {
+    let came = store.load(LoadedBlock {
         coord: coord(place),
         sdf: &mut back.sdf,
         weight: &mut back.weight,

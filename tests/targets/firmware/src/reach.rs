@@ -9,7 +9,7 @@ use dynvox_core::{
     image::View,
     objects::{ObjectSink, RetiredObject},
     view::Raycaster,
-    volume::{BlockStore, LeavingBlock, ObservationWeight, ReturningBlock},
+    volume::{BlockStore, EvictedBlock, ObservationWeight, LoadedBlock},
 };
 
 /// Frames taken.
@@ -26,14 +26,14 @@ static DISPARITY_Q8: [u16; PIXELS] = [20 << 8; PIXELS];
 struct Leaving(Digest);
 
 impl BlockStore for Leaving {
-    fn keep(&mut self, block: LeavingBlock<'_>) -> bool {
+    fn store(&mut self, block: EvictedBlock<'_>) -> bool {
         self.0.i16s(block.sdf);
         self.0.bytes(block.weight);
         block.colour.into_iter().flatten().for_each(|plane| self.0.bytes(plane));
         true
     }
 
-    fn bring_back(&mut self, _: ReturningBlock<'_>) -> bool {
+    fn load(&mut self, _: LoadedBlock<'_>) -> bool {
         false
     }
 }

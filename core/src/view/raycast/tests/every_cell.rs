@@ -1,0 +1,88 @@
+//! The raycaster agrees with a plain walk through every cell.
+
+use super::{scenes::rough, *};
+
+/// One pixel, the obvious way: every cell from the nearest depth to the farthest, corners looked up in the index one by one.
+fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize, v: usize) -> Option<f32> {
+    let eye = RayCamera::new(view, VOXEL_M).unwrap();
+    let ray = eye.ray(u, v);
+    let mut sampler = volume.sampler();
+    let far = depth_from_m(config.far_m);
+    let mut from = depth_from_m(config.near_m);
+    let mut cell = ray.cell_at(from);
+    let mut entered = None;
+    let mut last_cell = (0.0, 0);
+    while from <= far {
+        let next = AXES.map(|axis| ray.crossing(axis, cell[axis] + ray.ahead[axis]));
+        let to = *next.iter().min().unwrap();
+        let axis = next.iter().position(|&depth| depth == to).unwrap();
+        let mut corners = Corners::default();
+        for corner in 0..8 {
+            let point = AXES.map(|axis| cell[axis] + 8 * eye.base[axis] + (corner >> axis & 1) as i32);
+            if let Some(sample) = sampler.voxel(point).filter(|sample| sample.weight >= config.min_weight) {
+                corners.sdf[corner] = f32::from(sample.sdf);
+                corners.observed |= 1 << corner;
+            }
+        }
+        let is_seen = |corner: usize| corners.observed >> corner & 1 == 1;
+        let any = |test: fn(f32) -> bool| (0..8).any(|corner| is_seen(corner) && test(corners.sdf[corner]));
+        // A cell belongs to the block of its first corner and is skipped where that is not in the map.
+        let own = BlockCoord::of_lattice(AXES.map(|axis| cell[axis] + 8 * eye.base[axis])).and_then(|coord| volume.find(coord));
+        if own.is_some() && to > from && any(|sdf| sdf > 0.0) && any(|sdf| sdf <= 0.0) {
+            let block = ray.offset(cell.map(|c| c >> 3));
+            let offset = AXES.map(|axis| block[axis] - (cell[axis] & 7) as f32);
+            let passage = RaySegment::new(&ray, offset, [from, to].map(depth_in_m), [entered.unwrap_or(NO_AXIS), axis]);
+            let guessed = corners.complete();
+            let value = |wall: Option<(usize, usize)>, depth| {
+                if let Some((axis, upper)) = wall {
+                    let [u, v] = [[1, 2], [0, 2], [0, 1]][axis];
+                    let four = [0, 1 << u, 1 << v, 1 << u | 1 << v].map(|corner| corner | upper << axis);
+                    if let Some([a, b, c, d]) = march::completed(four.map(|corner| is_seen(corner).then(|| corners.sdf[corner]))) {
+                        let [u, v] = [u, v].map(|axis| within(offset[axis], ray.slope[axis], depth_in_m(depth)));
+                        let (low, high) = (a + (b - a) * u, c + (d - c) * u);
+                        return low + (high - low) * v;
+                    }
+                }
+                guessed.map_or(0.0, |corners| mean(&corners, passage.end(depth == to)))
+            };
+            let first =
+                if last_cell.1 == from { last_cell.0 } else { value(entered.map(|axis| (axis, 1 - ray.ahead[axis] as usize)), from) };
+            let last = value(Some((axis, ray.ahead[axis] as usize)), to);
+            if let (true, true, Some(corners)) = (first > 0.0, last <= 0.0, guessed) {
+                let share = passage.root(&Field::new(&corners), first, last);
+                let [from_m, to_m] = [from, to].map(depth_in_m);
+                return Some(from_m + (to_m - from_m) * share).filter(|&depth_m| depth_m <= config.far_m);
+            }
+            last_cell = (last, to);
+        }
+        cell[axis] += 2 * ray.ahead[axis] - 1;
+        (from, entered) = (to, Some(axis));
+    }
+    None
+}
+
+#[test]
+fn agrees_to_the_bit_with_a_walk_through_every_cell() {
+    let mut hits = 0;
+    for (seed, view) in (0..).zip([
+        at([0.0; 3], [0.0; 3]),
+        at([0.1, -0.4, 0.2], [0.9, -0.3, 0.2]),
+        at([-0.3, 0.8, 0.1], [-1.9, 0.4, 1.1]),
+        at([0.0, core::f64::consts::PI, 0.0], [0.2, 0.0, 5.0]),
+        at([0.0; 3], [0.0, 0.0, 2.2]),
+    ]) {
+        let config = RaycastConfig { near_m: 0.35, far_m: 3.9, min_weight: 1 + (seed % 2) as u8 };
+        let volume = rough(seed);
+        let mut caster = raycaster(6_000, &config);
+        caster.cast(&volume, &view, &Serial).unwrap();
+        let depth = caster.depth_m().unwrap();
+        for v in (0..96).step_by(3) {
+            for u in 0..160 {
+                let (seen, plain) = (depth.get(u, v).unwrap(), plain(&volume, &view, &config, u, v).unwrap_or(0.0));
+                assert_eq!(seen, plain, "scene {seed}, pixel {u} {v}");
+                hits += u32::from(seen > 0.0);
+            }
+        }
+    }
+    assert!(hits > 10_000, "{hits}");
+}
