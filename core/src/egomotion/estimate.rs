@@ -36,7 +36,7 @@ pub enum MotionStatus {
     BadRig,
 }
 
-/// A motion, or why there is none.
+/// A motion, or why it could not be estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionEstimate {
@@ -70,7 +70,7 @@ impl MotionEstimate {
     }
 }
 
-/// Room to estimate motions in, one after the other: the camera's, then each object's.
+/// Scratch memory for estimating motions one after the other: the camera's, then each object's.
 #[derive(Debug)]
 pub struct Estimator<'s> {
     points: Points<'s>,
@@ -84,7 +84,7 @@ impl<'s> Estimator<'s> {
         Points::bytes(capacity.matches) + region_bytes::<u32>(capacity.matches)
     }
 
-    /// Cuts its regions.
+    /// Allocates its regions.
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
             points: Points::new_in(capacity.matches, carver),
@@ -101,7 +101,7 @@ impl<'s> Estimator<'s> {
     /// Estimates the motion that carries the matches' points from the previous camera to the current one.
     ///
     /// `initial` is where hypotheses begin, standing still where it is absent; it is also the first hypothesis. `random` belongs to this
-    /// purpose alone. Matches beyond `capacity.matches` are not looked at.
+    /// purpose alone. Matches beyond `capacity.matches` are ignored.
     pub fn estimate<'m>(
         &mut self,
         config: &EgomotionConfig,
@@ -121,7 +121,7 @@ impl<'s> Estimator<'s> {
             return MotionEstimate::failed(MotionStatus::TooFewMatches, matches, 0, 0);
         }
         let start = initial.copied().unwrap_or(Transform::IDENTITY);
-        let (best, samples) = self.draw(config, rig, random, &start);
+        let (best, samples) = self.ransac(config, rig, random, &start);
         let mut estimate = MotionEstimate::failed(MotionStatus::TooFewInliers, matches, 0, samples);
         let mut motion = best;
         for round in 0..ROUNDS {
@@ -140,15 +140,15 @@ impl<'s> Estimator<'s> {
         }
         let matrix = RotationMatrix::new(&motion);
         let mut sums = NormalEquations::ZERO;
-        for point in self.chosen() {
+        for point in self.inlier_points() {
             sums.add(&point, &matrix, rig, |_| 1.0);
         }
         estimate.residual_rms_px = libm::sqrt(sums.error / (4.0 * sums.weight));
         MotionEstimate { status: MotionStatus::Estimated, t_current_previous: Some(motion), ..estimate }
     }
 
-    /// How many of the matches that can be triangulated a motion explains within `within_px`, and how many those are.
-    pub fn explained<'m>(
+    /// Counts the matches that `motion` explains within `within_px`, and the matches that can be triangulated.
+    pub fn count_inliers<'m>(
         &mut self,
         rig: &StereoRig,
         matches: impl IntoIterator<Item = &'m Match>,
@@ -160,19 +160,19 @@ impl<'s> Estimator<'s> {
         [self.points.score(motion, rig, within_px, 0), self.points.len() as u32]
     }
 
-    /// The hypothesis that explains most points, the first of equals, and how many were drawn.
-    fn draw(&self, config: &EgomotionConfig, rig: &StereoRig, random: &mut Random, start: &Transform) -> (Transform, u32) {
+    /// RANSAC: the hypothesis with most inliers, the first of equals, and how many were drawn.
+    fn ransac(&self, config: &EgomotionConfig, rig: &StereoRig, random: &mut Random, start: &Transform) -> (Transform, u32) {
         let mut best = *start;
         let mut most = self.points.score(start, rig, config.inlier_px, 0);
-        let mut wanted = enough(config, most, self.points.len());
+        let mut required = required_iterations(config, most, self.points.len());
         let mut drawn = 0;
-        while drawn < wanted {
+        while drawn < required {
             drawn += 1;
             let Some(motion) = self.hypothesis(config, rig, random, start) else { continue };
             let count = self.points.score(&motion, rig, config.inlier_px, most);
             if count > most {
                 (best, most) = (motion, count);
-                wanted = enough(config, most, self.points.len());
+                required = required_iterations(config, most, self.points.len());
             }
         }
         (best, drawn)
@@ -206,7 +206,7 @@ impl<'s> Estimator<'s> {
         None
     }
 
-    fn chosen(&self) -> impl Iterator<Item = Point> {
+    fn inlier_points(&self) -> impl Iterator<Item = Point> {
         self.inliers.iter().take(self.inlier_len).filter_map(|&index| self.points.get(index as usize))
     }
 
@@ -216,7 +216,7 @@ impl<'s> Estimator<'s> {
         for taken in 1..=u32::from(config.refine_steps) {
             let matrix = RotationMatrix::new(&motion);
             let mut sums = NormalEquations::ZERO;
-            for point in self.chosen() {
+            for point in self.inlier_points() {
                 sums.add(&point, &matrix, rig, |_| side_weight(config, rig, &point));
             }
             let Some(step) = sums.solve() else { return (motion, taken, false) };
@@ -230,7 +230,7 @@ impl<'s> Estimator<'s> {
 }
 
 /// Hypotheses to draw so that one is free of outliers with the configured probability, given the most inliers so far.
-fn enough(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
+fn required_iterations(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
     let share = f64::from(inliers) / points as f64;
     let clean = share * share * share;
     if clean >= 1.0 {
@@ -239,8 +239,8 @@ fn enough(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
     if clean < 1e-9 {
         return u32::from(config.samples);
     }
-    let wanted = libm::ceil(libm::log(1.0 - config.confidence) / libm::log(1.0 - clean));
-    if wanted < f64::from(config.samples) { wanted as u32 } else { u32::from(config.samples) }
+    let required = libm::ceil(libm::log(1.0 - config.confidence) / libm::log(1.0 - clean));
+    if required < f64::from(config.samples) { required as u32 } else { u32::from(config.samples) }
 }
 
 /// Weight by distance from the middle column ([`EgomotionConfig::side_knee`]).

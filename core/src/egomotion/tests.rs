@@ -28,7 +28,7 @@ fn between(a: &Transform, b: &Transform) -> (f64, f64) {
     (difference.distance_m(), difference.angle_rad().to_degrees())
 }
 
-/// Moves a camera through the room and returns the estimate of every frame after the first beside the truth.
+/// Moves a camera through the scene and returns estimate and truth of every frame after the first.
 fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
     let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
@@ -54,7 +54,7 @@ fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
 }
 
 #[test]
-fn finds_its_way_through_a_textured_room() {
+fn estimates_the_trajectory_through_a_textured_scene() {
     let motion =
         |metres: f64, turn: f64, tilt: f64| Transform::new(Vector3::new(tilt, turn, 0.3 * turn), Vector3::new(0.1 * metres, -0.02, metres));
     let motions = [
@@ -90,7 +90,7 @@ fn project(point: &Point3<f64>) -> [[f32; 2]; 2] {
     })
 }
 
-/// Exact matches of random points, of which the first `outliers` are sent elsewhere.
+/// Exact matches of random points; the first `outliers` of them get random pixels.
 fn matches(count: usize, outliers: usize, motion: &Transform, random: &mut Random) -> Vec<Match> {
     let uniform = |random: &mut Random, low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0;
     (0..count)
@@ -100,8 +100,8 @@ fn matches(count: usize, outliers: usize, motion: &Transform, random: &mut Rando
             let ([previous_left, previous_right], [mut current_left, mut current_right]) =
                 (project(&point), project(&motion.transform_point(point)));
             if i < outliers {
-                for place in [&mut current_left, &mut current_right] {
-                    *place = [uniform(random, 0.0, 400.0) as f32, uniform(random, 0.0, 160.0) as f32];
+                for pixel in [&mut current_left, &mut current_right] {
+                    *pixel = [uniform(random, 0.0, 400.0) as f32, uniform(random, 0.0, 160.0) as f32];
                 }
             }
             Match { previous_left, previous_right, current_left, current_right }
@@ -121,7 +121,7 @@ fn estimate(matches: &[Match], rig: &StereoRig, seed: u64) -> (MotionEstimate, V
 }
 
 #[test]
-fn two_outliers_in_five_are_told_apart() {
+fn two_outliers_in_five_are_found() {
     let matches = matches(500, 200, &motion(), &mut Random::new(3));
     let (estimate, inliers) = estimate(&matches, &RIG, 1);
     let (distance, angle) = between(&estimate.t_current_previous.unwrap(), &motion());
@@ -178,14 +178,14 @@ fn what_is_not_finite_or_behind_is_left_out() {
 }
 
 #[test]
-fn more_matches_than_room_are_not_looked_at() {
+fn matches_beyond_the_capacity_are_ignored() {
     let matches = matches(CAPACITY.matches + 50, 0, &motion(), &mut Random::new(2));
     let (estimate, _) = estimate(&matches, &RIG, 1);
     assert_eq!(estimate.matches as usize, CAPACITY.matches);
 }
 
 #[test]
-fn a_dark_right_camera_holds_the_last_motion() {
+fn a_dark_right_camera_repeats_the_last_motion() {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
     let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
     let mut estimator = estimator(&mut slab);
@@ -207,11 +207,11 @@ fn a_dark_right_camera_holds_the_last_motion() {
         }
         t_world_camera = t_world_camera * step;
     }
-    assert!((camera.t_world_camera().translation().z - 1.2).abs() < 0.05, "three steps, two of them held");
+    assert!((camera.t_world_camera().translation().z - 1.2).abs() < 0.05, "three steps, two of them extrapolated");
 }
 
 #[test]
-fn cuts_exactly_the_bytes_it_names() {
+fn allocates_exactly_the_bytes_it_names() {
     let mut slab = Box::new(Slab([0; BYTES]));
     let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
     Estimator::new_in(&CAPACITY, &mut carver);

@@ -55,8 +55,8 @@ impl Egomotion {
         self.t_world_camera = (self.t_world_camera * self.t_current_previous.inverse()).normalized();
     }
 
-    /// Puts the camera where it is said to be; its motion is the way from where it was.
-    pub fn place(&mut self, t_world_camera: &Transform) {
+    /// Sets the camera's pose to a given one; its motion is the difference from the pose before.
+    pub fn set_pose(&mut self, t_world_camera: &Transform) {
         self.t_current_previous = (t_world_camera.inverse() * self.t_world_camera).normalized();
         self.t_world_camera = t_world_camera.normalized();
         self.held = 0;
@@ -67,7 +67,7 @@ impl Egomotion {
         &mut self.t_world_camera
     }
 
-    /// Digest of the pose, of the motion that will be gone by, of the draws to come, and of this frame's estimate, where there is one.
+    /// Digest of the pose, of the motion to be extrapolated, of the random numbers to come, and of this frame's estimate.
     pub fn digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
         let mut hasher = Hasher::default();
         self.visit(&mut hasher);

@@ -62,7 +62,7 @@ impl Localization<'_, '_> {
         executor: &E,
     ) -> Located {
         let (origin, egomotion, icp, matches_excluded) = if let Some(t_world_camera) = &frame.t_world_camera {
-            self.camera.place(t_world_camera);
+            self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
             (if self.frame == 0 { PoseOrigin::First } else { PoseOrigin::Given }, None, None, 0)
         } else if self.config.mapper.egomotion == MotionSource::Icp {
@@ -119,8 +119,8 @@ impl Localization<'_, '_> {
         });
         let refined = self.scene_flow.refined();
         let matches = self.scene_flow.selection().iter().filter_map(|&index| refined.get(index as usize));
-        report.matches = self.estimator.explained(&rig, matches, &report.t_current_previous, self.config.icp.explained_px);
-        report.ask_matches(&self.config.icp);
+        report.matches = self.estimator.count_inliers(&rig, matches, &report.t_current_previous, self.config.icp.explained_px);
+        report.check_matches(&self.config.icp);
         self.camera.advance(report.motion());
         report
     }

@@ -4,7 +4,7 @@
 //! Projective data association and point-to-plane distance (Newcombe et al., *KinectFusion*, ISMAR 2011, Section 3.5), coarse to fine, as
 //! in InfiniTAM (Kähler et al., *Very High Frame Rate Volumetric Integration of Depth Images on Mobile Devices*, TVCG 2015; Prisacariu et
 //! al., *InfiniTAM v3*, 2017): a measured point is carried by the motion so far into the picture of the map, paired with the surface at the
-//! pixel it falls on, and the motion is moved to bring points onto their partners' planes. Every frame begins from standing still.
+//! pixel it falls on, and the motion is in_previous to bring points onto their partners' planes. Every frame begins from standing still.
 //!
 //! On a street this is expected to fail: at 1 m a frame partners are wrong from the start, and a road between façades holds nothing along
 //! itself, so that standing still fits well. Such a motion must not pass for an estimate. KinectFusion's own tests are made (enough
@@ -95,10 +95,10 @@ pub struct IcpReport {
 }
 
 impl IcpReport {
-    /// Asks the matches counted in `matches`; where there are none, they cannot speak against anything.
-    pub(crate) fn ask_matches(&mut self, config: &IcpConfig) {
-        let [explained, all] = self.matches.map(f64::from);
-        if self.status == IcpStatus::Tracked && explained < f64::from(config.explained_min) * all {
+    /// Contradicts the motion where too few of the matches counted in `matches` agree with it. Without matches it stands.
+    pub(crate) fn check_matches(&mut self, config: &IcpConfig) {
+        let [agreeing, all] = self.matches.map(f64::from);
+        if self.status == IcpStatus::Tracked && agreeing < f64::from(config.explained_min) * all {
             self.status = IcpStatus::Contradicted;
         }
     }
@@ -119,7 +119,7 @@ pub struct MapPicture<'a> {
 }
 
 /// Tracks one frame: `disparity_q8` measured now, `map` as seen from where the camera was. `memory` is overwritten; it needs a third of the
-/// image's pixels. The matches are not asked here.
+/// image's pixels. The matches are not checked here.
 pub fn track(
     config: &IcpConfig,
     rig: &StereoRig,
@@ -148,14 +148,14 @@ pub fn track(
             report.residual_rms_m = libm::sqrt(sums.squared_m2 / f64::from(sums.pairs.max(1)));
             report.held = sums.equations.min_eigen_share();
             report.t_current_previous = t_previous_current.inverse();
-            report.status = judge(config, &report);
+            report.status = classify(config, &report);
         }
     }
     report
 }
 
-/// KinectFusion's tests of a motion.
-fn judge(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
+/// Checks a motion by KinectFusion's tests.
+fn classify(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
     let motion = &report.t_current_previous;
     let (way_m, turn_rad) = (motion.distance_m(), 2.0 * motion.quaternion().coords.xyz().norm());
     if report.pairs < PAIRS_MIN {
@@ -212,17 +212,17 @@ impl<'c> Pairing<'c> {
             for (u, &disparity) in row.iter().enumerate().filter(|(_, disparity)| **disparity > 0.0) {
                 let depth = rig.focal_baseline_px_m() / f64::from(disparity);
                 let point = rig.ray(middle(u), middle(v)).map(|part| part * depth);
-                let moved = Vector3::from(t_previous_current.transform_point(point));
-                let Some((surface, normal)) = self.associate(&moved, map) else { continue };
+                let in_previous = Vector3::from(t_previous_current.transform_point(point));
+                let Some((surface, normal)) = self.associate(&in_previous, map) else { continue };
                 sums.points += 1;
-                let away = moved - surface;
+                let away = in_previous - surface;
                 let noise_m = self.noise_per_m * depth * depth;
                 let reach_m = (self.distance_m + 3.0 * noise_m) * self.widening;
                 if away.dot(&away) > reach_m * reach_m {
                     continue;
                 }
                 let distance_m = normal.dot(&away);
-                let turn = moved.cross(&normal);
+                let turn = in_previous.cross(&normal);
                 let weight = 1.0 / (NOISE_M * NOISE_M + noise_m * noise_m);
                 sums.pairs += 1;
                 sums.squared_m2 += distance_m * distance_m;

@@ -14,7 +14,7 @@ const MIN_WIDTH: usize = 64;
 /// Its least height.
 const MIN_HEIGHT: usize = 20;
 
-/// Disparity in px of the full image, finest first; 0 where there is none or its depth is beyond the limits.
+/// Disparity in px of the full image, finest first; 0 where it is unknown or its depth is beyond the limits.
 pub(super) struct Pyramid<'a> {
     levels: [Option<View<'a, f32>>; MAX_LEVELS as usize],
 }
@@ -45,7 +45,7 @@ impl<'a> Pyramid<'a> {
         pyramid
     }
 
-    /// The levels there are, coarsest first, each with its place: 0 is the finest.
+    /// The levels that fit, coarsest first, each with its number: 0 is the finest.
     pub fn coarse_to_fine(&self) -> impl Iterator<Item = (usize, View<'a, f32>)> {
         self.levels.iter().enumerate().rev().filter_map(|(at, level)| Some((at, (*level)?)))
     }

@@ -1,4 +1,4 @@
-//! Rooms of planes, looked at from two poses: the way between them is known.
+//! A scene of planes, rendered from two poses with a known motion between them.
 
 use super::*;
 use crate::{
@@ -16,17 +16,17 @@ const LIMITS_M: [f32; 2] = [0.5, 20.0];
 /// A plane: normal towards the camera, and where it cuts the axis along it.
 type Plane = ([f64; 3], f64);
 /// Floor, both walls, and a wall ahead.
-const ROOM: [Plane; 4] = [([0.0, -1.0, 0.0], 1.5), ([1.0, 0.0, 0.0], 3.0), ([-1.0, 0.0, 0.0], 4.0), ([0.0, 0.0, -1.0], 9.0)];
+const SCENE: [Plane; 4] = [([0.0, -1.0, 0.0], 1.5), ([1.0, 0.0, 0.0], 3.0), ([-1.0, 0.0, 0.0], 4.0), ([0.0, 0.0, -1.0], 9.0)];
 
 /// What a camera sees of the planes.
-struct Seen {
+struct Picture {
     depth_m: Vec<f32>,
     normal: Vec<[i8; 3]>,
     disparity_q8: Vec<u16>,
 }
 
-fn look(planes: &[Plane], t_world_camera: &Transform) -> Seen {
-    let mut seen = Seen {
+fn render(planes: &[Plane], t_world_camera: &Transform) -> Picture {
+    let mut picture = Picture {
         depth_m: vec![0.0; WIDTH * HEIGHT],
         normal: vec![[0; 3]; WIDTH * HEIGHT],
         disparity_q8: vec![0; WIDTH * HEIGHT],
@@ -34,24 +34,24 @@ fn look(planes: &[Plane], t_world_camera: &Transform) -> Seen {
     for at in 0..WIDTH * HEIGHT {
         let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
         let ray = Vector3::new((u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px, 1.0);
-        let (place, turned) = (t_world_camera.translation(), t_world_camera.rotate(ray));
+        let (origin, direction) = (t_world_camera.translation(), t_world_camera.rotate(ray));
         let hits = planes.iter().filter_map(|(normal, away_m)| {
             let normal = Vector3::from(*normal);
-            let depth = -(normal.dot(&place) + away_m) / normal.dot(&turned);
+            let depth = -(normal.dot(&origin) + away_m) / normal.dot(&direction);
             (depth > 0.1 && depth < f64::from(LIMITS_M[1])).then_some((depth, t_world_camera.inverse().rotate(normal)))
         });
         if let Some((depth, normal)) = hits.min_by(|a, b| a.0.total_cmp(&b.0)) {
-            seen.depth_m[at] = depth as f32;
-            seen.normal[at] = [0, 1, 2].map(|axis| libm::round(127.0 * normal[axis]) as i8);
-            seen.disparity_q8[at] = libm::round(RIG.focal_baseline_px_m() / depth * f64::from(DISPARITY_ONE_PX)) as u16;
+            picture.depth_m[at] = depth as f32;
+            picture.normal[at] = [0, 1, 2].map(|axis| libm::round(127.0 * normal[axis]) as i8);
+            picture.disparity_q8[at] = libm::round(RIG.focal_baseline_px_m() / depth * f64::from(DISPARITY_ONE_PX)) as u16;
         }
     }
-    seen
+    picture
 }
 
 /// Tracks the way from the origin to `motion`, which is where the camera is then.
 fn tracked(config: &IcpConfig, planes: &[Plane], motion: &Transform) -> IcpReport {
-    let (before, now) = (look(planes, &Transform::IDENTITY), look(planes, motion));
+    let (before, now) = (render(planes, &Transform::IDENTITY), render(planes, motion));
     let map = MapPicture {
         depth_m: View::new(&before.depth_m, WIDTH, HEIGHT).unwrap(),
         normal: View::new(&before.normal, WIDTH, HEIGHT).unwrap(),
@@ -65,10 +65,10 @@ fn walk(turn: [f64; 3], way_m: [f64; 3]) -> Transform {
 }
 
 #[test]
-fn small_motions_in_a_room_are_found() {
+fn small_motions_are_found() {
     for (turn, way_m) in [([0.0; 3], [0.0; 3]), ([0.0, 0.01, 0.0], [0.02, 0.0, 0.08]), ([0.004, -0.012, 0.003], [-0.05, 0.02, 0.05])] {
         let motion = walk(turn, way_m);
-        let report = tracked(&IcpConfig::default(), &ROOM, &motion);
+        let report = tracked(&IcpConfig::default(), &SCENE, &motion);
         assert_eq!(report.status, IcpStatus::Tracked, "{report:?}");
         let error = report.t_current_previous * motion;
         assert!(error.distance_m() < 0.005 && error.angle_rad() < 0.001, "{way_m:?}: {error:?}");
@@ -78,17 +78,17 @@ fn small_motions_in_a_room_are_found() {
 
 #[test]
 fn large_motions_are_no_estimates() {
-    let turned = tracked(&IcpConfig::default(), &ROOM, &walk([0.0, 0.6, 0.0], [0.0; 3]));
+    let turned = tracked(&IcpConfig::default(), &SCENE, &walk([0.0, 0.6, 0.0], [0.0; 3]));
     assert!(turned.status != IcpStatus::Tracked && turned.motion().is_none(), "{turned:?}");
     let config = IcpConfig { step_max_m: 0.05, ..IcpConfig::default() };
-    assert_eq!(tracked(&config, &ROOM, &walk([0.0; 3], [0.0, 0.0, 0.08])).status, IcpStatus::TooFar);
+    assert_eq!(tracked(&config, &SCENE, &walk([0.0; 3], [0.0, 0.0, 0.08])).status, IcpStatus::TooFar);
 }
 
 #[test]
 fn a_road_alone_holds_no_way_along_it_and_nothing_holds_none() {
-    let road = tracked(&IcpConfig::default(), &ROOM[..1], &walk([0.0; 3], [0.0, 0.0, 0.08]));
+    let road = tracked(&IcpConfig::default(), &SCENE[..1], &walk([0.0; 3], [0.0, 0.0, 0.08]));
     assert_eq!(road.status, IcpStatus::NotHeld, "{road:?}");
-    let canyon = tracked(&IcpConfig::default(), &ROOM[..3], &walk([0.0; 3], [0.0, 0.0, 0.5]));
+    let canyon = tracked(&IcpConfig::default(), &SCENE[..3], &walk([0.0; 3], [0.0, 0.0, 0.5]));
     assert_eq!(canyon.status, IcpStatus::NotHeld, "walls to both sides hold no more: {canyon:?}");
     let empty = tracked(&IcpConfig::default(), &[], &Transform::IDENTITY);
     assert_eq!((empty.status, empty.points), (IcpStatus::TooFewPairs, 0));
@@ -96,8 +96,8 @@ fn a_road_alone_holds_no_way_along_it_and_nothing_holds_none() {
 
 #[test]
 fn depth_off_the_map_is_no_estimate() {
-    // The same room, with a wall far nearer over two thirds of the picture than the map knows.
-    let (before, mut now) = (look(&ROOM, &Transform::IDENTITY), look(&ROOM, &Transform::IDENTITY));
+    // The same scene, with a wall far nearer over two thirds of the picture than the map knows.
+    let (before, mut now) = (render(&SCENE, &Transform::IDENTITY), render(&SCENE, &Transform::IDENTITY));
     let mut image = ViewMut::new(&mut now.disparity_q8, WIDTH, HEIGHT).unwrap();
     for row in image.pixels_mut().chunks_mut(WIDTH) {
         row[..2 * WIDTH / 3].fill((RIG.focal_baseline_px_m() / 0.8 * 256.0) as u16);
@@ -119,14 +119,14 @@ fn depth_off_the_map_is_no_estimate() {
 }
 
 #[test]
-fn matches_that_say_otherwise_are_believed() {
+fn matches_can_contradict_the_motion() {
     let config = IcpConfig::default();
     let mut report = IcpReport { matches: [49, 100], ..IcpReport::default() };
-    report.ask_matches(&config);
+    report.check_matches(&config);
     assert_eq!(report.status, IcpStatus::Contradicted);
     for matches in [[50, 100], [0, 0]] {
         let mut report = IcpReport { matches, ..IcpReport::default() };
-        report.ask_matches(&config);
+        report.check_matches(&config);
         assert_eq!(report.status, IcpStatus::Tracked);
     }
 }

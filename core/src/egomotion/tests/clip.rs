@@ -1,4 +1,4 @@
-//! Real clips, judged as KITTI judges odometry: relative errors over all sub-lengths, and from frame to frame.
+//! Real clips, evaluated by KITTI's odometry metric: relative errors over all segment lengths, and from frame to frame.
 //!
 //! With `--nocapture` the figures and the mean time of a frame are printed.
 
@@ -77,7 +77,7 @@ fn inverse(motion: &Matrix4<f64>) -> Matrix4<f64> {
     motion.try_inverse().unwrap()
 }
 
-fn judge(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors {
+fn relative_errors(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors {
     let between = |poses: &[Matrix4<f64>], i: usize, j: usize| inverse(&poses[i]) * poses[j];
     let error = |i: usize, j: usize| inverse(&between(estimate, i, j)) * between(truth, i, j);
     let frames = truth.len().min(estimate.len());
@@ -86,11 +86,11 @@ fn judge(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors {
         distance.push(distance[i - 1] + length(&between(truth, i - 1, i)));
     }
     let (mut translation, mut rotation, mut count) = (0.0, 0.0, 0.0);
-    for wanted in LENGTHS_M {
+    for segment_m in LENGTHS_M {
         for i in 0..frames {
-            let Some(j) = (i..frames).find(|&j| distance[j] >= distance[i] + wanted) else { break };
-            translation += length(&error(i, j)) / wanted * 100.0;
-            rotation += degrees(&error(i, j)) / wanted;
+            let Some(j) = (i..frames).find(|&j| distance[j] >= distance[i] + segment_m) else { break };
+            translation += length(&error(i, j)) / segment_m * 100.0;
+            rotation += degrees(&error(i, j)) / segment_m;
             count += 1.0;
         }
     }
@@ -116,8 +116,8 @@ fn run(name: &str) -> Option<Vec<Matrix4<f64>>> {
     let bytes = FlowMatcher::bytes(&capacity) + Estimator::bytes(&capacity);
     let mut slab: Vec<[u64; 8]> = vec![[0; 8]; bytes / 64 + 1];
     let slab: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
-    let lead = slab.as_ptr().align_offset(64);
-    let mut carver = Carver::new(&mut slab[lead..], bytes).unwrap();
+    let start = slab.as_ptr().align_offset(64);
+    let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
     let mut matcher = FlowMatcher::new_in(&capacity, &mut carver);
     let mut estimator = Estimator::new_in(&capacity, &mut carver);
     let mut camera = Egomotion::default();
@@ -142,7 +142,7 @@ fn run(name: &str) -> Option<Vec<Matrix4<f64>>> {
     (trajectory.len() > 1).then_some(trajectory)
 }
 
-fn say(what: &str, errors: &Errors) {
+fn print_errors(what: &str, errors: &Errors) {
     let Errors { translation_percent, rotation_deg_per_m, frame_rms_m, frame_rms_deg } = errors;
     println!(
         "{what}: t {translation_percent:.3} %, r {rotation_deg_per_m:.4} deg/m, per frame {:.2} cm {frame_rms_deg:.4} deg",
@@ -161,29 +161,29 @@ fn truth(name: &str) -> Option<Vec<Matrix4<f64>>> {
 }
 
 #[test]
-fn follows_a_street_as_well_as_the_best_stereo_odometry_measured() {
+fn tracks_sequence_06_as_well_as_the_best_stereo_odometry_measured() {
     let Some(trajectory) = run("06") else {
         println!("skipped: kitti-odometry/06");
         return;
     };
-    let errors = judge(&truth("06.txt").unwrap(), &trajectory);
-    say("06", &errors);
+    let errors = relative_errors(&truth("06.txt").unwrap(), &trajectory);
+    print_errors("06", &errors);
     assert!(errors.translation_percent <= 0.80);
     assert!(errors.rotation_deg_per_m <= 0.025);
     assert!(errors.frame_rms_m <= 0.010);
 }
 
 #[test]
-fn follows_a_residential_street() {
+fn tracks_a_residential_street() {
     let Some(trajectory) = run("r1405") else {
         println!("skipped: kitti-odometry/r1405");
         return;
     };
-    let errors = judge(&truth("r1405.txt").unwrap(), &trajectory);
-    say("r1405 against GPS and inertial unit", &errors);
+    let errors = relative_errors(&truth("r1405.txt").unwrap(), &trajectory);
+    print_errors("r1405 against GPS and inertial unit", &errors);
     // That truth is good over the clip and noisy from frame to frame.
     assert!(errors.translation_percent <= 1.5 && errors.rotation_deg_per_m <= 0.025);
-    let errors = judge(&truth("r1405.vo.txt").unwrap(), &trajectory);
-    say("r1405 against another stereo odometry", &errors);
+    let errors = relative_errors(&truth("r1405.vo.txt").unwrap(), &trajectory);
+    print_errors("r1405 against another stereo odometry", &errors);
     assert!(errors.translation_percent <= 0.5 && errors.rotation_deg_per_m <= 0.01 && errors.frame_rms_m <= 0.0075);
 }
