@@ -1,6 +1,6 @@
-//! What a detector may call a thing, whatever data set taught it, and what follows from the name.
+//! Classes that detectors name, independent of the data set, and how each class is treated.
 
-/// A kind of thing. One neutral list; names of PASCAL VOC, COCO, Cityscapes and KITTI map to it by [`Class::from_name`].
+/// The class of an object. One neutral list; names of PASCAL VOC, COCO, Cityscapes and KITTI map to it by [`Class::from_name`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
@@ -108,7 +108,7 @@ impl Class {
         Self::MovingObject,
     ];
 
-    /// The class a data set means by a name, whatever its case; `None` for a name nobody knows.
+    /// The class a data set means by a name, in upper or lower case; `None` for an unknown name.
     ///
     /// ```
     /// use dynvox_core::tracking::Class;
@@ -121,12 +121,12 @@ impl Class {
         NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|&(_, class)| class)
     }
 
-    /// The class of a code, as tables keep it; [`Class::Other`] for a code there is none for.
+    /// The class of a code, as tables keep it; [`Class::Other`] for an unknown code.
     pub fn from_code(code: u32) -> Self {
         Self::ALL.get(code as usize).copied().unwrap_or_default()
     }
 
-    /// The code: its place in [`Class::ALL`].
+    /// The code: its index in [`Class::ALL`].
     pub const fn code(self) -> u32 {
         self as u32
     }
@@ -158,7 +158,7 @@ impl Class {
         }
     }
 
-    /// Whether a detector may call one thing by both names from frame to frame: four-wheelers flicker among each other, and so do
+    /// Whether a detector may give one object both classes from frame to frame: four-wheelers flicker among each other, and so do
     /// people and what they ride.
     pub fn agrees_with(self, other: Self) -> bool {
         let group = |class: Self| match class {
@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_data_sets_words_for_a_thing_mean_the_thing() {
+    fn names_of_every_data_set_map_to_their_class() {
         for (name, class) in [
             ("car", Class::Car),
             ("Van", Class::Van),

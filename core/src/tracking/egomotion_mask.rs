@@ -29,7 +29,7 @@ const MOVING_MAX: usize = 16;
 /// these the matches that came from the last mask are excluded.
 #[derive(Clone, Debug)]
 pub struct EgomotionMask<'t, 's> {
-    owners: &'t [OwnerCode],
+    owner_codes: &'t [OwnerCode],
     refined: &'t [Match],
     previous: &'t MaskStore<'s>,
     /// Last masks of objects that were found by their motion.
@@ -41,7 +41,7 @@ pub struct EgomotionMask<'t, 's> {
 impl EgomotionMask<'_, '_> {
     /// Whether the refined match at that position may be used.
     pub fn includes(&self, index: u32) -> bool {
-        match self.owners.get(index as usize).map(|owner| owner.get()) {
+        match self.owner_codes.get(index as usize).map(|code| code.get()) {
             Some(MatchOwner::Ambiguous) => self.excluded == 0,
             Some(MatchOwner::Instance(instance)) => self.excluded >> instance & 1 == 0,
             Some(MatchOwner::None) => !self.is_on_moving(index),
@@ -77,6 +77,12 @@ impl<'s> Tracker<'s> {
                 && self.frame.wrapping_sub(track.last_frame) == 1
         };
         let moving = self.tracks.all().iter().filter(is_missing).map(|track| track.mask).take(MOVING_MAX).collect();
-        EgomotionMask { owners: self.owner, refined, previous: self.masks.previous(), moving, excluded }
+        EgomotionMask {
+            owner_codes: self.refined_owner,
+            refined,
+            previous: self.masks.previous(),
+            moving,
+            excluded,
+        }
     }
 }

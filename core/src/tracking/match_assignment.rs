@@ -45,8 +45,8 @@ impl OwnerCode {
 }
 
 impl From<MatchOwner> for OwnerCode {
-    fn from(owner: MatchOwner) -> Self {
-        Self(match owner {
+    fn from(match_owner: MatchOwner) -> Self {
+        Self(match match_owner {
             MatchOwner::None => 0,
             MatchOwner::Instance(index) => {
                 debug_assert!(index < super::MAX_DETECTIONS);
@@ -69,9 +69,9 @@ pub struct FrameMatches<'m> {
 impl Tracker<'_> {
     /// Assigns each match to the instance whose copy mask it lies under or else to the best one whose delete mask it lies under.
     pub(super) fn assign_matches(&mut self, matches: &FrameMatches<'_>) {
-        let owners = [&mut *self.owner, &mut *self.sparse_owner];
-        for (owners, matches) in owners.into_iter().zip([matches.refined, matches.sparse]) {
-            owners.iter_mut().zip(matches).for_each(|(owner, _)| *owner = OwnerCode::default());
+        let tables = [&mut *self.refined_owner, &mut *self.sparse_owner];
+        for (codes, matches) in tables.into_iter().zip([matches.refined, matches.sparse]) {
+            codes.iter_mut().zip(matches).for_each(|(code, _)| *code = OwnerCode::default());
         }
         self.assign_from(0, matches);
     }
@@ -85,16 +85,16 @@ impl Tracker<'_> {
             let moves = || other.track.get().and_then(|at| tracks.get(at)).is_some_and(Track::moves);
             !other.tracked_only.get() || moves()
         };
-        let refined = self.owner.iter_mut().zip(matches.refined);
-        for (owner, m) in refined.chain(self.sparse_owner.iter_mut().zip(matches.sparse)) {
-            if owner.get() != MatchOwner::None {
+        let refined = self.refined_owner.iter_mut().zip(matches.refined);
+        for (code, m) in refined.chain(self.sparse_owner.iter_mut().zip(matches.sparse)) {
+            if code.get() != MatchOwner::None {
                 continue;
             }
             let (u, v) = pixel(m.current_left);
             let best = |mut under: &mut dyn FnMut(&Instance) -> bool| instances.iter().skip(first).position(&mut under);
             let copy = best(&mut |instance| masks.contains(&instance.mask, u, v));
             let found = copy.or_else(|| best(&mut |instance| instance.delete_mask(masks).contains(u, v))).map(|at| at + first);
-            *owner = OwnerCode::from(match found {
+            *code = OwnerCode::from(match found {
                 Some(at) if is_between(instances, distinct, masks, at, u, v) => MatchOwner::Ambiguous,
                 Some(at) => MatchOwner::Instance(at),
                 None => MatchOwner::None,

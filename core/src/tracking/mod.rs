@@ -99,7 +99,7 @@ pub struct Tracker<'s> {
     instances: Instances<'s>,
     tracks: TrackTable<'s>,
     /// What each refined match is assigned to; and each sparse one.
-    owner: &'s mut [OwnerCode],
+    refined_owner: &'s mut [OwnerCode],
     sparse_owner: &'s mut [OwnerCode],
     /// Matches found by guided matching on one object.
     guided_matches: &'s mut [Match],
@@ -131,7 +131,7 @@ impl<'s> Tracker<'s> {
             ]),
             instances: Instances::new_in(capacity, carver),
             tracks: TrackTable::new_in(capacity, carver),
-            owner: carver.alloc("tracking.owner", capacity.matches),
+            refined_owner: carver.alloc("tracking.owner", capacity.matches),
             sparse_owner: carver.alloc("tracking.sparse_owner", capacity.matches),
             guided_matches: carver.alloc("tracking.guided_matches", GUIDED_MATCHES_MAX),
             segmenter: carver.group("tracking.segmentation", |carver| MotionSegmenter::new_in(capacity, carver)),

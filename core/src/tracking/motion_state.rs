@@ -113,9 +113,9 @@ impl MotionHysteresis {
     }
 
     /// Updates by a frame, with a motion or without. Returns the new state.
-    pub fn update(&mut self, config: &StateConfig, evidence: Option<MotionEvidence>) -> MotionState {
-        match evidence {
-            Some(evidence) => self.confirm(config, evidence.classify(config, self.state())),
+    pub fn update(&mut self, config: &StateConfig, motion_evidence: Option<MotionEvidence>) -> MotionState {
+        match motion_evidence {
+            Some(observed) => self.confirm(config, observed.classify(config, self.state())),
             None => self.expire(config),
         }
         self.state()
@@ -178,7 +178,7 @@ mod tests {
 
     fn states(config: &StateConfig, frames: &[Option<MotionEvidence>]) -> std::vec::Vec<MotionState> {
         let mut hysteresis = MotionHysteresis::default();
-        frames.iter().map(|evidence| hysteresis.update(config, *evidence)).collect()
+        frames.iter().map(|observed| hysteresis.update(config, *observed)).collect()
     }
 
     #[test]
@@ -260,14 +260,14 @@ mod tests {
     #[test]
     fn a_noisy_motion_proves_nothing() {
         let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, slow_m_s: 5.5, ..PUBLISHED };
-        let vote = |speed_m_s, sigma_m_s| {
+        let classified = |speed_m_s, sigma_m_s| {
             MotionEvidence { speed_m_s, sigma_m_s, spread_m_s: sigma_m_s, bias_m_s: 0.0 }.classify(&config, Uncertain)
         };
-        assert_eq!([vote(8.0, 1.0), vote(8.0, 1.5)], [Dynamic, Uncertain]);
+        assert_eq!([classified(8.0, 1.0), classified(8.0, 1.5)], [Dynamic, Uncertain]);
         // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give or take 2 nothing can be told.
-        assert_eq!([vote(2.0, 1.5), vote(2.0, 2.0), vote(2.0, 0.5)], [Static, Uncertain, Uncertain]);
+        assert_eq!([classified(2.0, 1.5), classified(2.0, 2.0), classified(2.0, 0.5)], [Static, Uncertain, Uncertain]);
         let biased = |bias_m_s| MotionEvidence { speed_m_s: 8.0, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s }.classify(&config, Uncertain);
         assert_eq!([biased(2.0), biased(3.0)], [Dynamic, Uncertain], "nor does one the lens could make");
-        assert_eq!([vote(f32::NAN, 0.0), vote(0.0, f32::INFINITY)], [Uncertain, Uncertain]);
+        assert_eq!([classified(f32::NAN, 0.0), classified(0.0, f32::INFINITY)], [Uncertain, Uncertain]);
     }
 }

@@ -70,14 +70,14 @@ impl Tracker<'_> {
             let (u, v) = pixel(m.previous_left);
             previous.contains(&previous_mask, u, v)
         };
-        // Few of all matches are one track's: the owner, which costs less, is compared first.
-        let is_own = |&(m, owner): &(&Match, &OwnerCode)| owner.is_instance(at) && was_under_mask(m);
-        let own = input.matches.refined.iter().zip(&*self.owner).filter(is_own).map(|(m, _)| m);
+        // Few matches belong to one track: the owner code, which costs less, is compared first.
+        let is_own = |&(m, code): &(&Match, &OwnerCode)| code.is_instance(at) && was_under_mask(m);
+        let own = input.matches.refined.iter().zip(&*self.refined_owner).filter(is_own).map(|(m, _)| m);
         let enough = own.clone().count() >= usize::from(self.config.motion.matches_enough);
         // Sparse matches of the same features say nothing new.
-        for (m, owner) in input.matches.sparse.iter().zip(self.sparse_owner.iter_mut()).filter(|(_, owner)| owner.is_instance(at)) {
+        for (m, code) in input.matches.sparse.iter().zip(self.sparse_owner.iter_mut()).filter(|(_, code)| code.is_instance(at)) {
             if enough || own.clone().any(|other| is_same_keypoint(m.current_left, other.current_left)) {
-                *owner = MatchOwner::None.into();
+                *code = MatchOwner::None.into();
             }
         }
         let own = own.chain(input.matches.sparse.iter().zip(&*self.sparse_owner).filter(is_own).map(|(m, _)| m));
@@ -100,7 +100,7 @@ impl Tracker<'_> {
 
 /// Updates a track's state by a frame's motion, or by its lack.
 fn classify(config: &TrackingConfig, rig: &StereoRig, camera: &CameraMotion, track: &mut Track) {
-    let evidence = camera.t_current_previous.filter(|_| track.measured.get()).map(|t_current_previous| {
+    let motion_evidence = camera.t_current_previous.filter(|_| track.measured.get()).map(|t_current_previous| {
         let interval_s = f64::from(config.frame_interval_s);
         let [speed, sigma, spread] = track.filter.speed();
         let camera_world = camera.t_world_camera.inverse();
@@ -120,7 +120,7 @@ fn classify(config: &TrackingConfig, rig: &StereoRig, camera: &CameraMotion, tra
             bias_m_s: bias as f32,
         }
     });
-    track.motion_state.update(&config.state, evidence);
+    track.motion_state.update(&config.state, motion_evidence);
 }
 
 /// Motion over ground in this frame: the identity for a static object.

@@ -58,8 +58,8 @@ pub struct TrackingReport {
 }
 
 impl Tracker<'_> {
-    /// The tracks as they stand, by age; without those too small to be reconstructed of which no motion was ever measured. Volumes are
-    /// not known here: [`TrackReport::blocks`] is 0.
+    /// The tracks of this frame, by age; without tentative ones, which are too small to be reconstructed and never had a measured motion.
+    /// Volumes are not known here: [`TrackReport::blocks`] is 0.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
         let interval_s = f64::from(self.config.frame_interval_s);
         self.tracks.all().iter().filter(|track| !track.is_tentative()).map(move |track| TrackReport {

@@ -58,8 +58,8 @@ impl<'s> Tracker<'s> {
     }
 
     /// What the refined match at that position is assigned to.
-    pub(crate) fn test_owner(&self, index: usize) -> MatchOwner {
-        self.owner[index].get()
+    pub(crate) fn test_match_owner(&self, index: usize) -> MatchOwner {
+        self.refined_owner[index].get()
     }
 
     /// Flips the lowest bit of a track's pose.

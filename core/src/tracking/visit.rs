@@ -18,7 +18,7 @@ impl Tracker<'_> {
             config,
             // Of one frame alone.
             instances: _,
-            owner: _,
+            refined_owner: _,
             sparse_owner: _,
             guided_matches: _,
             frame: _,

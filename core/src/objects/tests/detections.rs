@@ -6,7 +6,7 @@ fn pixels(left: i32, top: i32, width: i32, height: i32) -> PixelBox {
     PixelBox { left, top, width, height }
 }
 
-fn admitted(config: &TrackingConfig, size: [usize; 2], detections: &[Detection<'_>]) -> (DetectionCount, Vec<f32>, u64) {
+fn accepted_of(config: &TrackingConfig, size: [usize; 2], detections: &[Detection<'_>]) -> (DetectionCount, Vec<f32>, u64) {
     let capacity = Capacity { image_width: 1242, image_height: 375, mask_words: 20_000, ..CAPACITY };
     with(&capacity, config, |instances, _| {
         instances.ingest(0, detections, size);
@@ -20,7 +20,7 @@ fn a_box_must_be_strictly_larger_than_45_by_45_at_kittis_width_and_in_proportion
     let mask = vec![1; 3000];
     let retired = |width, height, image: usize| {
         let car = detection(Class::Car, 0.9, &pixels(10, 10, width, height), &mask);
-        admitted(&TrackingConfig::default(), [image, 200], &[car]).0.accepted
+        accepted_of(&TrackingConfig::default(), [image, 200], &[car]).0.accepted
     };
     // 2024, 2025 and 2026 px.
     assert_eq!([retired(46, 44, 1242), retired(45, 45, 1242), retired(1013, 2, 1242)], [0, 0, 1]);
@@ -52,7 +52,7 @@ fn nonsense_is_refused_by_name_and_counted_once() {
         at(10, 10, 5, 5),
         with_score(0.7),
     ];
-    let (count, scores, _) = admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
+    let (count, scores, _) = accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
     let expected = DetectionCount {
         given: 15,
         accepted: 1,
@@ -67,7 +67,7 @@ fn nonsense_is_refused_by_name_and_counted_once() {
 }
 
 #[test]
-fn of_ten_thousand_the_best_are_taken_in_whatever_order_they_come() {
+fn of_ten_thousand_the_best_are_accepted_in_any_order() {
     let mask = vec![1; 3600];
     let mut random = Random::new(1);
     let mut all: Vec<_> = (0..10_000)
@@ -76,14 +76,14 @@ fn of_ten_thousand_the_best_are_taken_in_whatever_order_they_come() {
             detection(Class::Car, random.below(1000) as f32 / 1000.0, &pixels(left, top, 60, 60), &mask)
         })
         .collect();
-    let (count, scores, digest) = admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
+    let (count, scores, digest) = accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
     assert_eq!(count.accepted + count.covered + count.over_capacity, 10_000);
     assert_eq!(count.over_capacity, 9_996, "four are the bound");
     assert!(scores.iter().all(|&score| score > 0.99), "{scores:?}");
     for i in (1..all.len()).rev() {
         all.swap(i, random.below(i as u32 + 1) as usize);
     }
-    assert_eq!(admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), (count, scores, digest));
+    assert_eq!(accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), (count, scores, digest));
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn what_is_too_small_to_be_reconstructed_is_tracked_with_the_space_that_is_left(
     let config = TrackingConfig::default();
     let car = |score, pixels: &PixelBox| detection(Class::Car, score, pixels, &mask[..pixels.area() as usize]);
     let [least, most] = [(30, 30), (31, 30)].map(|(width, height)| car(0.9, &pixels(200, 10, width, height)));
-    let count = |all: &[Detection<'_>]| admitted(&config, [1242, 375], all).0;
+    let count = |all: &[Detection<'_>]| accepted_of(&config, [1242, 375], all).0;
     let counted = |accepted, too_small, tracked_only, over_capacity, given| DetectionCount {
         given,
         accepted,
@@ -153,7 +153,7 @@ fn what_is_too_small_to_be_reconstructed_is_tracked_with_the_space_that_is_left(
     };
     assert_eq!(count(&[least]), counted(0, 1, 0, 0, 1));
     assert_eq!(count(&[most]), counted(0, 1, 1, 0, 1));
-    // A table of four: the small one goes first whatever its score, and is counted as small.
+    // A table of four: the one that is tracked only leaves first, despite its score, and is counted as such.
     let large: Vec<_> = (0..5).map(|n| pixels(300 + 70 * n, 10, 60, 60)).collect();
     let mut all: Vec<_> = large.iter().map(|pixels| car(0.3, pixels)).collect();
     all.insert(0, most);
@@ -161,21 +161,21 @@ fn what_is_too_small_to_be_reconstructed_is_tracked_with_the_space_that_is_left(
     assert_eq!(count(&all), counted(4, 1, 0, 1, 6));
     // A larger one keeps its pixels.
     let over = car(0.3, &pixels(190, 5, 60, 60));
-    assert_eq!(count(&[most, over]), counted(1, 1, 0, 0, 2), "nothing of the small one is left");
+    assert_eq!(count(&[most, over]), counted(1, 1, 0, 0, 2), "no pixel of the smaller car is left");
 }
 
 #[test]
-fn of_more_equals_than_there_is_room_for_the_same_are_taken_in_whatever_order() {
+fn of_more_equals_than_fit_the_same_are_accepted_in_any_order() {
     let mask = vec![1; 3600];
     let boxes: Vec<_> = (0..7).map(|n| pixels(10 + 40 * n, 10, 60, 60)).collect();
     let mut all: Vec<_> = boxes.iter().map(|pixels| detection(Class::Car, 0.5, pixels, &mask)).collect();
-    let first = admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
+    let first = accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
     for _ in 0..7 {
         all.rotate_left(1);
-        assert_eq!(admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), first);
+        assert_eq!(accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), first);
     }
     all.reverse();
-    assert_eq!(admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), first);
+    assert_eq!(accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), first);
 }
 
 #[test]
@@ -188,7 +188,7 @@ fn a_box_of_absurd_width_is_refused_though_its_mask_is_as_wide() {
         height: 4,
         ..detection(Class::Car, 0.9, &pixels(0, 0, 1, 1), &mask)
     };
-    let count = |width| admitted(&TrackingConfig::default(), [WIDTH, HEIGHT], &[wide(width)]).0;
+    let count = |width| accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &[wide(width)]).0;
     assert_eq!((count(32_768).accepted, count(32_769).bad_box, count(40_000).bad_box), (1, 1, 1));
 }
 
@@ -210,7 +210,7 @@ fn a_score_below_the_least_is_ignored() {
     let mask = vec![1; 3600];
     let car = |score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask);
     let config = TrackingConfig { score_min: 0.4, ..any_size() };
-    let count = |score| admitted(&config, [WIDTH, HEIGHT], &[car(score)]).0;
+    let count = |score| accepted_of(&config, [WIDTH, HEIGHT], &[car(score)]).0;
     assert_eq!([count(0.39), count(0.4)].map(|count| (count.accepted, count.ignored)), [(0, 1), (1, 0)]);
 }
 
@@ -218,7 +218,7 @@ fn a_score_below_the_least_is_ignored() {
 fn a_score_of_minus_nothing_is_nothing() {
     let mask = vec![1; 3600];
     let cars = [-0.0, 0.5].map(|score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask));
-    let (count, scores, _) = admitted(&any_size(), [WIDTH, HEIGHT], &cars);
+    let (count, scores, _) = accepted_of(&any_size(), [WIDTH, HEIGHT], &cars);
     assert_eq!((count.covered, scores), (1, vec![0.5]), "the better one is on top");
 }
 
@@ -241,7 +241,7 @@ fn of_two_alike_but_for_class_box_or_mask_the_same_is_on_top_in_either_order() {
                 retired.iter().map(|retired| (retired.class(), retired.mask.pixels, masks.area(&retired.mask))).collect::<Vec<_>>()
             })
         };
-        let digest = |order: [Detection<'_>; 2]| admitted(&any_size(), [WIDTH, HEIGHT], &order).2;
+        let digest = |order: [Detection<'_>; 2]| accepted_of(&any_size(), [WIDTH, HEIGHT], &order).2;
         assert_eq!(seen([a, b]), seen([b, a]));
         assert_eq!(digest([a, b]), digest([b, a]));
     }

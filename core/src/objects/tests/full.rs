@@ -38,13 +38,13 @@ fn a_mask_of_which_nothing_is_left_takes_mask_store_full() {
 }
 
 #[test]
-fn where_there_is_mask_store_full_for_an_unseen_tracks_mask_its_box_stands_for_it() {
+fn a_full_mask_store_replaces_an_unseen_tracks_mask_by_its_box() {
     with(&Capacity { mask_words: 130, ..CAPACITY }, &any_size(), |instances, estimator| {
         assert_eq!(take(instances, estimator, 0, &[car(100)]), [1]);
         assert_eq!(take(instances, estimator, 1, &[car(250)]), [2]);
         assert_eq!(instances.report().tracks.masks_lost, 1);
         assert_eq!(take(instances, estimator, 2, &[car(250)]), [2]);
-        assert_eq!(instances.report().tracks.masks_lost, 0, "a box needs no room");
+        assert_eq!(instances.report().tracks.masks_lost, 0, "a box takes no mask words");
         assert_eq!(take(instances, estimator, 3, &[car(100)]), [1]);
     });
 }
@@ -185,7 +185,7 @@ fn a_volume_that_is_full_keeps_what_it_has() {
 }
 
 #[test]
-fn whatever_could_not_be_used_is_in_the_sum_of_refusals() {
+fn the_sum_of_refusals_counts_every_kind() {
     let detections = [
         DetectionCount { bad_score: 1, ..DetectionCount::default() },
         DetectionCount { bad_box: 1, ..DetectionCount::default() },

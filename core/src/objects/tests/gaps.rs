@@ -1,4 +1,4 @@
-//! What happens to a thing that is not seen, or not measured, for a while.
+//! Objects that are not seen, or not measured, for some frames.
 
 use super::*;
 
@@ -12,7 +12,7 @@ fn parked(frame: u32) -> [Transform; 2] {
     [shift(0.0, 0.0, 0.3 * f64::from(frame)), shift(1.0, 0.3, 14.0)]
 }
 
-/// Shows a car in the frames `shown` says and looks at each.
+/// Shows a car in the frames `shown` selects and calls `inspect` after each.
 fn run(frames: u32, poses: fn(u32) -> [Transform; 2], shown: impl Fn(u32) -> bool, mut inspect: impl FnMut(u32, &Run<'_, '_, '_>)) {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         let mut run = Run::new(instances, estimator);
@@ -46,7 +46,7 @@ fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_f
             let moved = depths_m[frame].unwrap() - depths_m[frame - 1].unwrap();
             assert!((moved - step_m).abs() < 0.02, "frame {frame}: {moved} m");
         }
-        assert_eq!(depths_m[lost], None, "nobody knows where it is");
+        assert_eq!(depths_m[lost], None, "its pose is unknown");
     }
 }
 

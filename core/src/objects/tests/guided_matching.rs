@@ -58,7 +58,7 @@ fn run(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
 }
 
 #[test]
-fn a_thing_without_a_match_of_the_scene_flow_is_looked_at_until_it_is_known_to_stand() {
+fn an_object_without_scene_flow_matches_is_searched_for_until_it_is_known_to_be_static() {
     let tracks = run(3.0, true);
     for track in &tracks[1..] {
         assert!(track.measured && track.matches > 40 && track.inliers > 40, "{track:?}");
@@ -78,7 +78,7 @@ fn what_moves_is_found_where_it_went_and_not_where_it_was_sought() {
 }
 
 #[test]
-fn the_grid_is_no_finer_than_three_pixels_and_holds_no_more_points_than_there_is_room_for() {
+fn the_grid_is_no_finer_than_three_pixels_and_holds_at_most_its_capacity() {
     for [width, height] in [[20, 30], [48, 48], [120, 90], [1242, 375]] {
         let step = step_px(width, height);
         let points = (width / step) * (height / step);

@@ -6,15 +6,15 @@ fn square(side: i32) -> PixelBox {
     PixelBox { left: 100, top: 30, width: side, height: side }
 }
 
-/// At an image width of 1242 and the published settings: which pixels of a square mask of `side` px, with a corner of `cut` px cut off or
+/// At an image width of 1242 and the published settings: which pixels of a square mask of `side` px, with a corner of `corner` px cut off or
 /// none, are deleted and which copied.
-fn deleted(side: i32, cut: i32, test: impl Fn(&dyn Fn(i32, i32) -> bool, &dyn Fn(i32, i32) -> bool, PixelBox)) {
+fn deleted(side: i32, corner: i32, test: impl Fn(&dyn Fn(i32, i32) -> bool, &dyn Fn(i32, i32) -> bool, PixelBox)) {
     let mut words = vec![0; 1000];
     let mut store = MaskStore::new(&mut words);
     let pixels = square(side);
     let mask = store.alloc(pixels).unwrap();
     for v in 0..side {
-        let row: Vec<u8> = (0..side).map(|u| u8::from(u >= cut || v >= cut)).collect();
+        let row: Vec<u8> = (0..side).map(|u| u8::from(u >= corner || v >= corner)).collect();
         store.set_row(&mask, pixels.top + v, pixels.left, &row);
     }
     let scale = TrackingConfig::default().delete_permille(pixels.area(), 1242);

@@ -1,4 +1,4 @@
-//! Which matches count, and for whom.
+//! Which matches count, and for which object.
 
 use super::*;
 
@@ -8,7 +8,7 @@ fn car(left: i32, score: f32) -> Detection<'static> {
     detection(Class::Car, score, &PixelBox { left, top: 30, width: 60, height: 60 }, &MASK)
 }
 
-/// Points of a thing that leaves a standing camera by 0.2 m, seen in a band of the box of `car(left, _)`, no two within 5 px.
+/// Points of an object that moves away from a standing camera by 0.2 m, seen in a band of the box of `car(left, _)`, no two within 5 px.
 fn points(count: u32, left: i32, top: i32, depth_m: f64) -> Vec<Match> {
     let seen = |n: u32| {
         let pixel = [f64::from(left) + 5.0 + f64::from(7 * n % 50), f64::from(top) + f64::from(13 * n % 20)];
@@ -36,12 +36,12 @@ fn a_match_that_leaves_the_mask_or_enters_it_is_not_counted() {
     let stays = points(20, 100, 35, 10.0);
     let aside = |[u, v]: [f32; 2]| [u + 100.0, v];
     let leaves = points(5, 100, 65, 10.0).into_iter().map(|m| Match { current_left: aside(m.current_left), ..m });
-    let enters = points(5, 100, 65, 10.0).into_iter().map(|m| Match {
+    let entering = points(5, 100, 65, 10.0).into_iter().map(|m| Match {
         previous_left: aside(m.previous_left),
         previous_right: aside(m.previous_right),
         ..m
     });
-    let all: Vec<Match> = stays.iter().copied().chain(leaves).chain(enters).collect();
+    let all: Vec<Match> = stays.iter().copied().chain(leaves).chain(entering).collect();
     assert_eq!([counted(&stays, &[]), counted(&all, &[])], [20; 2]);
 }
 
@@ -67,7 +67,7 @@ fn what_shows_through_the_windows_and_what_stands_before_the_car_are_not_counted
 }
 
 #[test]
-fn what_is_seen_for_the_first_time_has_no_matches_whatever_was_there_before() {
+fn an_object_seen_for_the_first_time_has_no_matches() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         take_frame(instances, estimator, 0, &[car(100, 0.9)], [&[], &[]]);
         take_frame(instances, estimator, 1, &[car(250, 0.9)], [&points(30, 250, 35, 10.0), &[]]);
@@ -86,8 +86,8 @@ fn after(config: &TrackingConfig, boards: &[Board]) -> TrackReport {
     with(&CAPACITY, config, |instances, estimator| {
         let mut run = Run::new(instances, estimator);
         for (frame, board) in (0..).zip(boards) {
-            let [camera, place] = crossing(frame);
-            run.step(camera, &[(board, Some(place))]);
+            let [camera, t_world_board] = crossing(frame);
+            run.step(camera, &[(board, Some(t_world_board))]);
         }
         run.track(1).unwrap()
     })
@@ -110,7 +110,7 @@ fn the_motion_so_far_is_found_again_where_draws_alone_would_miss_it() {
 }
 
 #[test]
-fn matches_of_one_thing_err_alike_so_four_times_as_many_do_not_make_it_twice_as_sure() {
+fn matches_of_one_object_share_their_error_so_four_times_as_many_do_not_halve_sigma() {
     let config = TrackingConfig {
         motion: MotionConfig { camera_rad: 0.0, ..MotionConfig::default() },
         ..any_size()
@@ -146,42 +146,42 @@ fn at(u: f32) -> Match {
 }
 
 #[test]
-fn under_its_own_mask_a_match_is_a_things_own_though_anothers_delete_mask_is_there_too() {
+fn a_match_under_a_copy_mask_belongs_to_it_even_where_delete_masks_overlap() {
     with(&CAPACITY, &any_size(), |instances, _| {
         // The first one's mask ends at 99, its delete mask at 105; the second's begins at 101.
         instances.ingest(0, &[car(40, 0.9), car(101, 0.5)], [WIDTH, HEIGHT]);
         instances.assign_matches(&[at(100.0), at(105.0)], &[]);
-        assert_eq!(instances.tracker.test_owner(1), MatchOwner::Instance(1));
+        assert_eq!(instances.tracker.test_match_owner(1), MatchOwner::Instance(1));
     });
 }
 
-/// A thing seen to be as fast as that, surely.
+/// Evidence of that speed without any uncertainty.
 fn seen_at(speed_m_s: f32) -> Option<MotionEvidence> {
     Some(MotionEvidence { speed_m_s, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s: 0.0 })
 }
 
 #[test]
-fn a_small_thing_takes_its_neighbours_matches_only_once_it_moves() {
+fn a_small_object_takes_its_neighbours_matches_only_once_it_moves() {
     let config = TrackingConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..TrackingConfig::default() };
     with(&CAPACITY, &config, |instances, _| {
         instances.ingest(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
         instances.assign_matches(&[at(97.0)], &[]);
-        assert_eq!(instances.tracker.test_owner(0), MatchOwner::Instance(0));
+        assert_eq!(instances.tracker.test_match_owner(0), MatchOwner::Instance(0));
         let certain = StateConfig { confirm_frames: 1, ..StateConfig::default() };
         instances.tracker.test_tracks()[1].motion_state.update(&certain, seen_at(9.0));
         instances.assign_matches(&[at(97.0)], &[]);
-        assert_eq!(instances.tracker.test_owner(0), MatchOwner::Ambiguous);
+        assert_eq!(instances.tracker.test_match_owner(0), MatchOwner::Ambiguous);
     });
 }
 
 #[test]
-fn what_may_lie_on_either_of_two_things_guides_the_camera_only_if_both_may() {
-    for (large_share, guides) in [(1.0, true), (0.0, false)] {
+fn egomotion_uses_an_ambiguous_match_only_if_it_may_use_both_objects() {
+    for (large_share, included) in [(1.0, true), (0.0, false)] {
         with(&CAPACITY, &TrackingConfig { large_share, ..any_size() }, |instances, _| {
             instances.ingest(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
             instances.assign_matches(&[at(97.0)], &[]);
-            assert_eq!(instances.tracker.test_owner(0), MatchOwner::Ambiguous);
-            assert_eq!(instances.tracker.test_egomotion_includes(0), guides);
+            assert_eq!(instances.tracker.test_match_owner(0), MatchOwner::Ambiguous);
+            assert_eq!(instances.tracker.test_egomotion_includes(0), included);
         });
     }
 }

@@ -128,16 +128,16 @@ impl<'s> Instances<'s> {
 /// Calls `run` with instances and an estimator in a slab.
 pub(super) fn with<R>(capacity: &Capacity, config: &TrackingConfig, run: impl FnOnce(&mut Instances<'_>, &mut Estimator<'_>) -> R) -> R {
     let bytes = Instances::bytes(capacity) + Estimator::bytes(capacity);
-    let mut room = vec![0u8; bytes + SLAB_ALIGN];
-    let start = room.as_ptr().align_offset(SLAB_ALIGN);
-    let mut carver = Carver::new(&mut room[start..start + bytes], bytes).unwrap();
+    let mut slab = vec![0u8; bytes + SLAB_ALIGN];
+    let start = slab.as_ptr().align_offset(SLAB_ALIGN);
+    let mut carver = Carver::new(&mut slab[start..start + bytes], bytes).unwrap();
     let mut instances = Instances::new_in(capacity, config, &mut carver);
-    assert_eq!(carver.footprint().bytes(), Instances::bytes(capacity), "the formula is what is cut");
+    assert_eq!(carver.footprint().bytes(), Instances::bytes(capacity), "the formula is what is allocated");
     let mut estimator = Estimator::new_in(capacity, &mut carver);
     run(&mut instances, &mut estimator)
 }
 
-/// A rectangle of points square to the camera, with its place over time.
+/// A rectangle of points that faces the camera.
 pub(super) struct Board {
     pub class: Class,
     pub score: f32,
@@ -187,12 +187,12 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
         }
     }
 
-    /// Takes a frame: the camera at a place, each board at its (none: not seen).
+    /// Takes a frame: the camera's pose, and that of each board (`None`: not seen).
     pub fn step(&mut self, t_world_camera: Transform, boards: &[(&Board, Option<Transform>)]) -> InstancesReport {
         self.step_behind(t_world_camera, boards, &[])
     }
 
-    /// The same with boards in front of which no detector knows.
+    /// The same, with boards in front that the detector does not report.
     pub fn step_behind(
         &mut self,
         t_world_camera: Transform,

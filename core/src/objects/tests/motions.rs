@@ -8,12 +8,12 @@ fn ahead(frame: u32) -> [Transform; 2] {
     [shift(0.0, 0.0, 5.0 * t), shift(1.0, 0.3, 10.0 + 8.0 * t)]
 }
 
-fn run(board: &Board, frames: u32, place: impl Fn(u32) -> [Transform; 2]) -> Vec<TrackReport> {
+fn run(board: &Board, frames: u32, poses: impl Fn(u32) -> [Transform; 2]) -> Vec<TrackReport> {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         let mut run = Run::new(instances, estimator);
         (0..frames)
             .map(|frame| {
-                let [camera, car] = place(frame);
+                let [camera, car] = poses(frame);
                 run.step(camera, &[(board, Some(car))]);
                 run.track(1).unwrap()
             })
@@ -73,21 +73,21 @@ fn a_match_counts_only_from_mask_to_mask() {
         let (last, beyond) = (delete.left, delete.left - 1);
         run.instances.assign_matches(&[at(last, pixels.top + 5), at(beyond, pixels.top + 5), at(pixels.left + 5, pixels.top + 5)], &[]);
         assert_eq!(
-            [0, 1, 2].map(|at| run.instances.tracker.test_owner(at)),
+            [0, 1, 2].map(|at| run.instances.tracker.test_match_owner(at)),
             [MatchOwner::Instance(0), MatchOwner::None, MatchOwner::Instance(0)]
         );
         run.instances.assign_matches(&[Match { current_left: [f32::NAN, 5.0], ..Match::default() }], &[]);
-        assert_eq!(run.instances.tracker.test_owner(0), MatchOwner::None);
+        assert_eq!(run.instances.tracker.test_match_owner(0), MatchOwner::None);
     });
 }
 
 #[test]
-fn the_camera_listens_to_no_moving_car_and_to_no_large_one_of_unknown_state() {
-    let guides = |config: &TrackingConfig, frames: u32, place: &dyn Fn(u32) -> [Transform; 2], board: &Board| {
+fn egomotion_excludes_moving_cars_and_large_ones_of_unknown_state() {
+    let included = |config: &TrackingConfig, frames: u32, poses: &dyn Fn(u32) -> [Transform; 2], board: &Board| {
         with(&CAPACITY, config, |instances, estimator| {
             let mut run = Run::new(instances, estimator);
             for frame in 0..frames {
-                let [camera, car] = place(frame);
+                let [camera, car] = poses(frame);
                 run.step(camera, &[(board, Some(car))]);
             }
             let pixels = run.track(1).unwrap().pixels;
@@ -98,12 +98,12 @@ fn the_camera_listens_to_no_moving_car_and_to_no_large_one_of_unknown_state() {
     };
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)];
     let config = any_size();
-    assert!(!guides(&config, 6, &ahead, &Board::CAR), "known to move");
-    assert!(guides(&config, 6, &parked, &Board::CAR), "known to stand");
+    assert!(!included(&config, 6, &ahead, &Board::CAR), "known to move");
+    assert!(included(&config, 6, &parked, &Board::CAR), "known to stand");
     let small = Board { half_m: [0.9, 0.5], ..Board::CAR };
-    assert!(guides(&config, 1, &ahead, &small), "unknown and small");
+    assert!(included(&config, 1, &ahead, &small), "unknown and small");
     let large = Board { half_m: [2.5, 1.2], ..Board::CAR };
-    assert!(!guides(&config, 1, &ahead, &large), "unknown and large");
+    assert!(!included(&config, 1, &ahead, &large), "unknown and large");
 }
 
 #[test]
@@ -116,15 +116,15 @@ fn starting_and_stopping_show_within_five_frames() {
         29..=38 => 0.5 * f64::from(38 - frame),
         _ => 0.0,
     };
-    let place =
+    let poses =
         |frame: u32| [shift(0.0, 0.0, 0.3 * f64::from(frame)), shift(1.0, 0.3, 10.0 + (0..=frame).map(|n| 0.1 * speed(n)).sum::<f64>())];
-    let states: Vec<MotionState> = run(&Board::CAR, 50, place).iter().map(|track| track.state).collect();
+    let states: Vec<MotionState> = run(&Board::CAR, 50, poses).iter().map(|track| track.state).collect();
     let is = |state, range: core::ops::Range<usize>| range.clone().all(|frame| states[frame] == state);
     assert!(is(MotionState::Static, 4..9) && is(MotionState::Dynamic, 13..38) && is(MotionState::Static, 43..50), "{states:?}");
 }
 
 #[test]
-fn silhouettes_belong_to_nobody() {
+fn matches_on_the_silhouette_between_two_cars_are_ambiguous() {
     let mask = [1; 3600];
     let boxes = [PixelBox { left: 40, top: 30, width: 60, height: 60 }, PixelBox { left: 100, top: 30, width: 60, height: 60 }];
     with(&CAPACITY, &any_size(), |instances, _| {
@@ -132,7 +132,7 @@ fn silhouettes_belong_to_nobody() {
         instances.ingest(0, &cars, [WIDTH, HEIGHT]);
         let at = |u: f32| Match { current_left: [u, 60.0], ..Match::default() };
         instances.assign_matches(&[at(90.0), at(97.0), at(102.0), at(110.0)], &[]);
-        let of_match = |at| instances.tracker.test_owner(at);
+        let of_match = |at| instances.tracker.test_match_owner(at);
         assert_eq!([of_match(1), of_match(2)], [MatchOwner::Ambiguous; 2]);
         assert_ne!(of_match(0), of_match(3));
         assert!(of_match(0) != MatchOwner::Ambiguous && of_match(3) != MatchOwner::Ambiguous);
@@ -148,7 +148,7 @@ fn small_car(speed_m_s: f64) -> impl Fn(u32) -> [Transform; 2] {
 }
 
 #[test]
-fn a_small_thing_is_nothing_until_its_motion_is_measured_and_left_in_the_static_map_until_it_moves() {
+fn a_small_object_is_reported_once_its_motion_is_measured_and_masked_once_it_moves() {
     let config = TrackingConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..TrackingConfig::default() };
     for (speed_m_s, state) in [(8.0, MotionState::Dynamic), (0.0, MotionState::Static)] {
         with(&CAPACITY, &config, |instances, estimator| {
@@ -178,8 +178,8 @@ fn a_few_matches_on_what_hides_a_car_do_not_outweigh_its_own() {
             let mut run = Run::new(instances, estimator);
             for frame in 0..5 {
                 let t = f64::from(frame) * 0.1;
-                let (camera, car, stands) = (shift(0.0, 0.0, 2.0 * t), shift(0.3, 0.2, 28.0 + 8.0 * t), shift(0.04, 0.03, 4.0));
-                let posts = [(&post, Some(stands))];
+                let (camera, car, t_world_post) = (shift(0.0, 0.0, 2.0 * t), shift(0.3, 0.2, 28.0 + 8.0 * t), shift(0.04, 0.03, 4.0));
+                let posts = [(&post, Some(t_world_post))];
                 run.step_behind(camera, &[(&board, Some(car))], if with_post { &posts } else { &[] });
             }
             run.track(1).unwrap().speed_m_s.unwrap()[0]

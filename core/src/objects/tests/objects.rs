@@ -103,8 +103,8 @@ fn people_are_tracked_but_not_reconstructed() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         let mut run = Run::new(instances, estimator);
         for frame in 0..6 {
-            let [camera, place] = at(frame);
-            run.step(camera, &[(&walker, Some(place))]);
+            let [camera, t_world_walker] = at(frame);
+            run.step(camera, &[(&walker, Some(t_world_walker))]);
         }
         assert_eq!(run.track(1).unwrap().state, MotionState::Dynamic);
         assert_eq!(run.instances.objects().count(), 0);
@@ -144,12 +144,12 @@ fn a_short_ring_of_crops_keeps_the_latest_and_counts_the_rest() {
 #[test]
 fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_it_drove_off() {
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 14.0)];
-    for (place, state) in [(at as fn(u32) -> [Transform; 2], MotionState::Dynamic), (parked, MotionState::Static)] {
+    for (poses, state) in [(at as fn(u32) -> [Transform; 2], MotionState::Dynamic), (parked, MotionState::Static)] {
         with(&CAPACITY, &any_size(), |instances, estimator| {
             let mut run = Run::new(instances, estimator);
             let mut last = None;
             for frame in 0..16 {
-                let [camera, car] = place(frame);
+                let [camera, car] = poses(frame);
                 run.step(camera, &[(&Board::CAR, (frame < 6).then_some(car))]);
                 let track = run.track(1).unwrap();
                 let pose = run.instances.posed().next().map(|pose| pose.t_world_object);

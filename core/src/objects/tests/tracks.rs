@@ -27,7 +27,7 @@ fn two_cars_that_pass_each_other_keep_their_numbers() {
 }
 
 #[test]
-fn the_best_pair_goes_first_whoever_stands_first_in_the_list() {
+fn the_best_pair_is_associated_first_in_any_order() {
     with(&CAPACITY, &any_size(), |instances, _| {
         take(instances, 0, &[car(100)]);
         // The nearer one is the old one, though the other has the higher score and overlaps as well.
@@ -81,7 +81,7 @@ fn a_track_unseen_for_more_than_fifty_frames_is_forgotten() {
 }
 
 #[test]
-fn a_full_table_lets_the_one_unseen_for_longest_go_and_nobody_seen_lately() {
+fn a_full_table_evicts_the_track_unseen_for_longest_and_none_seen_lately() {
     with(&Capacity { tracks: 2, ..CAPACITY }, &any_size(), |instances, _| {
         take(instances, 0, &[car(20)]);
         take(instances, 1, &[car(120)]);
@@ -156,22 +156,22 @@ fn of_equals_the_first_detection_and_the_older_track_are_joined_and_each_once() 
 
 #[test]
 fn a_class_holds_until_others_were_seen_more_often() {
-    let heard = |classes: &[Class]| {
+    let voted = |classes: &[Class]| {
         with(&CAPACITY, &any_size(), |instances, _| {
-            let hear = |(frame, class): (u32, &Class)| {
+            let vote_class = |(frame, class): (u32, &Class)| {
                 take(instances, frame, &[Detection { class: *class, ..car(100) }]);
                 instances.tracks().next().unwrap().class
             };
-            (0..).zip(classes).map(hear).collect::<Vec<_>>()
+            (0..).zip(classes).map(vote_class).collect::<Vec<_>>()
         })
     };
     use Class::{Car, Truck, Van};
-    assert_eq!(heard(&[Car, Car, Truck, Car, Van, Truck]), [Car, Car, Car, Car, Car, Truck]);
-    assert_eq!(heard(&[Truck, Car, Car]), [Truck, Car, Car]);
+    assert_eq!(voted(&[Car, Car, Truck, Car, Van, Truck]), [Car, Car, Car, Car, Car, Truck]);
+    assert_eq!(voted(&[Truck, Car, Car]), [Truck, Car, Car]);
 }
 
 #[test]
-fn a_small_thing_that_grows_is_something_though_no_motion_was_measured() {
+fn a_small_object_that_grows_is_reported_though_no_motion_was_measured() {
     let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
     let grown = detection(Class::Car, 0.9, &PixelBox { left: 98, top: 28, width: 16, height: 16 }, &MASK[..256]);
     with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
@@ -180,12 +180,12 @@ fn a_small_thing_that_grows_is_something_though_no_motion_was_measured() {
 }
 
 #[test]
-fn what_a_pixel_shows_is_the_best_thing_whose_mask_holds_it() {
+fn a_pixel_shows_the_best_instance_whose_mask_contains_it() {
     with(&Capacity { tracks: 1, ..CAPACITY }, &any_size(), |instances, _| {
         let half: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 < 30)).collect();
         let walker = Detection { class: Class::Person, score: 0.5, ..car(100) };
         take(instances, 0, &[walker, Detection { mask: &half, ..car(100) }]);
-        let shown = |u| instances.instance_at(u, 50).map(|thing| (thing.class, thing.track));
+        let shown = |u| instances.instance_at(u, 50).map(|instance| (instance.class, instance.track));
         assert_eq!([shown(110), shown(140), shown(99)], [Some((Class::Car, Some(1))), Some((Class::Person, None)), None]);
     });
 }

@@ -77,7 +77,7 @@ fn each_crop_that_waited_is_fused_once() {
 }
 
 #[test]
-fn a_volume_lies_where_the_thing_is() {
+fn a_volume_lies_where_the_object_is() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         let mut run = Run::new(instances, estimator);
         for _ in 0..4 {
@@ -91,8 +91,8 @@ fn a_volume_lies_where_the_thing_is() {
 }
 
 #[test]
-fn what_counts_as_standing_is_put_where_it_was_seen_in_the_world() {
-    // Whatever it does, it counts as standing.
+fn a_static_object_is_fused_where_it_was_seen_in_the_world() {
+    // With these bounds every motion counts as static.
     let state = StateConfig { dynamic_m_s: 50.0, static_m_s: 50.0, slow_m_s: 50.0, ..StateConfig::default() };
     with(&Capacity { object_blocks: 2000, ..CAPACITY }, &TrackingConfig { state, ..any_size() }, |instances, estimator| {
         let mut run = Run::new(instances, estimator);
@@ -103,7 +103,7 @@ fn what_counts_as_standing_is_put_where_it_was_seen_in_the_world() {
         let mut layers: Vec<i16> = content(run.instances).0.iter().map(|at| at.z).collect();
         layers.sort_unstable();
         layers.dedup();
-        assert_eq!(layers, (19..=26).collect::<Vec<_>>(), "four places 80 cm apart");
+        assert_eq!(layers, (19..=26).collect::<Vec<_>>(), "four positions 80 cm apart");
     });
 }
 
@@ -141,12 +141,12 @@ fn cropped(disparity_px: impl Fn(i32) -> f64) -> Vec<i32> {
     let pixels = PixelBox { left: 20, top: 10, width: 60, height: 30 };
     let mut words = vec![0; 1000];
     let mut store = MaskStore::new(&mut words);
-    let place = store.alloc(pixels).unwrap();
-    (10..40).for_each(|v| store.set_row(&place, v, 20, &[1; 54]));
+    let mask = store.alloc(pixels).unwrap();
+    (10..40).for_each(|v| store.set_row(&mask, v, 20, &[1; 54]));
     let row: Vec<u16> = (0..WIDTH as i32).map(|u| (disparity_px(u - 20) * 256.0) as u16).collect();
     let disparity = row.repeat(HEIGHT);
     let mut crop = vec![7u16; pixels.area() as usize];
-    let kept = crop::crop(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &place, &mut crop);
+    let kept = crop::crop(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &mask, &mut crop);
     let columns = |row: &[u16]| (0..60).filter(|&u| row[u as usize] > 0).collect::<Vec<i32>>();
     let first = columns(&crop[..60]);
     assert!(crop.chunks_exact(60).all(|row| columns(row) == first));
@@ -179,7 +179,7 @@ fn what_the_matcher_lets_run_on_behind_an_edge_is_left_out_and_a_slope_is_not() 
 }
 
 #[test]
-fn a_thing_without_any_depth_leaves_nothing_to_wait_for() {
+fn an_object_without_depth_leaves_no_crop() {
     let mask = [1; 3600];
     let car = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 60, height: 60 }, &mask);
     with(&CAPACITY, &any_size(), |instances, estimator| {

@@ -32,19 +32,19 @@ impl Ground {
         let mut best: Option<(u32, Self)> = None;
         for step in -SLOPES..=SLOPES {
             let slope = SLOPE_STEP * f64::from(step);
-            let mut votes = [0u32; HEIGHTS];
+            let mut counts = [0u32; HEIGHTS];
             for [x, y, z] in lattice.points_below_horizon() {
                 if !(NEAR_M..=FAR_M).contains(&z) || libm::fabs(x) > SIDE_M {
                     continue;
                 }
                 let bin = (y - slope * z - HEIGHT_MIN_M) / HEIGHT_STEP_M;
                 if bin >= 0.0
-                    && let Some(vote) = votes.get_mut(bin as usize)
+                    && let Some(count) = counts.get_mut(bin as usize)
                 {
-                    *vote += 1;
+                    *count += 1;
                 }
             }
-            let pairs = votes.iter().zip(votes.iter().skip(1)).map(|(a, b)| a + b);
+            let pairs = counts.iter().zip(counts.iter().skip(1)).map(|(a, b)| a + b);
             for (bin, count) in (1..).zip(pairs) {
                 if count >= VOTES_MIN && best.is_none_or(|(most, _)| count > most) {
                     best = Some((count, Self { height_m: HEIGHT_MIN_M + HEIGHT_STEP_M * f64::from(bin), slope }));

@@ -293,7 +293,7 @@ fn merge(groups: Vec<Group, GROUPS_MAX>) -> Vec<Group, GROUPS_MAX> {
             other.members += group.members;
         } else {
             let pushed = merged.push(*group).is_ok();
-            debug_assert!(pushed, "there are no more than before");
+            debug_assert!(pushed, "merging does not add groups");
         }
     }
     merged

@@ -114,9 +114,9 @@ impl<'s> MotionSegmenter<'s> {
     }
 
     /// Groups what contradicts the static model and continues the hypotheses.
-    fn observe(&mut self, model: &StaticModel<'_>, camera: &CameraMotion, matches: &[Match], owner: &[OwnerCode]) -> SegmentationReport {
+    fn observe(&mut self, model: &StaticModel<'_>, camera: &CameraMotion, matches: &[Match], codes: &[OwnerCode]) -> SegmentationReport {
         let mut report = SegmentationReport::default();
-        let free = || matches.iter().zip(owner).map(|(m, owner)| (m, owner.get() == MatchOwner::None));
+        let free = || matches.iter().zip(codes).map(|(m, code)| (m, code.get() == MatchOwner::None));
         let (mut len, mut stride, mut count) = (0, 1, 0usize);
         for ((m, is_free), mark) in free().zip(self.is_candidate.iter_mut()) {
             *mark = 0;
@@ -186,7 +186,7 @@ impl Tracker<'_> {
         let Some(t_current_previous) = camera.t_current_previous.filter(|_| config.dynamic && config.segmentation.enabled) else { return };
         let bias_px = [config.motion.bias_px, config.motion.lens_px].map(f64::from);
         let model = StaticModel::new(&config.segmentation, rig, &t_current_previous, bias_px);
-        let mut report = self.segmenter.observe(&model, camera, matches.refined, self.owner);
+        let mut report = self.segmenter.observe(&model, camera, matches.refined, self.refined_owner);
         let lattice = Lattice::new(rig, disparity_q8);
         let ground = Ground::find(&lattice);
         let first = self.instances.all().len();

@@ -36,7 +36,7 @@ pub(super) struct StaticModel<'a> {
 /// A match whose point is known in both frames.
 #[derive(Clone, Copy)]
 pub(super) struct Residual {
-    /// Squared Mahalanobis distance from the static prediction; a bound above it where that is small enough.
+    /// Squared Mahalanobis distance from the static prediction; an upper bound of it where the bound suffices.
     pub chi_square: f64,
     /// Where the point is, in the current camera, m.
     pub point_m: Vector3<f64>,

@@ -212,21 +212,21 @@ fn a_detector_that_comes_later_takes_the_track_over() {
 fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
     let world = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.2 };
     let static_world = World { cars: vec![Car { motion: [0.0, 0.0], ..OVERTAKING }], step_m: 0.8, noise_px: 0.2 };
-    let mut hypotheses = vec![Hypothesis::default(); HYPOTHESES_MAX];
-    let mut followed = Hypotheses::new(&mut hypotheses);
+    let mut storage = vec![Hypothesis::default(); HYPOTHESES_MAX];
+    let mut hypotheses = Hypotheses::new(&mut storage);
     let config = SegmentationConfig::default();
     let model = |camera: &CameraMotion| StaticModel::new(&config, &RIG, &camera.t_current_previous.unwrap(), [0.25, 0.0]);
     let bytes = MotionSegmenter::bytes(&CAPACITY);
     let mut slab = vec![0u8; bytes + SLAB_ALIGN];
     let mut carver = Carver::new(&mut slab, bytes).unwrap();
     let mut segmenter = MotionSegmenter::new_in(&CAPACITY, &mut carver);
-    core::mem::swap(&mut segmenter.hypotheses, &mut followed);
+    core::mem::swap(&mut segmenter.hypotheses, &mut hypotheses);
     let mut confirmed = Vec::new();
     for frame in 1..9 {
         let shown = if frame < 4 { &world } else { &static_world };
         let (camera, matches) = (shown.camera(frame), shown.matches(frame));
-        let owner = vec![OwnerCode::default(); matches.len()];
-        segmenter.observe(&model(&camera), &camera, &matches, &owner);
+        let codes = vec![OwnerCode::default(); matches.len()];
+        segmenter.observe(&model(&camera), &camera, &matches, &codes);
         confirmed.push(segmenter.hypotheses.all().iter().filter(|hypothesis| hypothesis.is_confirmed()).count());
     }
     assert_eq!(confirmed, [0, 1, 1, 1, 1, 1, 0, 0]);
