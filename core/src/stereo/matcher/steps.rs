@@ -1,0 +1,192 @@
+//! The steps from a pair's gradients to its disparities, each on the matcher's buffers.
+
+use super::{ROWS, StereoMatcher};
+use crate::{
+    image::{DISPARITY_ONE_PX, InvalidPair, View},
+    parallel::{BANDS, Bands, Executor, each, zip3},
+    stereo::{
+        StereoConfig, StereoReport,
+        config::DISPARITY_LIMIT,
+        delaunay::{SupportPoint, Triangulation},
+        dense::{DenseBand, DenseMatching, NONE, WORKING_ONE_PX},
+        descriptor::Gradients,
+        filter_support, gaps,
+        gaps::Filling,
+        gradient, invalid, median, prior,
+        prior::{CellGrid, DisparitySet, PlaneCost},
+        smooth, speckle,
+        speckle::Scratch,
+        support,
+        support::{NO_MATCH, SupportMatching},
+    },
+};
+
+impl StereoMatcher<'_> {
+    pub(super) fn find_gradients<E: Executor>(
+        &mut self,
+        left: View<'_, u8>,
+        right: View<'_, u8>,
+        invalid: Option<&InvalidPair<'_>>,
+        executor: &E,
+    ) {
+        let (width, bands) = (self.width, Bands::of(self.height));
+        let [left_du, left_dv, right_du, right_dv] = split_planes(self.gradients, width * self.height);
+        let [left_invalid, right_invalid] = [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
+        for (image, invalid, du, dv) in [(left, left_invalid, left_du, left_dv), (right, right_invalid, right_du, right_dv)] {
+            let jobs = zip3(bands.first(), bands.split_mut(du, width), bands.split_mut(dv, width));
+            each(executor, jobs, |(first, du, dv)| gradient::gradients(image, first, du, dv));
+            if let Some(invalid) = invalid {
+                invalid::flatten(invalid, width, du);
+                invalid::flatten(invalid, width, dv);
+            }
+        }
+    }
+
+    pub(super) fn match_support<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+        let [left, right] = gradients(self.gradients, self.width, self.height);
+        let (columns, rows) =
+            (support::candidates(self.width, config.candidate_step), support::candidates(self.height, config.candidate_step));
+        let bands = Bands::of(rows);
+        let matching = SupportMatching { config, left, right };
+        let jobs = zip3(bands.first(), bands.split_mut(self.support, columns), Bands::of(BANDS).split_mut(self.rows, ROWS * self.width));
+        each(executor, jobs, |(first, grid, scratch)| matching.match_rows(first, grid, scratch));
+        let grid = self.support.get(..columns * rows).unwrap_or(&[]);
+        report.candidates = grid.len() as u32;
+        report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
+    }
+
+    pub(super) fn filter_support_points(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+        let step = config.candidate_step;
+        let (columns, rows) = (support::candidates(self.width, step), support::candidates(self.height, step));
+        let Some(grid) = self.support.get_mut(..columns * rows) else { return };
+        report.implausible = filter_support::remove_implausible(config, grid, columns, self.support_before);
+        report.redundant = filter_support::remove_redundant(config, grid, columns);
+        self.left_mesh.clear();
+        self.right_mesh.clear();
+        for (j, row) in grid.chunks_exact(columns.max(1)).enumerate() {
+            for (i, &disparity) in row.iter().enumerate().filter(|(_, d)| **d != NO_MATCH) {
+                let (u, v, disparity) = ((i * step) as u16, (j * step) as u16, disparity as u16);
+                self.left_mesh.add(SupportPoint { u, v, disparity });
+                report.occluded_right += u32::from(self.right_mesh.add(SupportPoint { u: u - disparity, v, disparity }));
+            }
+        }
+        report.support_points = self.left_mesh.points().len() as u32;
+    }
+
+    pub(super) fn triangulate<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+        let columns = prior::cells(self.width, config.grid_size);
+        let cells = columns * prior::cells(self.height, config.grid_size);
+        let prepare = |mesh: &mut Triangulation<'_>, sets: &mut [DisparitySet]| {
+            mesh.triangulate();
+            prior::mark_cells(config, mesh.points(), columns, sets.get_mut(..cells).unwrap_or(&mut []));
+        };
+        executor.join(|| prepare(&mut self.left_mesh, self.left_cells), || prepare(&mut self.right_mesh, self.right_cells));
+        report.triangles_left = self.left_mesh.triangle_count() as u32;
+        report.triangles_right = self.right_mesh.triangle_count() as u32;
+    }
+
+    pub(super) fn match_densely<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+        let (width, bands) = (self.width, Bands::of(self.height));
+        let columns = prior::cells(width, config.grid_size);
+        let matching = DenseMatching {
+            config,
+            gradients: gradients(self.gradients, width, self.height),
+            cells: [CellGrid { cells: self.left_cells, columns }, CellGrid { cells: self.right_cells, columns }],
+            cost: PlaneCost::new(config),
+        };
+        let disparity: &mut [i16] = bytemuck::cast_slice_mut(self.disparity);
+        let images = zip3(bands.first(), bands.split_mut(disparity, width), bands.split_mut(self.other, width));
+        let scratch = Bands::of(BANDS).split_mut(self.rows, ROWS * width);
+        let mut jobs = [(); BANDS].map(|()| None);
+        for ((job, (first, left, right)), scratch) in jobs.iter_mut().zip(images).zip(scratch) {
+            *job = Some(DenseBand { first, left, right, scratch, counts: [0; 2] });
+        }
+        let (left_mesh, right_mesh) = (&self.left_mesh, &self.right_mesh);
+        each(executor, jobs.each_mut(), |band| {
+            if let Some(band) = band {
+                prior::rasterise_planes(left_mesh, config.plane_slope_max, band.first, width, band.left);
+                prior::rasterise_planes(right_mesh, config.plane_slope_max, band.first, width, band.right);
+                matching.match_band(band);
+            }
+        });
+        for [matched, inconsistent] in jobs.iter().flatten().map(|band| band.counts) {
+            report.matched += matched;
+            report.inconsistent += inconsistent;
+        }
+    }
+
+    pub(super) fn remove_speckles(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+        let similarity = working(config.speckle_similarity);
+        let image = image_of(self.disparity, self.width * self.height);
+        let scratch = Scratch {
+            runs: bytemuck::cast_slice_mut(self.gradients),
+            ends: bytemuck::cast_slice_mut(self.other),
+            flags: bytemuck::cast_slice_mut(self.columns),
+        };
+        report.speckles = speckle::remove_speckles(image, self.width, similarity, config.speckle_size, scratch);
+    }
+
+    pub(super) fn fill_gaps(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+        let filling = Filling { width: config.gap_width, discontinuity: working(config.gap_discontinuity) as u16 };
+        let image = image_of(self.disparity, self.width * self.height);
+        report.filled = gaps::fill_rows(image, self.width, filling) + gaps::fill_columns(image, self.width, filling, self.columns);
+    }
+
+    pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
+        let (width, pixels, bands) = (self.width, self.width * self.height, Bands::of(self.height));
+        let image = image_of(self.disparity, pixels);
+        let other = self.other.get_mut(..pixels).unwrap_or(&mut []);
+        if config.adaptive_mean {
+            let rows = zip3(bands.first(), bands.split_mut(image, width), bands.split_mut(other, width));
+            each(executor, rows, |(_, from, to)| smooth::mean_along_rows(from, width, to));
+            let columns = zip3(bands.first(), bands.split_mut(image, width), [(); BANDS]);
+            each(executor, columns, |(first, to, ())| smooth::mean_along_columns(other, width, first, to));
+        }
+        if config.median {
+            other.iter_mut().zip(&*image).for_each(|(to, from)| *to = *from);
+            let rows = zip3(bands.first(), bands.split_mut(image, width), [(); BANDS]);
+            each(executor, rows, |(first, to, ())| median::median(other, width, first, to));
+        }
+    }
+
+    /// Turns working units into the result's.
+    pub(super) fn finish(&mut self, invalid: Option<&InvalidPair<'_>>, report: &mut StereoReport) {
+        let disparities = self.disparity.get_mut(..self.width * self.height).unwrap_or(&mut []);
+        for disparity in disparities.iter_mut() {
+            let working = *disparity as i16;
+            // Smoothed values stay between those they come from: 0..=255 px.
+            *disparity = if working == NONE { 0 } else { working as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16) };
+        }
+        if let Some(invalid) = invalid {
+            invalid::remove(invalid, self.width, disparities);
+        }
+        report.valid = disparities.iter().filter(|disparity| **disparity != 0).count() as u32;
+    }
+}
+
+/// Whole px in working units, held at the largest difference two disparities can have.
+fn working(px: u16) -> i16 {
+    px.min(DISPARITY_LIMIT) as i16 * WORKING_ONE_PX
+}
+
+/// The first `pixels` of the disparity region as working units.
+fn image_of(disparity: &mut [u16], pixels: usize) -> &mut [i16] {
+    bytemuck::cast_slice_mut(disparity).get_mut(..pixels).unwrap_or(&mut [])
+}
+
+/// The gradient region as four images: horizontal and vertical gradient of the left image, then of the right one.
+fn split_planes(gradients: &mut [u32], pixels: usize) -> [&mut [u8]; 4] {
+    let mut planes = bytemuck::cast_slice_mut::<u32, u8>(gradients).chunks_exact_mut(pixels.max(1));
+    [(); 4].map(|()| planes.next().unwrap_or(&mut []))
+}
+
+/// The gradients of both images.
+fn gradients(region: &[u32], width: usize, height: usize) -> [Gradients<'_>; 2] {
+    let mut planes = bytemuck::cast_slice::<u32, u8>(region).chunks_exact((width * height).max(1));
+    [(); 2].map(|()| Gradients {
+        du: planes.next().unwrap_or(&[]),
+        dv: planes.next().unwrap_or(&[]),
+        width,
+        height,
+    })
+}
