@@ -4,9 +4,9 @@
 //! same bits on every machine. The pipeline is that of Bârsan, Liu, Pollefeys, Geiger, *Robust Dense Mapping for Large-Scale Dynamic
 //! Environments* (ICRA 2018).
 //!
-//! Data flows one way: [`memory`], [`image`] and [`geometry`] are the ground; [`stereo`] and [`scene_flow`] stand on them;
-//! [`egomotion`] on `scene_flow`; [`volume`] on the ground alone; [`tracking`] on `egomotion` and [`masks`], [`objects`] on
-//! `tracking` and `volume`; [`mapper`] is the roof and the only one that knows them all.
+//! Dependencies run one way: [`memory`], [`image`] and [`geometry`] depend on no stage; [`stereo`], [`scene_flow`] and [`volume`]
+//! depend on them; [`egomotion`] on `scene_flow`; [`tracking`] on `egomotion` and [`masks`]; [`objects`] on `tracking` and `volume`.
+//! Only [`mapper`] depends on every stage.
 #![no_std]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
 

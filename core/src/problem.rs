@@ -1,4 +1,4 @@
-//! What can be wrong with a configuration. A leaf: every stage's settings use it, and it knows none of them.
+//! Problems of a configuration. Every stage's settings use this module; it depends on none of them.
 
 use core::fmt;
 use heapless::Vec;
@@ -6,7 +6,7 @@ use heapless::Vec;
 /// Most problems a validation reports at once.
 pub const MAX_PROBLEMS: usize = 32;
 
-/// One thing wrong with a configuration.
+/// One problem of a configuration.
 ///
 /// ```
 /// use dynvox_core::view::MeshConfig;

@@ -10,7 +10,7 @@ const HEIGHT: usize = 96;
 pub struct Pair([Vec<u8>; 2]);
 
 impl Pair {
-    /// Frame `number` of a drive that starts 9 m away from the wall.
+    /// Frame `number` of a run that starts 9 m away from the wall.
     pub fn new(number: u32) -> Self {
         let m_per_px = (9.0 - 0.2 * f64::from(number)) / RIG.focal_px;
         let image = |camera_x_m: f64| {

@@ -59,7 +59,7 @@ fn plainly_mixed(x: u64) -> u64 {
 }
 
 #[test]
-fn is_what_the_definition_says_whatever_the_length() {
+fn equals_the_definition_at_every_length() {
     let noise = planes()[4];
     for len in 0..=512 {
         assert_eq!(of_bytes(&noise[..len]), plain(&noise[..len]), "{len} bytes");
@@ -237,9 +237,9 @@ fn tells_lengths_and_orders_apart_and_makes_nan_one() {
     let run: fn(&mut Digest) = |d| d.bytes(&[5; 64]);
     let value: fn(&mut Digest) = |d| d.u64(64);
     let orders = [[run, run, value], [run, value, run], [value, run, run]];
-    all_different(orders.iter().map(|order| of(|d| order.iter().for_each(|enter| enter(d)))).collect());
-    let cuts = (0..=128).map(|cut| of(|d| [&[5; 128][..cut], &[5; 128][cut..]].iter().for_each(|part| d.bytes(part))));
-    all_different(cuts.collect());
+    all_different(orders.iter().map(|order| of(|d| order.iter().for_each(|append| append(d)))).collect());
+    let splits = (0..=128).map(|at| of(|d| [&[5; 128][..at], &[5; 128][at..]].iter().for_each(|part| d.bytes(part))));
+    all_different(splits.collect());
     assert_eq!(of(|d| d.f64(f64::NAN)), of(|d| d.f64(-f64::NAN)));
     assert_eq!(of(|d| d.f32s([f32::NAN, 1.0])), of(|d| d.f32s([-f32::NAN, 1.0])));
     assert_ne!(of(|d| d.f64(0.0)), of(|d| d.f64(-0.0)));

@@ -3,7 +3,7 @@
 use super::StereoRig;
 use crate::image::{DISPARITY_ONE_PX, View, ViewMut};
 
-/// Turns disparity (1/256 px, 0 none) into depth in metres, 0 where there is none or it lies outside `near_m..=far_m`.
+/// Turns disparity (1/256 px, 0 none) into depth in metres, 0 where disparity is unknown or depth outside `near_m..=far_m`.
 /// Images of different sizes are turned as far as both reach.
 ///
 /// ```

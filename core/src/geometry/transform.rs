@@ -73,7 +73,7 @@ impl Transform {
         (Self::new([a, b, c], [x, y, z]) * *self).normalized()
     }
 
-    /// The same motion with its quaternion brought back to length 1: long products drift.
+    /// The same motion with its quaternion rescaled to length 1: long products accumulate rounding errors.
     #[must_use]
     pub fn normalized(&self) -> Self {
         let [x, y, z, w] = self.rotation;

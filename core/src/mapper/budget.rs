@@ -1,8 +1,8 @@
 //! A capacity for a given number of bytes and a given image: what the profiles are for four cases, for all others.
 //!
 //! The rules, in order. What the image needs comes first and follows from its pixels alone (see [`Capacity::for_budget`]). Of the rest at
-//! most a fifth goes to volumes of objects, in steps; all that remains is blocks of the static map, since they decide how far a drive goes
-//! before blocks leave the pool. The result never exceeds the budget, and one block more would.
+//! most a fifth goes to volumes of objects, in steps; all that remains is blocks of the static map, since they decide how far a run
+//! gets before blocks leave the pool. The result never exceeds the budget, and one block more would.
 
 use super::{MIN_HEIGHT, MIN_WIDTH};
 use crate::memory::Capacity;
@@ -271,7 +271,7 @@ impl<'o> Question<'o> {
         self.with_blocks(&capacity, fitting)
     }
 
-    /// The same with so many blocks, of which at most four in five are visible at once.
+    /// The same with so many blocks; at most four in five of them are visible at once.
     fn with_blocks(&self, capacity: &Capacity, blocks: usize) -> Capacity {
         let most = blocks - blocks / 5;
         Capacity {

@@ -1,11 +1,11 @@
-//! A digest of each stage's outcome, so that two runs that part can be told apart by where they part.
+//! A digest of each stage's outcome: the first that differs names the stage at which two runs diverge.
 //!
-//! The stages stand in the order data flows. The first whose digests differ is where two runs part: what stands before it is equal, what
-//! follows stands on it. One step is not in the list of its own: which detection continues which track is decided before the camera's motion
-//! and told by the tracks' digest, behind it.
+//! Stages are listed in the order data flows. Every stage before the first difference is equal; every stage after it depends on it. The
+//! association of detections with tracks has no digest of its own: it runs before the camera's motion and is part of the tracks' digest,
+//! which comes later in the list.
 //!
 //! Memory: 8 bytes a stage and 16 an object. Time: a multiplication for each 8 bytes of images, disparity, matches and masks; of volumes only
-//! blocks that changed are looked at.
+//! blocks that changed are read.
 
 use crate::{digest::Digest, objects::MAX_OBJECTS};
 use core::fmt;
@@ -79,7 +79,7 @@ impl ObjectDigests {
     }
 }
 
-/// `3:00112233aabbccdd;7:…` by id, or `-` where there is none.
+/// `3:00112233aabbccdd;7:…` by id, or `-` without objects.
 impl fmt::Display for ObjectDigests {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (at, object) in self.iter().enumerate() {

@@ -28,16 +28,16 @@ pub struct StereoFrame<'a> {
     pub colour: Option<View<'a, [u8; 3]>>,
     /// Semantic class of each left pixel, an index into `VolumeConfig::class_weight`; all weights are 1 where it is absent.
     pub class: Option<View<'a, u8>>,
-    /// Disparity of each left pixel in 1/256 px, 0 none, from elsewhere: it takes the place of the pair's own. Motion still needs both
+    /// Disparity of each left pixel in 1/256 px, 0 none, from elsewhere: it replaces the pair's own. Motion still needs both
     /// images. Values no pair of this width can have are refused and counted.
     pub disparity_q8: Option<View<'a, u16>>,
-    /// Where the left camera is, camera to world, from elsewhere: it takes the place of the camera's own egomotion. Give it with every frame,
+    /// Where the left camera is, camera to world, from elsewhere: it replaces the camera's own egomotion. Give it with every frame,
     /// in one world.
     pub t_world_camera: Option<Transform>,
     /// When the pair was taken, ns since any moment that stays the same: later than that of the frame before. Where two frames in a row have
     /// it, objects move by the true time between them; else by `frame_interval_s` of the configuration.
     pub time_ns: Option<u64>,
-    /// What a detector saw in the left image, in any order; empty where there is none.
+    /// What a detector saw in the left image, in any order; empty without a detector.
     pub detections: &'a [Detection<'a>],
 }
 

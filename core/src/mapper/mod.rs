@@ -214,12 +214,12 @@ impl<'s> Mapper<'s> {
         Ok(size)
     }
 
-    /// Ends a drive: prunes what is still in the window. Objects are lost; see [`Mapper::finish_with`].
+    /// Ends a run: prunes what is still in the window. Objects are lost; see [`Mapper::finish_with`].
     pub fn finish(&mut self) -> PruneReport {
         self.finish_with(&mut NoSink)
     }
 
-    /// As [`Mapper::finish`], with a sink for the objects there still are.
+    /// As [`Mapper::finish`], with a sink for the remaining objects.
     pub fn finish_with<O: ObjectSink>(&mut self, objects: &mut O) -> PruneReport {
         self.objects.finish(objects);
         self.background.finish()

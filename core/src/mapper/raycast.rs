@@ -33,8 +33,8 @@ impl<'s> Mapper<'s> {
     }
 
     /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is nearest (the compositing of Section
-    /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of [`Mapper::posed_objects`]. Time: that of one raycast and
-    /// of one more for each object, of which there are at most [`crate::objects::MAX_OBJECTS`].
+    /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of [`Mapper::posed_objects`]. Time: one raycast, and
+    /// one more for each object; there are at most [`crate::objects::MAX_OBJECTS`].
     pub fn raycast_composed<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(t_world_camera)?;
         executor.stage(Stage::Raycast, || {

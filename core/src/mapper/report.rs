@@ -140,7 +140,7 @@ impl Report {
         Self { digests: StageDigests { input, ..self.digests }, rectification, digest, ..self }
     }
 
-    /// Features and matches for which there was no room.
+    /// Features and matches beyond the capacity.
     pub fn dropped_features(&self) -> u32 {
         let flow = &self.scene_flow;
         flow.left.dropped + flow.right.dropped + flow.sparse.dropped + flow.dense.dropped

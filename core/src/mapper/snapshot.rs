@@ -1,4 +1,4 @@
-//! A mapper's state as bytes: what a run needs to go on as if it had never stopped.
+//! A mapper's state as bytes: all that a resumed run needs to give the results of an uninterrupted one.
 //!
 //! Each struct describes its state once (the module `state`); the description that is hashed into each
 //! step's digests is the one that is written here and read back. What can be rebuilt is not stored:

@@ -1,4 +1,4 @@
-//! One frame: the loop of the paper (Section III), a line or two per stage, each of which returns what the next one takes.
+//! One frame: the loop of the paper (Section III), a line or two per stage; each stage returns what the next one takes.
 
 use super::{
     BlockCount, Config, Mapper, ObjectDigest, ObjectDigests, PoseOrigin, Report, StageDigests, StepError, StereoFrame,

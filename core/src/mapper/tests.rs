@@ -1,7 +1,7 @@
-//! The mapper as a whole, in a room of which everything is known.
+//! The mapper as a whole, in a scene with known geometry.
 
-mod drives;
 mod mutations;
+mod random_runs;
 mod raw;
 mod resume;
 mod self_calibration;
@@ -19,7 +19,7 @@ use std::{vec, vec::Vec};
 
 const CAPACITY: Capacity = Capacity { image_width: WIDTH, image_height: HEIGHT, blocks: 4_000, ..Capacity::TINY };
 
-/// A walk through the room past something that is taken for a standing car.
+/// A walk through the scene past a patch that the detector takes for a parked car.
 struct Walk {
     pairs: Vec<[Vec<u8>; 2]>,
     mask: Vec<u8>,

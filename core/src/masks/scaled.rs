@@ -2,7 +2,7 @@
 
 use super::{MaskHandle, MaskStore, PixelBox};
 
-/// A mask scaled about the centre of its box: a bilinear resize of a 0/1 image of which a pixel counts if its value is 1, in integers. Not
+/// A mask scaled about the centre of its box: a bilinear resize of a 0/1 image, in integers; a pixel belongs to it if its value is 1. Not
 /// a dilation: a corner cut out of the mask is cut out of the scaled one, larger.
 #[derive(Clone, Copy, Debug)]
 pub struct ScaledMask<'m, 's> {
@@ -41,13 +41,13 @@ impl<'m, 's> ScaledMask<'m, 's> {
         if v < scaled.top || v - scaled.top >= scaled.height {
             return;
         }
-        let (whole, lead) = (self.mask.is_box(), from.left - self.mask.origin());
+        let (is_box, first_bit) = (self.mask.is_box(), from.left - self.mask.origin());
         let [above, below] = sources(v - scaled.top, from.height, scaled.height).map(|row| self.store.row(&self.mask, from.top + row));
         // Columns between which a pixel lies are within the box.
         let set = |column: i32| {
-            let at = (lead + column) as usize;
+            let at = (first_bit + column) as usize;
             let both = |(above, below): (&u64, &u64)| (above & below) >> (at % 64) & 1 == 1;
-            whole || above.get(at / 64).zip(below.get(at / 64)).is_some_and(both)
+            is_box || above.get(at / 64).zip(below.get(at / 64)).is_some_and(both)
         };
         let (first, last) = (scaled.left.max(0), (scaled.left + scaled.width).min(width));
         for (u, [before, after]) in (first..last).zip(Sources::begin(first - scaled.left, from.width, scaled.width)) {

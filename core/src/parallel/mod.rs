@@ -54,7 +54,7 @@ pub trait Executor: Sync {
     }
 }
 
-/// One thing after the other, on the caller's thread.
+/// Runs jobs one after the other, on the caller's thread.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Serial;
 

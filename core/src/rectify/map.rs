@@ -40,9 +40,9 @@ impl Packing {
         Self { fraction_u, fraction_v, row_bits: whole_v + fraction_v }
     }
 
-    /// The entry of a place in the raw image; [`NONE`] outside it.
+    /// The entry of a point in the raw image; [`NONE`] outside it.
     ///
-    /// All four neighbours of an entry lie within the image: a place in the last column is moved left by the smallest step there is, one in
+    /// All four neighbours of an entry lie within the image: a point in the last column is moved left by the smallest step there is, one in
     /// the last row up.
     fn entry(&self, camera: &RawCamera, [u, v]: [f64; 2]) -> u32 {
         let [last_u, last_v] = [camera.width - 1, camera.height - 1];
@@ -61,7 +61,7 @@ impl Packing {
 
     /// Column, row and weights of their right and lower neighbours.
     #[inline(always)]
-    fn place(&self, entry: u32) -> ([usize; 2], [u32; 2]) {
+    fn unpack(&self, entry: u32) -> ([usize; 2], [u32; 2]) {
         let (u, v) = (entry >> self.row_bits, entry & ((1 << self.row_bits) - 1));
         let weights = [u & ((1 << self.fraction_u) - 1), v & ((1 << self.fraction_v) - 1)];
         ([(u >> self.fraction_u) as usize, (v >> self.fraction_v) as usize], weights)
@@ -78,8 +78,8 @@ pub(super) fn fill(map: &mut [u32], width: usize, camera: &TurnedCamera, rig: &S
     let packing = Packing::of(&camera.raw);
     for (v, row) in map.chunks_exact_mut(width.max(1)).enumerate() {
         for (u, entry) in row.iter_mut().enumerate() {
-            let place = camera.raw_pixel(rig, [u as f64, v as f64]);
-            *entry = place.map_or(NONE, |place| packing.entry(&camera.raw, place));
+            let raw = camera.raw_pixel(rig, [u as f64, v as f64]);
+            *entry = raw.map_or(NONE, |raw| packing.entry(&camera.raw, raw));
         }
     }
 }
@@ -120,7 +120,7 @@ pub(super) fn remap<T: Sample>(map: &[u32], camera: &RawCamera, raw: &View<'_, T
     // From a pixel to its right lower neighbour, both included.
     let span = stride + 2;
     for (out, &entry) in out.iter_mut().zip(map) {
-        let ([u, v], weights) = packing.place(entry);
+        let ([u, v], weights) = packing.unpack(entry);
         // [`NONE`] names the last column and row there could be: what follows does not lie within the image.
         let window = data.get(v * stride + u..).and_then(|rest| rest.get(..span));
         *out = match window.map(|window| (window.first_chunk::<2>(), window.last_chunk::<2>())) {

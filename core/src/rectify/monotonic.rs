@@ -2,14 +2,14 @@
 
 /// Most Newton steps of the inverse. Each is at most half as long as the one before, so that as many leave less than a rounding error.
 pub const MAX_STEPS: usize = 64;
-/// Places at which [`growing_until`] looks.
-const PLACES: u32 = 512;
+/// Points at which [`growing_until`] evaluates the function.
+const POINTS: u32 = 512;
 
-/// The last of [`PLACES`] places between 0 and `end`, moved by `place`, up to which `value` grows from one to the next.
-pub(super) fn growing_until(end: f64, place: impl Fn(f64) -> f64, value: impl Fn(f64) -> f64) -> f64 {
+/// The last of [`POINTS`] points between 0 and `end`, each mapped by `point`, up to which `value` grows from one to the next.
+pub(super) fn growing_until(end: f64, point: impl Fn(f64) -> f64, value: impl Fn(f64) -> f64) -> f64 {
     let (mut last, mut before) = (0.0, value(0.0));
-    for step in 1..=PLACES {
-        let at = place(end * f64::from(step) / f64::from(PLACES));
+    for step in 1..=POINTS {
+        let at = point(end * f64::from(step) / f64::from(POINTS));
         let here = value(at);
         // Written so that NaN ends it.
         let grows = here > before && here.is_finite();

@@ -38,7 +38,7 @@ pub enum RectifierError {
 impl fmt::Display for RectifierError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::RawTooLarge { width: 0, .. } => f.write_str("the capacity has no room for raw images: set its raw_width and raw_height"),
+            Self::RawTooLarge { width: 0, .. } => f.write_str("the capacity holds no raw images: set its raw_width and raw_height"),
             Self::RawTooLarge { width, height } => {
                 write!(f, "the raw images are larger than the capacity allows: at most {width} x {height} px")
             }
@@ -86,7 +86,7 @@ impl Camera<'_> {
     }
 }
 
-/// Room for the rectified images. Apart from the [`Rectifier`], so that a mapper can lend them to its stages.
+/// Memory of the rectified images. Separate from the [`Rectifier`], so that a mapper can lend them to its stages.
 #[derive(Debug, Default)]
 pub struct RectifiedImages<'s> {
     left: &'s mut [u8],

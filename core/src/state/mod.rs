@@ -9,7 +9,7 @@
 //! All numbers are little-endian and of a stated width, so the bytes are the same on every machine.
 //! What can be rebuilt is not visited: a `rebuild` method follows a reading.
 //!
-//! A visit that failed goes on without effect; whoever began it asks in the end.
+//! A visit that failed continues without effect; the caller checks for failure at the end.
 
 mod checksum;
 mod hash;

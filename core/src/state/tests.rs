@@ -10,14 +10,14 @@ struct Everything {
     numbers: [u32; 2],
     signed: i32,
     wide: u64,
-    half: f32,
-    whole: f64,
+    single: f32,
+    double: f64,
     row: [i16; 70],
     column: [u16; 3],
     used: usize,
     kind: bool,
     maybe: Option<u32>,
-    place: Transform,
+    pose: Transform,
 }
 
 impl Everything {
@@ -27,14 +27,14 @@ impl Everything {
             numbers: [0; 2],
             signed: 0,
             wide: 0,
-            half: 0.0,
-            whole: 0.0,
+            single: 0.0,
+            double: 0.0,
             row: [0; 70],
             column: [0; 3],
             used: 0,
             kind: false,
             maybe: None,
-            place: Transform::IDENTITY,
+            pose: Transform::IDENTITY,
         }
     }
 
@@ -44,31 +44,44 @@ impl Everything {
             numbers: [7, u32::MAX],
             signed: -5,
             wide: 1 << 60,
-            half: -0.0,
-            whole: 1e-300,
+            single: -0.0,
+            double: 1e-300,
             row: core::array::from_fn(|at| -(at as i16)),
             column: [1, 2, 65_535],
             used: 9,
             kind: true,
             maybe: Some(4),
-            place: Transform { translation_m: [1.0, 2.0, 3.0], ..Transform::IDENTITY },
+            pose: Transform { translation_m: [1.0, 2.0, 3.0], ..Transform::IDENTITY },
         }
     }
 
     fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { byte, numbers, signed, wide, half, whole, row, column, used, kind, maybe, place } = self;
+        let Self {
+            byte,
+            numbers,
+            signed,
+            wide,
+            single,
+            double,
+            row,
+            column,
+            used,
+            kind,
+            maybe,
+            pose,
+        } = self;
         visitor.u8(byte);
         visitor.u32s(numbers);
         visitor.i32(signed);
         visitor.u64(wide);
-        visitor.f32(half);
-        visitor.f64(whole);
+        visitor.f32(single);
+        visitor.f64(double);
         visitor.i16s(row);
         visitor.u16s(column);
         visitor.count(used, 10);
         visitor.code(kind, u32::from, |code| code == 1);
         visitor.option(maybe, || 0, Visitor::u32);
-        visitor.transform(place);
+        visitor.transform(pose);
     }
 }
 
@@ -116,14 +129,14 @@ fn every_field_is_in_the_digest() {
         |value| value.numbers[1] ^= 1,
         |value| value.signed ^= 1,
         |value| value.wide ^= 1,
-        |value| value.half = 0.0,
-        |value| value.whole = 0.0,
+        |value| value.single = 0.0,
+        |value| value.double = 0.0,
         |value| value.row[69] ^= 1,
         |value| value.column[2] ^= 1,
         |value| value.used += 1,
         |value| value.kind = false,
         |value| value.maybe = None,
-        |value| value.place.translation_m[0] = 0.0,
+        |value| value.pose.translation_m[0] = 0.0,
     ];
     for (at, change) in change.iter().enumerate() {
         let mut changed = Everything::some();

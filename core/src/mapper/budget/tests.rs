@@ -81,9 +81,9 @@ fn any_question_is_answered_within_its_budget_or_refused_with_a_least_that_works
 
 #[test]
 fn a_larger_budget_maps_at_least_as_far() {
-    let drive =
+    let capacity_of =
         |mib: usize| solve(mib * MIB, (640, 480), &BudgetOptions { colour: Some(false), objects: Some(2), ..BudgetOptions::default() });
-    let blocks: std::vec::Vec<usize> = (50..300).step_by(10).map(|mib| drive(mib).unwrap().blocks).collect();
+    let blocks: std::vec::Vec<usize> = (50..300).step_by(10).map(|mib| capacity_of(mib).unwrap().blocks).collect();
     assert!(blocks.is_sorted(), "{blocks:?}");
 }
 

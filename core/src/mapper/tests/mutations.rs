@@ -1,4 +1,4 @@
-//! One bit of one thing changes: the digest changes, and the first difference names the stage that the thing belongs to.
+//! One bit of the state changes: the digest changes, and the first difference names the stage that the bit belongs to.
 
 use super::*;
 use crate::mapper::Digested;
@@ -6,7 +6,7 @@ use crate::mapper::Digested;
 /// Frames after which the car has a volume.
 const FRAMES: usize = 7;
 
-/// Changes something after the last frame, and says which stage its digests say it was.
+/// Applies `change` after the last frame and returns the stage that the digests name.
 fn named(change: impl Fn(&mut Mapper<'_>)) -> Option<Digested> {
     let walk = Walk::new(FRAMES);
     with_mapper(&walk, FRAMES, |mapper, reports| named_by(&walk, mapper, reports, change))

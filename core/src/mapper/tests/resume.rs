@@ -1,4 +1,4 @@
-//! A drive stopped and resumed is the drive that never stopped; what is no whole snapshot of this mapper is refused.
+//! A stopped and resumed run equals the uninterrupted run; anything but a complete snapshot of this mapper is refused.
 
 use super::*;
 use crate::mapper::snapshot;
@@ -256,18 +256,18 @@ fn a_flip_of_any_byte_is_refused_by_name() {
         assert!(named, "byte {at} of {len}, bit {bit}: {refused:?}");
         bytes[at] ^= 1 << bit;
     }
-    assert_eq!(refusal(&bytes), None, "and whole it is taken");
+    assert_eq!(refusal(&bytes), None, "the complete snapshot is accepted");
     println!("{len} bytes of a snapshot, a bit of each flipped");
 }
 
 #[test]
-fn a_sink_that_fails_is_told_of() {
+fn the_error_of_a_failing_sink_is_returned() {
     let walk = Walk::new(2);
     with_mapper(&walk, 2, |mapper, _| {
-        let mut room = 1_000;
+        let mut space = 1_000;
         let full = mapper.save(&mut |piece: &[u8]| {
-            room -= piece.len().min(room);
-            if room > 0 { Ok(()) } else { Err("full") }
+            space -= piece.len().min(space);
+            if space > 0 { Ok(()) } else { Err("full") }
         });
         assert_eq!(full, Err("full"));
     });

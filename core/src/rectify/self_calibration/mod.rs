@@ -242,7 +242,7 @@ impl SelfCalibration {
         }
         let ([offset_px], offset_sigma_px) = self.offset.estimate(&self.offset_prior()).unwrap_or_default();
         let ([_, slope_px, quartic_px, _], _) = self.sides.estimate(&self.sides_prior()).unwrap_or_default();
-        let settled = self.frames >= FRAMES_MIN && offset_sigma_px < SIGMA_MAX_PX;
+        let is_certain = self.frames >= FRAMES_MIN && offset_sigma_px < SIGMA_MAX_PX;
         let obvious = self.frames >= OBVIOUS_FRAMES_MIN && libm::fabs(offset_px) > OBVIOUS_SIGMAS * offset_sigma_px;
         SelfCalibrationReport {
             offset_px,
@@ -251,7 +251,7 @@ impl SelfCalibration {
             quartic_px,
             applied_offset_px: self.applied.offset_px,
             frames: self.frames,
-            known: settled || obvious,
+            known: is_certain || obvious,
             corrected: self.mode == SelfCalibrationMode::Apply,
         }
     }

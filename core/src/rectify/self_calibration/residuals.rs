@@ -87,7 +87,7 @@ impl<'r> Residuals<'r> {
             }
         }
         let [.., constant, slope, quartic, tilt, _] = &mut right;
-        // ... and the current one, which the prediction is held against.
+        // ... and the current one, with which the prediction is compared.
         for (entry, part) in [constant, slope, quartic, tilt].into_iter().zip(now) {
             *entry += part;
         }
