@@ -1,6 +1,6 @@
 //! Dependencies point downwards: each folder of the core and of the host imports what the table allows, and nothing else.
 //!
-//! The `crate::`, `super::` and `self::` paths of every file are read from its text, tests left out, and each is held against the table. A new
+//! The `crate::`, `super::` and `self::` paths of every file are read from its text, tests left out, and each is compared with the table. A new
 //! edge is a decision: add it here, with the reason in the commit, or move what is imported.
 
 use dynvox_tests::source::{files, parts, text};
@@ -87,7 +87,7 @@ fn a_forbidden_import_is_found_however_it_is_written() {
         "use super::super::super::mapper::Mapper;",
         "use crate::Mapper;",
         "fn step() { crate::mapper::step(); }",
-        "pub(crate) use crate::mapper::{self as roof};",
+        "pub(crate) use crate::mapper::{self as top};",
     ];
     for line in written {
         let planted = Crate::of([("lib.rs", LIB), ("volume/fuse/row.rs", line)]);

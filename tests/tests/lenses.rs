@@ -18,8 +18,8 @@ fn lens(model: LensModel) -> Lens {
     Lens::new(FOCAL_PX, CENTER_PX, model).unwrap()
 }
 
-/// Every fifth pixel of a 640 x 480 image: its ray by ours, and back by theirs and by ours. How far it is from where it was at most, px.
-/// Their own way from pixel to ray ends at a millionth of the focal length, and cannot be held against this bound.
+/// Unprojects every fifth pixel of a 640 x 480 image with our lens and projects the ray with theirs and with ours. Returns the largest
+/// distance from the pixel, px. Their own inverse stops at a millionth of the focal length, too coarse for this bound.
 fn worst(ours: &Lens, theirs: &impl CameraModel) -> f64 {
     let mut worst = 0.0;
     for at in 0..128 * 96u32 {

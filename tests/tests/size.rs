@@ -8,8 +8,8 @@ const FUNCTION_LINES: usize = 60;
 const FILE_LINES: usize = 400;
 
 /// Functions and files that are still longer, at most. They only ever become fewer.
-const LONG_FUNCTIONS: usize = 4;
-const LONG_FILES: usize = 4;
+const LONG_FUNCTIONS: usize = 3;
+const LONG_FILES: usize = 2;
 
 /// Name, first line and number of lines of each function with a body.
 fn functions(rust: &str) -> Vec<(String, usize, usize)> {

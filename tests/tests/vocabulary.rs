@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Words still to be replaced, at most. It only ever falls.
-const REMAINING: usize = 800;
+const REMAINING: usize = 300;
 /// The list, which names every word it bans, and this test.
 const EXEMPT: [&str; 2] = ["tests/vocabulary.txt", "tests/tests/vocabulary.rs"];
 /// Where the changelog names keys that were renamed, up to the next heading.
