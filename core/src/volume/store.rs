@@ -38,7 +38,7 @@ pub trait BlockStore {
     /// and counted.
     fn store(&mut self, block: EvictedBlock<'_>) -> bool;
 
-    /// Fills a block that is made again; `false` when none is stored at its coordinates, and then the block stays all zero.
+    /// Fills a block that is made again; `false` when none is stored at its coordinates; the block must then stay all zero.
     fn load(&mut self, block: LoadedBlock<'_>) -> bool;
 }
 

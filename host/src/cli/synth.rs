@@ -34,7 +34,7 @@ pub fn run(args: &SynthArgs) -> anyhow::Result<()> {
     let written = write_kitti(&street, &args.out, |done, _| bar.set_position(u64::from(done)));
     bar.finish_and_clear();
     written?;
-    let place = args.out.display();
-    outln!("{} frames with their truth in {place}\nmap it: dynvox run {place} --images colour", street.config().frames);
+    let folder = args.out.display();
+    outln!("{} frames with their truth in {folder}\nmap it: dynvox run {folder} --images colour", street.config().frames);
     Ok(())
 }

@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn the_road_and_what_stands_beside_the_thing_are_not_its_surface() {
+    fn the_road_and_objects_beside_it_are_not_an_objects_surface() {
         let side = side();
         let xs: Vec<f64> = side.cells.values().map(|[x, _, _, count]| x / count).collect();
         assert!(xs.iter().all(|x| x.abs() <= 1.03) && xs.iter().any(|x| *x < -0.95));

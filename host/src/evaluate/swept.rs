@@ -28,8 +28,8 @@ struct SweptBox {
 
 impl SweptBox {
     fn contains(&self, point: &Point3<f64>) -> bool {
-        let ([width, height, length], place) = (self.dimensions_m, self.t_object_map.transform_point(*point));
-        place.x.abs() < 0.5 * width - SIDE_M && place.z.abs() < 0.5 * length - SIDE_M && place.y < -FOOT_M && place.y > -height
+        let ([width, height, length], at) = (self.dimensions_m, self.t_object_map.transform_point(*point));
+        at.x.abs() < 0.5 * width - SIDE_M && at.z.abs() < 0.5 * length - SIDE_M && at.y < -FOOT_M && at.y > -height
     }
 }
 
@@ -41,7 +41,7 @@ pub struct Swept {
     squares: HashMap<[i64; 2], Vec<u32>>,
 }
 
-/// The square of ground a place lies in.
+/// The square of ground a point lies in.
 fn square(x_m: f64, z_m: f64) -> [i64; 2] {
     [x_m, z_m].map(|m| (m / SQUARE_M).floor() as i64)
 }
@@ -128,8 +128,8 @@ mod tests {
         let path = folder.path().join("map.ply");
         let mut ply = PlyWriter::begin(&path).unwrap();
         let mut patch = |x: f32, y: f32, z: f32| ply.triangle([0.0, 0.05, 0.1].map(|d| ([x + d, y, z + d * d], [9; 3])));
-        let places = [(3.0, 1.0, 9.0), (3.0, 1.0, 15.5), (3.0, 1.6, 12.0), (5.0, 1.0, 12.0), (3.0, 1.0, 30.0), (3.0, -0.5, 12.0)];
-        places.iter().for_each(|&(x, y, z)| patch(x, y, z));
+        let patches = [(3.0, 1.0, 9.0), (3.0, 1.0, 15.5), (3.0, 1.6, 12.0), (5.0, 1.0, 12.0), (3.0, 1.0, 30.0), (3.0, -0.5, 12.0)];
+        patches.iter().for_each(|&(x, y, z)| patch(x, y, z));
         ply.finish().unwrap();
         assert_eq!(swept.triangles(&path).unwrap(), 2, "two of the patches: the others are road, beside, above, or where a car is parked");
     }

@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 
 /// Vertices remembered for sharing.
 const WINDOW: usize = 1 << 16;
-/// Room for a count in the header.
+/// Digits of a count in the header.
 const DIGITS: usize = 10;
 
-/// A vertex: place in m and colour.
+/// A vertex: position in m and colour.
 pub type Vertex = ([f32; 3], [u8; 3]);
 
 /// What was written.
@@ -66,7 +66,7 @@ impl PlyWriter {
         })
     }
 
-    /// Adds a triangle. A failure is kept until [`PlyWriter::finish`]: whoever streams triangles has nothing to do about it.
+    /// Adds a triangle. [`PlyWriter::finish`] returns a failure, so that callbacks need no error path.
     pub fn triangle(&mut self, corners: [Vertex; 3]) {
         if self.failed.is_none() {
             self.failed = self.try_triangle(corners).err();
@@ -120,7 +120,7 @@ impl PlyWriter {
     }
 }
 
-/// Writes a header line with room for a count and returns where the count stands.
+/// Writes a header line with space for a count and returns the position of the count.
 fn count_line(file: &mut BufWriter<File>, line: &str) -> io::Result<u64> {
     file.write_all(line.as_bytes())?;
     let at = file.stream_position()?;

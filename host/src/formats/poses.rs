@@ -42,7 +42,7 @@ pub fn read_poses(path: &Path) -> Result<Trajectory, FormatError> {
     Ok(Trajectory { times_s: (!times_s.is_empty()).then_some(times_s), poses })
 }
 
-/// Time, where the row has one, and pose. Rounded rotations are brought back to length 1.
+/// Time, where the row has one, and pose. Rounded rotations are normalized to length 1.
 fn pose_of(numbers: &[f64]) -> Option<(Option<f64>, Transform)> {
     if let &[r00, r01, r02, x, r10, r11, r12, y, r20, r21, r22, z] = numbers {
         let rotation = [[r00, r01, r02], [r10, r11, r12], [r20, r21, r22]];

@@ -110,9 +110,9 @@ pub fn map(widest_px: usize, seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[
     Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }.png(widest_px)
 }
 
-/// The static map with every object in its place: dynamic ones tinted orange, static ones blue. Empty without objects.
+/// The static map with every object at its pose: dynamic ones tinted orange, static ones blue. Empty without objects.
 pub fn composed(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &Transform) -> Vec<u8> {
-    let states: Vec<MotionState> = view.mapper().posed_objects().map(|placed| placed.summary.state).collect();
+    let states: Vec<MotionState> = view.mapper().posed_objects().map(|posed| posed.summary.state).collect();
     if states.is_empty() {
         return Vec::new();
     }
@@ -129,7 +129,7 @@ struct Painting<'a, T> {
     depth_m: View<'a, f32>,
     /// Normals in camera axes.
     normal: View<'a, [i8; 3]>,
-    /// Colours; black where there is none.
+    /// Colours; black where unknown.
     colour: View<'a, [u8; 3]>,
     /// Tint of a pixel, if it has one.
     tint: T,

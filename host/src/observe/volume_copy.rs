@@ -62,7 +62,7 @@ impl VolumeCopy {
         };
         let bytes = Volume::bytes(&capacity);
         let mut slab = HostSlab::map(bytes).ok_or(ErrorKind::OutOfMemory)?;
-        let misfit = |error| Error::other(format!("no room for an object's blocks: {error:?}"));
+        let misfit = |error| Error::other(format!("an object's blocks do not fit the copy's memory: {error:?}"));
         let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(misfit)?;
         let mut volume = Volume::new_in(&capacity, &self.config, &mut carver);
         carver.check().map_err(misfit)?;
@@ -73,7 +73,7 @@ impl VolumeCopy {
     }
 }
 
-/// Brings one block back.
+/// A store that holds one block.
 struct One<'b>(&'b Block);
 
 impl BlockStore for One<'_> {
@@ -101,7 +101,7 @@ mod tests {
     const WIDTH: usize = 96;
     const HEIGHT: usize = 64;
 
-    /// A volume of two walls, of which the first is pruned away, so that slots are free between those in use.
+    /// A volume of two walls. The first is pruned away, so that slots are free between those in use.
     fn with_volume(colour: bool, test: impl FnOnce(&Volume<'_>)) {
         let capacity = Capacity { blocks: 500, colour, ..Capacity::TINY };
         let config = VolumeConfig { truncation_m: 0.2, ..VolumeConfig::default() };

@@ -58,7 +58,7 @@ impl RunResult {
         })
     }
 
-    /// Reads a result; `None` where there is none.
+    /// Reads a result; `None` if the file does not exist.
     ///
     /// # Errors
     /// The file cannot be read, or is not a result.

@@ -5,9 +5,9 @@ use tempfile::TempDir;
 
 fn request(kinds: &[Kind]) -> SweepRequest {
     let street: Data = "street".parse().unwrap();
-    let drive: Data = "some/where:06".parse().unwrap();
+    let kitti: Data = "some/where:06".parse().unwrap();
     SweepRequest {
-        data: vec![(street, Some("exact")), (drive, Some("lidar"))],
+        data: vec![(street, Some("exact")), (kitti, Some("lidar"))],
         kinds: kinds.to_vec(),
         weights: vec![0, 1, 2],
         rates: vec![1, 4],

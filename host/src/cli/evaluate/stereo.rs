@@ -19,7 +19,7 @@ const REGIONS: [&str; 6] = ["noc", "noc_background", "noc_foreground", "occ", "o
 pub struct StereoArgs {
     /// Folder of KITTI 2012 (image_0, image_1, disp_noc, disp_occ) or 2015 (image_2, image_3, disp_noc_0, disp_occ_0, obj_map), or the one with its training/
     folder: PathBuf,
-    /// Judge another program's disparities instead: 16-bit PNG (value / 256 px, 0 none) of the images' names
+    /// Evaluate another program's disparities instead: 16-bit PNG (value / 256 px, 0 none) of the images' names
     #[arg(long, value_name = "DIR")]
     disparity: Option<PathBuf>,
     /// Settings from a file; config.toml of a run is one

@@ -50,8 +50,8 @@ fn track(state: MotionState, motion_world: Transform) -> TrackReport {
     }
 }
 
-/// Feeds a drive in which the estimated world is the true one moved by `drift`, and each motion is off by `error` in the car's frame.
-fn drive(states: &[MotionState], moving: &[bool], drift: &Transform, error: &Transform) -> ObjectErrors {
+/// Evaluates a run whose estimated world is the true one moved by `drift`, with each motion off by `error` in the car's frame.
+fn errors_of(states: &[MotionState], moving: &[bool], drift: &Transform, error: &Transform) -> ObjectErrors {
     let mut errors = ObjectErrors::default();
     for (at, (&state, &moving)) in states.iter().zip(moving).enumerate() {
         let frame = at as u32;
@@ -64,10 +64,10 @@ fn drive(states: &[MotionState], moving: &[bool], drift: &Transform, error: &Tra
 }
 
 #[test]
-fn a_motion_off_by_two_centimetres_has_that_error_wherever_the_camera_believes_to_be() {
+fn a_motion_off_by_two_centimetres_has_that_error_despite_any_drift_of_the_camera() {
     let drift = Transform::new(Vector3::new(0.1, -0.4, 0.05), Vector3::new(30.0, -2.0, 11.0));
     let off = Transform::new(Vector3::new(0.0, 0.001, 0.0), Vector3::new(0.02, 0.0, 0.0));
-    let errors = drive(&[MotionState::Dynamic; 8], &[true; 8], &drift, &off).tracks()[&1].clone();
+    let errors = errors_of(&[MotionState::Dynamic; 8], &[true; 8], &drift, &off).tracks()[&1].clone();
     assert!((errors.me_t_m.unwrap() - 0.02).abs() < 1e-4, "{errors:?}");
     assert!((errors.me_r_deg.unwrap() - 0.001f64.to_degrees()).abs() < 1e-6);
     assert!((errors.speed_error_m_s.unwrap() - 0.5).abs() < 1e-5);
@@ -77,8 +77,9 @@ fn a_motion_off_by_two_centimetres_has_that_error_wherever_the_camera_believes_t
 #[test]
 fn a_state_may_take_five_frames_and_no_more() {
     use MotionState::{Dynamic as D, Static as S, Uncertain as U};
-    let of =
-        |states: &[MotionState], moving: &[bool]| drive(states, moving, &Transform::IDENTITY, &Transform::IDENTITY).tracks()[&1].clone();
+    let of = |states: &[MotionState], moving: &[bool]| {
+        errors_of(states, moving, &Transform::IDENTITY, &Transform::IDENTITY).tracks()[&1].clone()
+    };
     let (m, s) = (true, false);
     assert_eq!(of(&[U, U, U, U, U, D, D], &[m; 7]).late_frames, 0);
     assert_eq!(of(&[U, U, U, U, U, U, D], &[m; 7]).late_frames, 1);
@@ -101,23 +102,23 @@ fn what_overlaps_nothing_true_is_not_compared() {
 }
 
 #[test]
-fn a_turning_car_is_judged_as_a_rigid_body() {
-    // Twenty metres ahead a car turns by a degree on the spot. A right motion has no error; the difference of the two places in the camera, taken for a
-    // motion with the same turn, would be off by 35 cm.
+fn a_turning_car_is_evaluated_as_a_rigid_body() {
+    // Twenty metres ahead a car turns by a degree on the spot. The correct motion has no error; the difference of the two positions in the
+    // camera, taken for a motion with the same turn, would be off by 35 cm.
     let before = Transform::from_translation([0.0, 1.6, 20.0]);
     let turn = Transform::new(Vector3::new(0.0, 1f64.to_radians(), 0.0), Vector3::zeros());
     let now = before * turn;
     let motion_world = now * before.inverse();
     let [metres, degrees] = motion_error(&before, &now, &motion_world);
     assert!(metres < 1e-12 && degrees < 1e-6, "{metres} {degrees}");
-    let places = Vector3::from(now.translation_m) - Vector3::from(before.translation_m);
-    let shortcut = Transform { translation_m: places.into(), ..turn };
+    let difference = Vector3::from(now.translation_m) - Vector3::from(before.translation_m);
+    let shortcut = Transform { translation_m: difference.into(), ..turn };
     assert!((motion_error(&before, &now, &shortcut)[0] - 20.0 * 1f64.to_radians()).abs() < 1e-3);
 }
 
 #[test]
 fn every_comparison_is_a_row_in_the_order_of_frames() {
-    let errors = drive(
+    let errors = errors_of(
         &[MotionState::Uncertain, MotionState::Dynamic, MotionState::Dynamic],
         &[true; 3],
         &Transform::IDENTITY,
@@ -165,7 +166,7 @@ fn late_tracks_are_counted_by_distance_and_by_what_could_be_seen_of_them() {
 }
 
 #[test]
-fn a_thing_at_the_border_is_cut_and_one_of_few_pixels_small() {
+fn an_object_at_the_border_is_cut_and_one_of_few_pixels_small() {
     let of = |left, top, width, height| Visibility::of(&PixelBox { left, top, width, height }, SIZE);
     assert_eq!([of(1, 1, 30, 30), of(1, 1, 638, 190)], [Visibility::Whole; 2]);
     assert_eq!([of(1, 1, 29, 90), of(1, 1, 90, 29)], [Visibility::Small; 2]);

@@ -31,7 +31,7 @@ struct Masks(Vec<(PixelBox, InstanceAt)>);
 
 impl Masks {
     fn region(&self, u: i32, v: i32) -> Region {
-        Region::of(self.0.iter().find(|(pixels, _)| pixels.contains(u, v)).map(|(_, thing)| thing))
+        Region::of(self.0.iter().find(|(pixels, _)| pixels.contains(u, v)).map(|(_, instance)| instance))
     }
 }
 
@@ -67,8 +67,8 @@ const HITS: [Hit; 13] = [
 
 /// One frame's points, settled with that frame's masks; and the map's depth where the hits say so.
 fn pending(frame: usize, hits: &[Hit], masks: &Masks) -> (PendingFrame, Vec<f32>) {
-    let places: Vec<(i32, i32, f64)> = hits.iter().map(|&(u, v, true_px, ..)| (u, v, true_px)).collect();
-    let scanned = project_scan(&scan(&places), &FIELD);
+    let points: Vec<(i32, i32, f64)> = hits.iter().map(|&(u, v, true_px, ..)| (u, v, true_px)).collect();
+    let scanned = project_scan(&scan(&points), &FIELD);
     let input = |u: usize, v: usize| hits.iter().find(|hit| (hit.0 as usize, hit.1 as usize) == (u, v)).map_or(0.0, |hit| hit.3);
     let mut map_depth_m = vec![0.0; FIELD.width * FIELD.height];
     for &(u, v, _, _, shown_px) in hits.iter().filter(|hit| hit.4 > 0.0) {
@@ -99,7 +99,7 @@ fn every_point_of_the_hand_made_scene_is_counted_once_and_right() {
     let found = compare(&frame, &map);
     assert_eq!(found.count, ScanCount { points: 13, out_of_range: 2, outside: 1, epipolar: 1 });
     let [still, dynamic, ignored] = found.regions;
-    // Seven points of the street, three of which input or map lacks: judged are 250, 40, 90 and 25 px.
+    // Seven points of the street; input or map lacks three of them. Compared are 250, 40, 90 and 25 px.
     assert_eq!(numbers(&still), (7, 3, [[2, 0, 0], [2, 1, 2]]));
     assert_eq!(numbers(&dynamic), (1, 0, [[0, 0, 0], [0, 0, 0]]));
     assert_eq!(numbers(&ignored), (2, 0, [[0, 1, 1], [0, 1, 1]]));
@@ -154,7 +154,7 @@ fn a_delayed_evaluation_splits_the_points_by_the_masks_of_their_own_frame() {
 }
 
 #[test]
-fn frames_without_a_judged_point_are_left_out_of_the_means() {
+fn frames_without_a_compared_point_are_left_out_of_the_means() {
     let counts = |points: &[[f32; 3]]| {
         let mut counts = Counts::default();
         points.iter().for_each(|&[true_px, input, map]| counts.add(true_px, [input, map]));
@@ -172,7 +172,7 @@ fn frames_without_a_judged_point_are_left_out_of_the_means() {
 }
 
 #[test]
-fn errors_are_counted_at_full_size_whatever_the_scale() {
+fn errors_are_counted_at_full_size_for_every_scale() {
     let (frame, map) = pending(0, &[(300, 180, 30.0, 30.0, 28.0)], &masks(0));
     let wrong = |enlarged: f32| {
         let view = View::new(&map, FIELD.width, FIELD.height).unwrap();

@@ -4,7 +4,7 @@ use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// A drive along an arc of `count` frames, and the same with a known error in every step.
+/// A trajectory of `count` poses that repeat one step.
 fn arc(count: usize, step: Transform) -> Vec<Transform> {
     std::iter::successors(Some(Transform::IDENTITY), |pose| Some(pose * step)).take(count).collect()
 }

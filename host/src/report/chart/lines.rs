@@ -4,7 +4,7 @@ use super::plot::{LEFT, Plot, RIGHT, WIDTH, legend, nice_step, polyline, x_label
 use crate::evaluate::quantile::quantile;
 use maud::{Markup, html};
 
-/// Points a line is drawn with at most: longer ones are thinned to the largest value of each stretch.
+/// Points a line is drawn with at most: longer ones are thinned to the largest value of each interval.
 pub(super) const POINTS: usize = 560;
 
 /// One line of a chart.
@@ -71,12 +71,12 @@ fn frame_labels(frames: &[usize]) -> Markup {
     }
 }
 
-/// Pairs of position and value, at most [`POINTS`]: of each stretch the largest value.
+/// Pairs of position and value, at most [`POINTS`]: the largest value of each interval.
 pub(super) fn thinned(values: &[f64]) -> Vec<(usize, f64)> {
-    let stretch = values.len().div_ceil(POINTS).max(1);
+    let interval = values.len().div_ceil(POINTS).max(1);
     let largest = |(at, values): (usize, &[f64])| {
         let value = values.iter().copied().filter(|value| value.is_finite()).reduce(f64::max)?;
-        Some((at * stretch, value))
+        Some((at * interval, value))
     };
-    values.chunks(stretch).enumerate().filter_map(largest).collect()
+    values.chunks(interval).enumerate().filter_map(largest).collect()
 }

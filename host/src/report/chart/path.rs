@@ -39,13 +39,13 @@ pub fn from_above(paths: &[Path<'_>]) -> Markup {
     let scale = ((WHOLE - 28.0) / (along + 2.0 * margin)).min(HIGHEST / (across + 2.0 * margin));
     let height = ((across + 2.0 * margin) * scale).max(90.0) + BAR;
     let middle = ((x0 + x1) / 2.0, (z0 + z1) / 2.0);
-    let place = |&(x, z): &(f64, f64)| {
+    let to_page = |&(x, z): &(f64, f64)| {
         let (right, up) = if turned { (z - middle.1, x - middle.0) } else { (x - middle.0, middle.1 - z) };
         (WHOLE / 2.0 + right * scale, (height - BAR) / 2.0 + up * scale)
     };
     let d = |points: &[(f64, f64)]| {
         let every = points.len().div_ceil(4 * POINTS).max(1);
-        polyline(points.iter().step_by(every).chain(points.last()).map(place))
+        polyline(points.iter().step_by(every).chain(points.last()).map(to_page))
     };
     let step = nice_step((along + 2.0 * margin) / 10.0);
     let (bar, base) = (px(step * scale), height - 18.0);
@@ -57,7 +57,7 @@ pub fn from_above(paths: &[Path<'_>]) -> Markup {
                 path d=(d(&path.points)) fill="none" stroke=(path.colour) stroke-width="2.2" stroke-linejoin="round"
                     stroke-dasharray=[path.dashed.then_some("6 5")] {}
             }
-            @if let Some((x, y)) = all().next().map(place) {
+            @if let Some((x, y)) = all().next().map(to_page) {
                 circle cx=(px(x)) cy=(px(y)) r="4.5" fill=[paths.first().map(|path| path.colour)] {}
             }
         }

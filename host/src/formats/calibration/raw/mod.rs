@@ -10,7 +10,7 @@
 //! | camodocal | two camera files, and `extrinsics.yaml` as a third or beside them | `model_type` |
 //! | OpenCV | one or two files, YAML or XML | `M1 D1 M2 D2 R T`, or the long names |
 //!
-//! Whatever the format, the result is checked here: baseline, sizes, rotations. Units are metres and pixels.
+//! The result of every format is checked here: baseline, sizes, rotations. Units are metres and pixels.
 
 mod camodocal;
 mod euroc;

@@ -29,7 +29,7 @@ pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
 /// The rig of two projection matrices with one focal length and centre.
 pub fn rectified_rig(at: Node<'_>, p_left: &[f64; 12], p_right: &[f64; 12]) -> Result<StereoRig, FormatError> {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
-    let shared = [0, 5, 2, 6].iter().all(|&place| near(p_left[place], p_right[place])) && near(p_left[0], p_left[5]);
+    let shared = [0, 5, 2, 6].iter().all(|&entry| near(p_left[entry], p_right[entry])) && near(p_left[0], p_left[5]);
     if !shared {
         let reason = "the two projection matrices differ in focal length or principal point";
         return Err(

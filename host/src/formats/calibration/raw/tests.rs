@@ -1,4 +1,4 @@
-//! Each format says the same rig; each way to damage a file is answered by a sentence.
+//! Each format contains_all the same rig; each way to damage a file is answered by a sentence.
 
 use super::*;
 use dynvox_core::rectify::LensModel;
@@ -198,37 +198,37 @@ fn damaged_numbers_are_named_with_the_next_action() {
         assert!(KALIBR.contains(from), "{from}");
         refusal(&[("camchain.yaml", &KALIBR.replace(from, to))])
     };
-    let says = |message: String, words: &[&str]| {
+    let contains_all = |message: String, words: &[&str]| {
         for word in words {
             assert!(message.contains(word), "{word}: {message}");
         }
     };
-    says(kalibr("458.6", ".nan"), &["non-finite", "line 5", "Check that the file is whole"]);
-    says(kalibr("458.6", "0.0"), &["focal length is not a positive number", "above 0"]);
-    says(
+    contains_all(kalibr("458.6", ".nan"), &["non-finite", "line 5", "Check that the file is whole"]);
+    contains_all(kalibr("458.6", "0.0"), &["focal length is not a positive number", "above 0"]);
+    contains_all(
         kalibr("intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\ncam1", "resolution: [752, 480]\ncam1"),
         &["intrinsics is missing in cam0"],
     );
-    says(kalibr("[1.0, 0.0, 0.0, -0.11]", "[0.0, 0.0, 0.0, -0.11]"), &["not a rotation matrix", "copy it whole"]);
-    says(kalibr("-0.11]", "-537.0]"), &["537 m apart. Is it in millimetres?", "divide them by 1000"]);
-    says(kalibr("-0.11]", "0.11]"), &["right camera stands to the left", "Exchange the two cameras"]);
-    says(kalibr("-0.11]", "0.0]"), &["distance between the cameras is 0"]);
-    says(kalibr("resolution: [752, 480]", "resolution: [75, 48]"), &["does not fit images of 75 x 48 px"]);
-    says(kalibr("resolution: [752, 480]", "resolution: [752.5, 480]"), &["not a width and a height"]);
-    says(kalibr("T_cn_cnm1", "T_cn_cnm2"), &["T_cn_cnm1 is missing in cam1"]);
-    says(refusal(&[("a.yaml", "a: 1\n")]), &["no known calibration", "Known are EuRoC"]);
-    says(refusal(&[("a.yaml", "- 1\n")]), &["it holds no keys"]);
-    says(refusal(&[("a.yaml", &euroc(0.0))]), &["one sensor.yaml", "--calibration twice"]);
-    says(refusal(&[("a.toml", "[left]\n")]), &["not a calibration"]);
-    says(
+    contains_all(kalibr("[1.0, 0.0, 0.0, -0.11]", "[0.0, 0.0, 0.0, -0.11]"), &["not a rotation matrix", "copy it whole"]);
+    contains_all(kalibr("-0.11]", "-537.0]"), &["537 m apart. Is it in millimetres?", "divide them by 1000"]);
+    contains_all(kalibr("-0.11]", "0.11]"), &["right camera stands to the left", "Exchange the two cameras"]);
+    contains_all(kalibr("-0.11]", "0.0]"), &["distance between the cameras is 0"]);
+    contains_all(kalibr("resolution: [752, 480]", "resolution: [75, 48]"), &["does not fit images of 75 x 48 px"]);
+    contains_all(kalibr("resolution: [752, 480]", "resolution: [752.5, 480]"), &["not a width and a height"]);
+    contains_all(kalibr("T_cn_cnm1", "T_cn_cnm2"), &["T_cn_cnm1 is missing in cam1"]);
+    contains_all(refusal(&[("a.yaml", "a: 1\n")]), &["no known calibration", "Known are EuRoC"]);
+    contains_all(refusal(&[("a.yaml", "- 1\n")]), &["it holds no keys"]);
+    contains_all(refusal(&[("a.yaml", &euroc(0.0))]), &["one sensor.yaml", "--calibration twice"]);
+    contains_all(refusal(&[("a.toml", "[left]\n")]), &["not a calibration"]);
+    contains_all(
         refusal(&[("c.txt", &KITTI.replace("1 0 0 0 1 0 0 0 1\nP_rect_00", "1 0 0 0 1 0 0 1\nP_rect_00"))]),
         &["R_rect_00 has 8 numbers, not 9"],
     );
     let short = opencv_short();
-    says(refusal(&[("intrinsics.yml", &short[0])]), &["R or rotation", "second --calibration"]);
+    contains_all(refusal(&[("intrinsics.yml", &short[0])]), &["R or rotation", "second --calibration"]);
     let sizeless = short[1].replace("size: [752, 480]\n", "");
-    says(refusal(&[("intrinsics.yml", &short[0]), ("extrinsics.yml", &sizeless)]), &["does not say the size"]);
-    says(refusal(&[("l.yaml", &camodocal()), ("r.yaml", &camodocal())]), &["extrinsics.yaml", "cannot be read"]);
+    contains_all(refusal(&[("intrinsics.yml", &short[0]), ("extrinsics.yml", &sizeless)]), &["does not say the size"]);
+    contains_all(refusal(&[("l.yaml", &camodocal()), ("r.yaml", &camodocal())]), &["extrinsics.yaml", "cannot be read"]);
 }
 
 #[test]

@@ -100,7 +100,7 @@ impl<'t> Node<'t> {
         self.path
     }
 
-    /// The value of a key; `None` where there is none.
+    /// The value of a key; `None` if the key is missing.
     pub fn get(&self, key: &'t str) -> Option<Node<'t>> {
         Some(Node { path: self.path, key, value: self.value.get(key)? })
     }
@@ -134,7 +134,7 @@ impl<'t> Node<'t> {
     fn as_number(&self, value: &Value) -> Result<f64, FormatError> {
         let number = match value {
             Value::Number(number) => number.as_f64(),
-            // YAML's numbers that are none, and numbers in quotes.
+            // YAML's `.nan` and `.inf`, and numbers in quotes.
             Value::String(word) => word.trim_start_matches('.').parse().ok().or(word.parse().ok()),
             _ => None,
         };
