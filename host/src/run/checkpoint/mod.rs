@@ -103,7 +103,7 @@ impl Checkpoint {
     /// Reads the checkpoint in a run's folder, but for the mapper's part.
     ///
     /// # Errors
-    /// There is none, or it is of another version or damaged.
+    /// The checkpoint is missing, of another version, or damaged.
     pub fn read(folder: &RunFolder) -> Result<Self, ResumeError> {
         let path = folder.snapshot();
         let failed = |source| ResumeError::Read { path: path.clone(), source };

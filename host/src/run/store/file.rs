@@ -248,7 +248,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
 
     /// Whether a block is stored.
     pub fn holds(&mut self, coord: BlockCoord) -> bool {
-        self.place(coord).is_some()
+        self.newest_record(coord).is_some()
     }
 
     /// The tiles in which blocks are stored, ascending.
@@ -265,13 +265,13 @@ impl<F: Read + Write + Seek> BlockFile<F> {
     }
 
     /// Where the newest record of a block begins.
-    fn place(&mut self, coord: BlockCoord) -> Option<u64> {
+    fn newest_record(&mut self, coord: BlockCoord) -> Option<u64> {
         let tile = tile_of(coord);
         self.load_index(tile);
         self.index.records(tile)?.get(&coord).copied()
     }
 
-    /// Reads the positions of a tile's records, unless they are known or there are none.
+    /// Reads the positions of a tile's records, unless they are known or the tile has no records.
     fn load_index(&mut self, tile: Tile) {
         let Some(newest) = self.index.newest(tile) else { return };
         if self.index.records(tile).is_some() {
@@ -382,7 +382,7 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
 
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         // The record stays: should the run end before the block is evicted again, it is still stored.
-        let Some(at) = self.place(block.coord) else { return false };
+        let Some(at) = self.newest_record(block.coord) else { return false };
         let came = self.fetch(block.coord, at).unwrap_or(false) && record::read(&self.record, block, &mut self.scratch);
         self.unreadable += u64::from(!came);
         came

@@ -27,25 +27,25 @@ fn coord(i: u32) -> BlockCoord {
     BlockCoord::new(i as i32 - 3, -(i as i32), 7).expect("within the map")
 }
 
-fn keep(store: &mut impl BlockStore, place: u32, seed: u32) -> bool {
+fn store_block(store: &mut impl BlockStore, number: u32, seed: u32) -> bool {
     let content = content(seed);
     store.store(EvictedBlock {
-        coord: coord(place),
+        coord: coord(number),
         sdf: &content.sdf,
         weight: &content.weight,
         colour: Some(&content.colour),
     })
 }
 
-/// Whether the block at `place` comes back as that of `seed`.
-fn is_back(store: &mut impl BlockStore, place: u32, seed: u32) -> bool {
+/// Whether block `number` is loaded with the content of `seed`.
+fn is_loaded(store: &mut impl BlockStore, number: u32, seed: u32) -> bool {
     let mut back = Content {
         sdf: [0; BLOCK_VOXELS],
         weight: [0; BLOCK_VOXELS],
         colour: [[0; BLOCK_VOXELS]; 3],
     };
     let came = store.load(LoadedBlock {
-        coord: coord(place),
+        coord: coord(number),
         sdf: &mut back.sdf,
         weight: &mut back.weight,
         colour: Some(&mut back.colour),
@@ -60,13 +60,13 @@ fn keeps_blocks_over_a_restart_and_the_newest_counts() {
     let path = folder.path().join("map.blocks");
     let (mut store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
     assert_eq!(opened, Opened::default());
-    (0..50).for_each(|i| assert!(keep(&mut store, i, i)));
-    assert!(keep(&mut store, 7, 1_007));
+    (0..50).for_each(|i| assert!(store_block(&mut store, i, i)));
+    assert!(store_block(&mut store, 7, 1_007));
     drop(store);
     let (mut store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
     assert_eq!(opened, Opened { records: 51, cut_bytes: 0 });
-    (0..50).for_each(|i| assert!(is_back(&mut store, i, if i == 7 { 1_007 } else { i })));
-    assert!(!is_back(&mut store, 99, 99), "what was never kept does not come back");
+    (0..50).for_each(|i| assert!(is_loaded(&mut store, i, if i == 7 { 1_007 } else { i })));
+    assert!(!is_loaded(&mut store, 99, 99), "what was never kept does not come back");
     let blocks: Vec<BlockCoord> = store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect();
     assert!(blocks.len() == 50 && (0..50).all(|i| blocks.contains(&coord(i))), "each block once");
 }
@@ -76,16 +76,16 @@ fn opens_after_being_torn_at_every_byte_of_its_last_record() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.blocks");
     let (mut store, _) = BlockFile::open(&path, 0.05, 0.75).unwrap();
-    (0..3).for_each(|i| assert!(keep(&mut store, i, i)));
+    (0..3).for_each(|i| assert!(store_block(&mut store, i, i)));
     let whole_len = store.bytes();
-    assert!(keep(&mut store, 3, 3));
+    assert!(store_block(&mut store, 3, 3));
     drop(store);
     let whole = fs::read(&path).unwrap();
     for torn in whole_len as usize..whole.len() {
         fs::write(&path, &whole[..torn]).unwrap();
         let (mut store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
         assert_eq!(opened, Opened { records: 3, cut_bytes: torn as u64 - whole_len });
-        assert!(is_back(&mut store, 2, 2) && keep(&mut store, 3, 3) && is_back(&mut store, 3, 3));
+        assert!(is_loaded(&mut store, 2, 2) && store_block(&mut store, 3, 3) && is_loaded(&mut store, 3, 3));
         drop(store);
         assert_eq!(fs::read(&path).unwrap(), whole, "and goes on as if nothing had been");
     }
@@ -100,9 +100,9 @@ fn a_flipped_bit_ends_the_store_before_its_record() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.blocks");
     let (mut store, _) = BlockFile::open(&path, 0.05, 0.75).unwrap();
-    assert!(keep(&mut store, 0, 0));
+    assert!(store_block(&mut store, 0, 0));
     let first = store.bytes() as usize;
-    assert!(keep(&mut store, 1, 1));
+    assert!(store_block(&mut store, 1, 1));
     drop(store);
     let whole = fs::read(&path).unwrap();
     for at in (first..whole.len()).step_by(97).chain(first..first + HEADER) {
@@ -128,10 +128,10 @@ fn refuses_other_files_and_other_voxels_by_name() {
     assert!(other.contains("0.05 m voxels") && other.contains("0.1 m"), "{other}");
 }
 
-/// A disk with so much room and no more.
+/// A disk with limited space.
 struct SmallDisk {
     bytes: Cursor<Vec<u8>>,
-    room: usize,
+    space: usize,
 }
 
 impl Read for SmallDisk {
@@ -148,8 +148,8 @@ impl Seek for SmallDisk {
 
 impl Write for SmallDisk {
     fn write(&mut self, from: &[u8]) -> io::Result<usize> {
-        let room = self.room.saturating_sub(self.bytes.position() as usize).min(from.len());
-        if room == 0 { Err(io::ErrorKind::StorageFull.into()) } else { self.bytes.write(&from[..room]) }
+        let space = self.space.saturating_sub(self.bytes.position() as usize).min(from.len());
+        if space == 0 { Err(io::ErrorKind::StorageFull.into()) } else { self.bytes.write(&from[..space]) }
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -158,35 +158,35 @@ impl Write for SmallDisk {
 }
 
 #[test]
-fn a_full_disk_ends_the_keeping_and_what_was_kept_stays() {
-    let mut store = BlockFile::over(SmallDisk { bytes: Cursor::new(vec![0; 16]), room: 20_000 });
-    let kept: Vec<u32> = (0..50).take_while(|&i| keep(&mut store, i, i)).collect();
+fn a_full_disk_ends_storing_and_stored_blocks_stay() {
+    let mut store = BlockFile::over(SmallDisk { bytes: Cursor::new(vec![0; 16]), space: 20_000 });
+    let kept: Vec<u32> = (0..50).take_while(|&i| store_block(&mut store, i, i)).collect();
     assert!(!kept.is_empty() && kept.len() < 50);
     assert_eq!(store.failure().map(io::Error::kind), Some(io::ErrorKind::StorageFull));
-    assert!(!keep(&mut store, 60, 60), "it does not try again");
+    assert!(!store_block(&mut store, 60, 60), "it does not try again");
     for i in kept {
-        assert!(is_back(&mut store, i, i));
+        assert!(is_loaded(&mut store, i, i));
     }
     assert_eq!(store.unreadable(), 0);
 }
 
 #[test]
-fn a_store_is_reopened_where_it_was_marked_and_what_came_after_is_cut() {
+fn a_store_is_reopened_at_its_mark_and_later_records_are_removed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.blocks");
     let (mut store, _) = BlockFile::open(&path, 0.05, 0.3).unwrap();
     let empty = store.position().unwrap();
-    (0..5).for_each(|place| assert!(keep(&mut store, place, place)));
+    (0..5).for_each(|number| assert!(store_block(&mut store, number, number)));
     let marked = store.position().unwrap();
-    assert!(keep(&mut store, 3, 30) && keep(&mut store, 9, 9));
+    assert!(store_block(&mut store, 3, 30) && store_block(&mut store, 9, 9));
     let after = store.position().unwrap();
     drop(store);
     let whole = fs::read(&path).unwrap();
     let mut store = BlockFile::reopen(&path, 0.05, 0.3, &marked).unwrap();
     assert_eq!((store.records(), store.bytes(), fs::metadata(&path).unwrap().len()), (5, marked.bytes, marked.bytes));
-    assert!(is_back(&mut store, 3, 3) && !store.holds(coord(9)));
-    // What is kept again is what was kept.
-    assert!(keep(&mut store, 3, 30) && keep(&mut store, 9, 9));
+    assert!(is_loaded(&mut store, 3, 3) && !store.holds(coord(9)));
+    // Storing the same blocks again gives the same file.
+    assert!(store_block(&mut store, 3, 30) && store_block(&mut store, 9, 9));
     assert_eq!(store.position().unwrap(), after);
     assert!(fs::read(&path).unwrap() == whole);
     drop(store);
@@ -203,19 +203,19 @@ fn a_store_is_reopened_where_it_was_marked_and_what_came_after_is_cut() {
     assert_eq!(BlockFile::reopen(&path, 0.05, 0.3, &empty).unwrap().records(), 0);
     fs::remove_file(&path).unwrap();
     assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Missing { .. })));
-    assert!(!path.exists(), "none is made");
+    assert!(!path.exists(), "no file is made");
 }
 
 #[test]
-fn a_store_that_took_no_more_takes_no_more_when_it_is_reopened() {
+fn a_full_store_stays_full_when_it_is_reopened() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.blocks");
     let (mut store, _) = BlockFile::open(&path, 0.05, 0.3).unwrap();
-    assert!(keep(&mut store, 1, 1));
+    assert!(store_block(&mut store, 1, 1));
     store.limit(store.bytes() + 1);
-    assert!(!keep(&mut store, 2, 2));
-    let (marked, said) = (store.position().unwrap(), store.failure().unwrap().to_string());
+    assert!(!store_block(&mut store, 2, 2));
+    let (marked, failure) = (store.position().unwrap(), store.failure().unwrap().to_string());
     let mut store = BlockFile::reopen(&path, 0.05, 0.3, &marked).unwrap();
-    assert!(!keep(&mut store, 2, 2) && is_back(&mut store, 1, 1));
-    assert_eq!(store.failure().unwrap().to_string(), said);
+    assert!(!store_block(&mut store, 2, 2) && is_loaded(&mut store, 1, 1));
+    assert_eq!(store.failure().unwrap().to_string(), failure);
 }
