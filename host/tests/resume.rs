@@ -29,7 +29,7 @@ const STREET: [&str; 14] = [
     "--out",
 ];
 
-/// Runs the binary until it says that it has mapped a frame, and kills it there.
+/// Runs the binary until it prints `line`, and kills it there.
 fn killed_at(folder: &Path, args: &[&str], line: &str) {
     let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
         .args(args)
@@ -40,12 +40,12 @@ fn killed_at(folder: &Path, args: &[&str], line: &str) {
         .unwrap();
     let output_text =
         BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap).find(|output_text| output_text.starts_with(line));
-    // SIGKILL: nothing of it can clean up.
+    // SIGKILL: the run cannot clean up.
     run.kill().unwrap();
-    assert!(!run.wait().unwrap().success() && output_text.is_some(), "it was under way");
+    assert!(!run.wait().unwrap().success() && output_text.is_some(), "the run printed the line and was killed");
 }
 
-/// Whether a column of frames.csv tells of the machine and not of the run.
+/// Whether a column of frames.csv depends on the machine and not on the run.
 fn of_the_machine(column: &str) -> bool {
     column.ends_with("_ms") || column == "rss_bytes" || column == "probes_most"
 }
@@ -91,12 +91,12 @@ fn assert_same(root: &Path, whole: &str, resumed: &str) {
 }
 
 #[test]
-fn a_street_killed_three_times_is_the_street_that_never_stopped() {
+fn a_run_killed_three_times_equals_the_uninterrupted_run() {
     let root = TempDir::new().unwrap();
     let street = |out: &'static str, more: &[&'static str]| [&STREET[..], &[out], more].concat();
     assert!(dynvox(root.path(), &street("whole", &["--quiet", "--threads", "1"])).status.success());
     killed_at(root.path(), &street("stopped", &["--snapshot-every", "4", "--threads", "2"]), "frame 9/24");
-    assert!(!root.path().join("stopped").exists(), "not before it is whole");
+    assert!(!root.path().join("stopped").exists(), "not before the run is complete");
     // What a kill in the middle of writing leaves.
     let partial = root.path().join(".stopped.partial");
     fs::create_dir_all(partial.join("objects")).unwrap();
@@ -121,14 +121,14 @@ fn a_street_killed_three_times_is_the_street_that_never_stopped() {
     let of = summary(&root.path().join("whole"));
     assert!(of["evict"]["back"].as_u64().unwrap() > 0 && of["objects"].as_array().unwrap().len() > 2, "{of}");
     assert!(!names(&root.path().join("whole/objects")).is_empty());
-    // The threads are those of the last stretch.
+    // The number of threads is that of the last resumption.
     let path = root.path().join("stopped/summary.json");
     let threads = fs::read_to_string(&path).unwrap().replace("\"threads\": 2", "\"threads\": 1");
     fs::write(&path, threads).unwrap();
     assert_same(root.path(), "whole", "stopped");
 }
 
-/// A run of a stereo folder that fails at its sixth frame, behind a snapshot of four.
+/// A run of a stereo folder that fails at its sixth frame, after a snapshot of four.
 fn stopped() -> TempDir {
     let root = TempDir::new().unwrap();
     rig(root.path(), 8);
@@ -165,57 +165,76 @@ fn a_run_that_failed_resumes_when_the_cause_is_repaired() {
     assert!(output_text(&twice).contains("it is complete"), "{}", output_text(&twice));
 }
 
+/// Resuming the run of [`stopped`] is refused with a sentence and changes nothing.
+fn assert_refused(root: &TempDir, sentence: &str) {
+    let snapshot = root.path().join("out/.it.partial/run.snapshot");
+    let before = fs::read(&snapshot).unwrap();
+    let run = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
+    assert_eq!(run.status.code(), Some(1));
+    assert!(output_text(&run).starts_with("error: ") && output_text(&run).contains(sentence), "{sentence}: {}", output_text(&run));
+    assert_eq!(names(&root.path().join("out")), [".it.partial"]);
+    assert!(fs::read(&snapshot).unwrap() == before);
+}
+
+/// As [`assert_refused`], while the file `name` holds `bytes`.
+fn assert_refused_with(root: &TempDir, name: &str, bytes: &[u8], sentence: &str) {
+    let path = root.path().join(name);
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, bytes).unwrap();
+    assert_refused(root, sentence);
+    fs::write(&path, whole).unwrap();
+}
+
+fn assert_resumes(root: &TempDir) {
+    let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
+    assert!(resumed.status.success(), "{}", output_text(&resumed));
+    assert_same(root.path(), "whole", "out/it");
+}
+
 #[test]
-fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
+fn damaged_snapshots_and_stores_are_refused_by_name() {
     let root = stopped();
     let path = |name: &str| root.path().join(name);
-    let (snapshot, blocks) = (path("out/.it.partial/run.snapshot"), path("out/.it.partial/map.blocks"));
-    let refused = |sentence: &str| {
-        let before = fs::read(&snapshot).unwrap();
-        let run = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
-        assert_eq!(run.status.code(), Some(1));
-        assert!(output_text(&run).starts_with("error: ") && output_text(&run).contains(sentence), "{sentence}: {}", output_text(&run));
-        assert_eq!(names(&path("out")), [".it.partial"]);
-        assert!(fs::read(&snapshot).unwrap() == before);
-    };
-    // While `name` holds `bytes`.
-    let with = |name: &Path, bytes: &[u8], sentence: &str| {
-        let whole = fs::read(name).unwrap();
-        fs::write(name, bytes).unwrap();
-        refused(sentence);
-        fs::write(name, whole).unwrap();
-    };
-    let whole = fs::read(&snapshot).unwrap();
+    let snapshot = "out/.it.partial/run.snapshot";
+    let whole = fs::read(path(snapshot)).unwrap();
+    let refused = |bytes: &[u8], sentence: &str| assert_refused_with(&root, snapshot, bytes, sentence);
     let changed = |at: usize, byte: u8| {
         let mut bytes = whole.clone();
         bytes[at] = byte;
         bytes
     };
-    with(&snapshot, b"P5 3 1 255", "is not a snapshot of a run");
-    with(&snapshot, &changed(8, 0), "is a snapshot of version 0; this dynvox takes version 2");
+    refused(b"P5 3 1 255", "is not a snapshot of a run");
+    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 2");
     for at in [15, 20, 30, 5_000, whole.len() / 2, whole.len() - 1] {
-        with(&snapshot, &changed(at, !whole[at]), "run.snapshot is damaged");
+        refused(&changed(at, !whole[at]), "run.snapshot is damaged");
     }
-    with(&snapshot, &whole[..whole.len() - 1], "run.snapshot is damaged");
-    with(&snapshot, &[&whole[..], b"1"].concat(), "run.snapshot is damaged");
-    with(&path("settings.toml"), b"[volume]\nvoxel_size_m = 0.09\n", "volume.voxel_size_m was 0.08 and is 0.09");
+    refused(&whole[..whole.len() - 1], "run.snapshot is damaged");
+    refused(&[&whole[..], b"1"].concat(), "run.snapshot is damaged");
+    let blocks = path("out/.it.partial/map.blocks");
+    fs::rename(&blocks, path("blocks")).unwrap();
+    assert_refused(&root, "map.blocks is missing");
+    fs::rename(path("blocks"), &blocks).unwrap();
+    assert_refused_with(&root, "out/.it.partial/map.blocks", b"dynvox", "map.blocks is not as the run left it");
+    assert_resumes(&root);
+}
+
+#[test]
+fn another_run_or_a_changed_data_set_is_refused_by_name() {
+    let root = stopped();
+    let path = |name: &str| root.path().join(name);
+    assert_refused_with(&root, "settings.toml", b"[volume]\nvoxel_size_m = 0.09\n", "volume.voxel_size_m was 0.08 and is 0.09");
     let calibration = fs::read_to_string(path("rig/calib.txt")).unwrap().replace("baseline_m 0.5", "baseline_m 0.6");
-    with(&path("rig/calib.txt"), calibration.as_bytes(), "the data set's rig was ");
-    let image = path("rig/right/003.png");
-    let mut pixels = image::open(&image).unwrap().into_luma8();
+    assert_refused_with(&root, "rig/calib.txt", calibration.as_bytes(), "the data set's rig was ");
+    let mut pixels = image::open(path("rig/right/003.png")).unwrap().into_luma8();
     pixels.get_pixel_mut(80, 40).0[0] ^= 1;
     pixels.save(path("other.png")).unwrap();
-    with(&image, &fs::read(path("other.png")).unwrap(), "frame 3 of the data set has changed");
+    assert_refused_with(&root, "rig/right/003.png", &fs::read(path("other.png")).unwrap(), "frame 3 of the data set has changed");
     let [last, away] = ["rig/left/007.png", "away.png"].map(path);
     fs::rename(&last, &away).unwrap();
     fs::rename(path("rig/right/007.png"), path("away-right.png")).unwrap();
-    refused("the data set's number of frames was 8 and is 7");
+    assert_refused(&root, "the data set's number of frames was 8 and is 7");
     fs::rename(&away, &last).unwrap();
     fs::rename(path("away-right.png"), path("rig/right/007.png")).unwrap();
-    fs::rename(&blocks, path("blocks")).unwrap();
-    refused("map.blocks is missing");
-    fs::rename(path("blocks"), &blocks).unwrap();
-    with(&blocks, b"dynvox", "map.blocks is not as the run left it");
     for (args, sentence) in [
         (vec!["run", "--resume", "out/it", "--profile", "small"], "cannot be used with"),
         (vec!["run", "--resume", "nowhere"], "can be resumed: there is no such run"),
@@ -225,14 +244,11 @@ fn what_is_not_the_run_that_was_begun_is_refused_by_name_and_stays_as_it_is() {
         let run = dynvox(root.path(), &args);
         assert!(!run.status.success() && output_text(&run).contains(sentence), "{args:?}: {}", output_text(&run));
     }
-    // And as it was it goes on, or makes place.
-    let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
-    assert!(resumed.status.success(), "{}", output_text(&resumed));
-    assert_same(root.path(), "whole", "out/it");
+    assert_resumes(&root);
 }
 
 #[test]
-fn a_stopped_run_makes_place_for_another_when_that_is_asked_for() {
+fn a_stopped_run_is_replaced_with_overwrite() {
     let root = stopped();
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--frames", "2", "--out", "out/it", "--overwrite"]);
     assert!(run.status.success(), "{}", output_text(&run));

@@ -1,67 +1,76 @@
-//! A sweep as a user meets it: interrupted, taken up again, made in parts.
+//! A sweep as a user meets it: interrupted, resumed, divided into shards.
 #![allow(missing_docs)]
 
 mod binary;
 
 use binary::{dynvox, names, output_text};
 use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 
-#[test]
-fn a_killed_sweep_goes_on_where_it_stopped_and_parts_make_the_same_whole() {
-    let root = TempDir::new().unwrap();
-    let sweep = [
-        "sweep",
-        "street",
-        "--sweeps",
-        "prune-weight,scale,methods",
-        "--weights",
-        "0,1",
-        "--scales",
-        "100,50",
-        "--prune-lag",
-        "2",
-        "--evaluation-delay",
-        "3",
-        "--profile",
-        "small",
-        "--frames",
-        "6",
-        "--set",
-        "street.width=320",
-        "--set",
-        "street.height=96",
-        "--set",
-        "street.frames=6",
-        "--quiet",
-        "--out",
-    ];
-    let results = |out: &str| {
-        let list = fs::read_dir(root.path().join(out).join("runs")).into_iter().flatten().flatten();
-        let mut paths: Vec<_> =
-            list.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|ending| ending == "json")).collect();
-        paths.sort();
-        paths
-    };
-    let mut child = Command::new(env!("CARGO_BIN_EXE_dynvox")).args(sweep).arg("cut").current_dir(root.path()).spawn().unwrap();
-    while results("cut").len() < 2 && child.try_wait().unwrap().is_none() {
+const SWEEP: [&str; 24] = [
+    "sweep",
+    "street",
+    "--sweeps",
+    "prune-weight,scale,methods",
+    "--weights",
+    "0,1",
+    "--scales",
+    "100,50",
+    "--prune-lag",
+    "2",
+    "--evaluation-delay",
+    "3",
+    "--profile",
+    "small",
+    "--frames",
+    "6",
+    "--set",
+    "street.width=320",
+    "--set",
+    "street.height=96",
+    "--set",
+    "street.frames=6",
+    "--quiet",
+    "--out",
+];
+
+/// The results in a sweep's folder, by name.
+fn results(folder: &Path) -> Vec<PathBuf> {
+    let list = fs::read_dir(folder.join("runs")).into_iter().flatten().flatten();
+    let mut paths: Vec<_> = list.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|ending| ending == "json")).collect();
+    paths.sort();
+    paths
+}
+
+/// Begins the sweep in folder `out` of `root` and kills it once two results are there.
+fn kill_after_two_results(root: &Path, out: &str) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_dynvox")).args(SWEEP).arg(out).current_dir(root).spawn().unwrap();
+    while results(&root.join(out)).len() < 2 && child.try_wait().unwrap().is_none() {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     child.kill().unwrap();
     child.wait().unwrap();
+}
+
+#[test]
+fn a_killed_sweep_resumes_and_merged_shards_equal_the_whole() {
+    let root = TempDir::new().unwrap();
+    let results = |out: &str| results(&root.path().join(out));
+    kill_after_two_results(root.path(), "cut");
     let before = results("cut");
     assert!((2..6).contains(&before.len()), "killed in the middle: {before:?}");
-    let made = |path: &std::path::PathBuf| (fs::read(path).unwrap(), fs::metadata(path).unwrap().modified().unwrap());
+    let made = |path: &PathBuf| (fs::read(path).unwrap(), fs::metadata(path).unwrap().modified().unwrap());
     let kept: Vec<_> = before.iter().map(made).collect();
-    let on = dynvox(root.path(), &[&sweep[..], &["cut"]].concat());
-    assert!(on.status.success(), "{}", output_text(&on));
-    assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "what was made is not made again");
+    let resumed = dynvox(root.path(), &[&SWEEP[..], &["cut"]].concat());
+    assert!(resumed.status.success(), "{}", output_text(&resumed));
+    assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "finished runs are not repeated");
     assert_eq!(results("cut").len(), 6, "two late, two scales, tracker and no objects");
     assert_eq!(names(&root.path().join("cut")), ["methods.csv", "plan.json", "prune-weight.csv", "report.html", "runs", "scale.csv"]);
-    assert!(names(&root.path().join("cut/runs")).iter().all(|name| name.ends_with(".json")), "nothing of a run stays but its result");
+    assert!(names(&root.path().join("cut/runs")).iter().all(|name| name.ends_with(".json")), "only its result stays of a run");
     for part in ["1/2", "2/2"] {
-        let run = dynvox(root.path(), &[&sweep[..], &[&part[..1], "--shard", part]].concat());
+        let run = dynvox(root.path(), &[&SWEEP[..], &[&part[..1], "--shard", part]].concat());
         assert!(run.status.success() && results(&part[..1]).len() == 3, "{}", output_text(&run));
     }
     let merged = dynvox(root.path(), &["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
@@ -77,6 +86,6 @@ fn a_killed_sweep_goes_on_where_it_stopped_and_parts_make_the_same_whole() {
             "{whole}"
         );
     }
-    let other = dynvox(root.path(), &[&sweep[..], &["cut", "--set", "volume.far_m=10"]].concat());
+    let other = dynvox(root.path(), &[&SWEEP[..], &["cut", "--set", "volume.far_m=10"]].concat());
     assert!(!other.status.success() && output_text(&other).contains("belongs to another sweep"), "{}", output_text(&other));
 }

@@ -1,0 +1,102 @@
+//! Commands other than `run`: inspect, budget, evaluate.
+#![allow(missing_docs)]
+
+mod binary;
+
+use binary::{dynvox, names, output_text, rig};
+use image::{GrayImage, Luma};
+use std::fs;
+use tempfile::TempDir;
+
+#[test]
+fn inspect_reports_what_a_data_set_holds_and_how_to_map_it() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 2);
+    let printed = dynvox(root.path(), &["inspect", "rig"]);
+    let text = String::from_utf8_lossy(&printed.stdout).into_owned();
+    assert!(printed.status.success());
+    for words in [
+        "rig: folder",
+        "2 stereo pairs of 160 x 64 px",
+        "baseline 0.5000 m",
+        "no times of the images",
+        "at least --memory",
+        "dynvox run rig",
+    ] {
+        assert!(text.contains(words), "{words} in {text}");
+    }
+    assert!(text.contains("no LiDAR scans") && text.contains("no masks"), "{text}");
+    for (path, words) in
+        [("rig/left", "is a part of the data set rig"), ("rig/left/000.png", "is a file"), ("nothing", "there is no data set at")]
+    {
+        let printed = dynvox(root.path(), &["inspect", path]);
+        assert!(!printed.status.success() && output_text(&printed).contains(words), "{path}: {}", output_text(&printed));
+    }
+    fs::create_dir_all(root.path().join("run")).unwrap();
+    fs::write(root.path().join("run/summary.json"), "{}").unwrap();
+    let printed = String::from_utf8(dynvox(root.path(), &["inspect", "run"]).stdout).unwrap();
+    assert!(printed.contains("the results of a run") && printed.contains("dynvox evaluate trajectory run TRUTH"), "{printed}");
+    fs::remove_file(root.path().join("rig/calib.txt")).unwrap();
+    let printed = dynvox(root.path(), &["inspect", "rig"]);
+    assert!(!printed.status.success() && String::from_utf8_lossy(&printed.stdout).contains("calib.txt is missing"));
+}
+
+#[test]
+fn budget_shows_every_profile_and_the_regions_sum_to_the_slab() {
+    let root = TempDir::new().unwrap();
+    let all = String::from_utf8(dynvox(root.path(), &["budget"]).stdout).unwrap();
+    assert!(["tiny", "small", "onboard", "desktop"].iter().all(|name| all.contains(name)));
+    let tiny = String::from_utf8(dynvox(root.path(), &["budget", "--profile", "tiny"]).stdout).unwrap();
+    let bytes = |line: &str| -> u64 { line.split_whitespace().nth_back(2).unwrap().replace(',', "").parse().unwrap() };
+    let lines: Vec<&str> = tiny.lines().skip(1).collect();
+    let (slab, regions) = lines.split_last().unwrap();
+    assert_eq!(regions.iter().map(|line| bytes(line)).sum::<u64>(), bytes(slab));
+    assert_eq!(bytes(slab), dynvox_core::Capacity::TINY.bytes() as u64);
+}
+
+#[test]
+fn files_are_evaluated_without_a_run() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 1);
+    let json = |args: &[&str]| {
+        let printed = dynvox(root.path(), args);
+        assert!(printed.status.success(), "{}", output_text(&printed));
+        serde_json::from_slice::<serde_json::Value>(&printed.stdout).unwrap()
+    };
+    // The plane as a pair of KITTI 2015: its left half is an object with a true disparity 5 px from the visible one.
+    let file_in = |folder: &str| {
+        fs::create_dir_all(root.path().join("set/training").join(folder)).unwrap();
+        root.path().join("set/training").join(folder).join("000000_10.png")
+    };
+    fs::copy(root.path().join("rig/left/000.png"), file_in("image_2")).unwrap();
+    fs::copy(root.path().join("rig/right/000.png"), file_in("image_3")).unwrap();
+    let truth = |u: u32, _: u32| Luma([if u < 80 { 15 * 256u16 } else { 10 * 256 }]);
+    image::ImageBuffer::from_fn(160, 64, truth).save(file_in("disp_noc_0")).unwrap();
+    GrayImage::from_fn(160, 64, |u, _| Luma([u8::from(u < 80)])).save(file_in("obj_map")).unwrap();
+    let found = json(&["evaluate", "stereo", "set", "--json"]);
+    let regions = &found["regions"];
+    assert_eq!((&found["benchmark"], &regions["noc"]["pixels"]), (&"kitti-2015".into(), &10_240.into()));
+    assert!(
+        regions["noc_background"]["coverage"].as_f64().unwrap() > 0.6 && regions["noc_background"]["d1"].as_f64().unwrap() < 0.01,
+        "{found}"
+    );
+    let foreground = &regions["noc_foreground"];
+    assert!(
+        foreground["d1"].as_f64().unwrap() > 0.99 && (foreground["mean_signed_error_px"].as_f64().unwrap() + 5.0).abs() < 0.1,
+        "{found}"
+    );
+    assert!(regions["occ"].is_null());
+    let given = json(&["evaluate", "stereo", "set", "--disparity", "set/training/disp_noc_0", "--json"]);
+    assert_eq!((&given["regions"]["noc"]["d1_filled"], &given["regions"]["noc"]["coverage"]), (&0.0.into(), &1.0.into()));
+    let printed = String::from_utf8(dynvox(root.path(), &["inspect", "set"]).stdout).unwrap();
+    assert!(printed.contains("kitti-2015, 1 pairs") && printed.contains("dynvox evaluate stereo set"), "{printed}");
+    let refused = dynvox(root.path(), &["evaluate", "stereo", "rig"]);
+    assert!(!refused.status.success() && output_text(&refused).contains("is not a stereo benchmark"), "{}", output_text(&refused));
+    // A run's folder against its own poses in the other format.
+    let small = ["--set", "street.width=160", "--set", "street.height=64", "--set", "street.frames=3"];
+    json(&[&["run", "--profile", "tiny", "--out", "run", "--json"], &small[..]].concat());
+    let same = json(&["evaluate", "trajectory", "run", "run/trajectory_kitti.txt", "--json"]);
+    assert!(same["ate_m"].as_f64().unwrap() < 1e-9 && same["rpe_r_deg"].as_f64().unwrap() < 1e-6, "{same}");
+    let refused = dynvox(root.path(), &["evaluate", "trajectory", "run", "rig/calib.txt"]);
+    assert!(!refused.status.success() && output_text(&refused).contains("line 1 is not a pose"), "{}", output_text(&refused));
+}
