@@ -1,7 +1,9 @@
 //! Choosing a source and laying it over a data set.
 
 use crate::formats::{FormatError, Image, read_opencv_depth, read_pfm, read_png_deep};
-use crate::input::source::{AvailableMasks, FrameSource, GivenDepth, InputError, Layer, Overlay, Quantity, StereoImages, to_disparity};
+use crate::input::source::{
+    AvailableMasks, FrameSource, GivenDepth, InputError, Overlay, OverlaySource, Quantity, StereoImages, to_disparity,
+};
 use dynvox_core::geometry::StereoRig;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -89,8 +91,8 @@ fn quantity_of(folder: &Path) -> Quantity {
 fn file_of(folders: &[PathBuf], stem: &str) -> Option<PathBuf> {
     let short = stem.parse::<u32>().ok().map(|number| format!("{number:04}"));
     let stems = std::iter::once(stem).chain(short.as_deref());
-    let places = stems.flat_map(|stem| folders.iter().map(move |folder| (folder, stem)));
-    let mut files = places.flat_map(|(folder, stem)| ENDINGS.map(|ending| folder.join(format!("{stem}.{ending}"))));
+    let candidates = stems.flat_map(|stem| folders.iter().map(move |folder| (folder, stem)));
+    let mut files = candidates.flat_map(|(folder, stem)| ENDINGS.map(|ending| folder.join(format!("{stem}.{ending}"))));
     files.find(|path| path.is_file())
 }
 
@@ -124,7 +126,7 @@ enum Source {
     Exact,
 }
 
-impl Layer for Source {
+impl OverlaySource for Source {
     fn add(&self, dataset: &dyn FrameSource, index: usize, images: &mut StereoImages) -> Result<(), InputError> {
         let (size, rig) = (dataset.size(), dataset.rig());
         images.depth = match self {

@@ -6,7 +6,7 @@
 //! ([`crate::input::DepthRefusals`]); a file that is missing,
 //! broken or of another size ends the run with a sentence.
 //!
-//! Memory: one image of `f32` and one of `u16`, whatever a file's header says.
+//! Memory: one image of `f32` and one of `u16`, independent of a file's header.
 
 mod files;
 #[cfg(test)]

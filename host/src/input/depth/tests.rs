@@ -24,7 +24,7 @@ fn wedge_px(u: usize, v: usize) -> f64 {
     4.0 + u as f64 + v as f64 / 8.0
 }
 
-fn said<T>(result: Result<T, impl std::fmt::Display>) -> String {
+fn refusal_of<T>(result: Result<T, impl std::fmt::Display>) -> String {
     result.err().expect("it should be refused").to_string()
 }
 
@@ -75,7 +75,7 @@ fn broken_files_and_other_sizes_are_refused_with_a_sentence() {
     let pfm = |bytes: &[u8]| {
         let path = root.path().join("a.pfm");
         fs::write(&path, bytes).unwrap();
-        said(read_pfm(&path, (2, 1)))
+        refusal_of(read_pfm(&path, (2, 1)))
     };
     assert!(pfm(b"Pf\n2 2\n-1\n0123456701234567").contains("it is 2 x 2 px, but the images are 2 x 1 px"));
     assert!(pfm(b"Pf\n2 1\n-1\n0123").contains("holds 4 bytes of pixels, not 8"));
@@ -84,13 +84,13 @@ fn broken_files_and_other_sizes_are_refused_with_a_sentence() {
     assert!(pfm(b"Pf\n2 1\n0\n01234567").contains("scale"));
     assert!(pfm(b"Pf\n99999999999999999999 1\n-1\n").contains("not numbers"));
     assert!(pfm(b"Pf").contains("does not have the header"));
-    assert!(said(read_opencv_depth(&fixture("depth_float.xml"), SIZE)).contains("type \"f\""));
-    assert!(said(read_opencv_depth(&fixture("depth.xml"), (9, 6))).contains("it is 8 x 6 px"));
+    assert!(refusal_of(read_opencv_depth(&fixture("depth_float.xml"), SIZE)).contains("type \"f\""));
+    assert!(refusal_of(read_opencv_depth(&fixture("depth.xml"), (9, 6))).contains("it is 8 x 6 px"));
     let text = fs::read_to_string(fixture("depth.xml")).unwrap();
     let xml = |text: &str| {
         let path = root.path().join("a.xml");
         fs::write(&path, text).unwrap();
-        said(read_opencv_depth(&path, SIZE))
+        refusal_of(read_opencv_depth(&path, SIZE))
     };
     assert!(xml(&text.replace("9000", "90000")).contains("not a 16-bit number"));
     assert!(xml(&text.replace("9000 ", "")).contains("holds 47 values, not 48"));
@@ -98,12 +98,12 @@ fn broken_files_and_other_sizes_are_refused_with_a_sentence() {
     assert!(xml(&text[..200]).contains("not XML"));
     let small = root.path().join("small.png");
     image::GrayImage::new(8, 6).save(&small).unwrap();
-    assert!(said(read(&small, Quantity::DisparityPx, SIZE, &RIG)).contains("8 bit, not of one of 16"));
-    assert!(said(read(&fixture("disparity.png"), Quantity::DisparityPx, (4, 4), &RIG)).contains("8 x 6 px"));
+    assert!(refusal_of(read(&small, Quantity::DisparityPx, SIZE, &RIG)).contains("8 bit, not of one of 16"));
+    assert!(refusal_of(read(&fixture("disparity.png"), Quantity::DisparityPx, (4, 4), &RIG)).contains("8 x 6 px"));
 }
 
 #[test]
-fn values_no_rig_has_are_counted_whatever_the_format() {
+fn values_impossible_for_the_rig_are_counted_in_every_format() {
     let values = Image::new(6, 1, vec![f32::INFINITY, f32::NAN, -3.0, 256.0, 255.9, 0.0]).unwrap();
     let given = to_disparity(&values, Quantity::DisparityPx, &RIG);
     assert_eq!(given.disparity_q8.pixels(), [0, 0, 0, 0, 65_510, 0]);
@@ -145,11 +145,11 @@ fn a_folders_name_says_what_it_holds_unless_the_option_does() {
     assert_eq!(at(&original, "files:ROOT/elas"), Some(5 * 256), "the original's names");
     let notes = laid_over(&original, "depth:ROOT/elas").unwrap().notes().to_vec();
     assert!(notes.iter().any(|note| note.contains("depth from") && note.contains("for 1 of 2 frames")), "{notes:?}");
-    assert!(said(laid_over(&original, "files:ROOT/elas").unwrap().frame(1)).contains("000001.png cannot be used: it is missing"));
-    assert!(said(laid_over(&original, "files:ROOT/left").unwrap().frame(0)).contains("8 bit"), "pictures are no depth");
-    assert!(said(laid_over(&original, "files:ROOT/nowhere")).contains("no such folder"));
-    assert!(said(laid_over(&original, "files:ROOT/elas/..")).contains("nothing for any frame"));
-    assert!(said(laid_over(&original, "exact")).contains("only the synthetic street"));
+    assert!(refusal_of(laid_over(&original, "files:ROOT/elas").unwrap().frame(1)).contains("000001.png cannot be used: it is missing"));
+    assert!(refusal_of(laid_over(&original, "files:ROOT/left").unwrap().frame(0)).contains("8 bit"), "pictures are no depth");
+    assert!(refusal_of(laid_over(&original, "files:ROOT/nowhere")).contains("no such folder"));
+    assert!(refusal_of(laid_over(&original, "files:ROOT/elas/..")).contains("nothing for any frame"));
+    assert!(refusal_of(laid_over(&original, "exact")).contains("only the synthetic street"));
     assert!("pfm:x".parse::<DepthChoice>().is_err() && "files:".parse::<DepthChoice>().is_err());
 }
 

@@ -109,9 +109,9 @@ pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Findin
             pairs.push(Pair::of(&left, &right));
         }
     }
-    findings.extend(judge(&pairs));
+    findings.extend(diagnose(&pairs));
     let thumbnails = order::window(indices).iter().map_while(|&index| Some(order::thumbnail(&source.frame(index).ok()?.left)));
-    findings.extend(order::judge(&thumbnails.collect::<Vec<_>>(), indices.first().copied().unwrap_or(0)));
+    findings.extend(order::check(&thumbnails.collect::<Vec<_>>(), indices.first().copied().unwrap_or(0)));
     Ok(findings)
 }
 
@@ -158,7 +158,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-fn judge(pairs: &[Pair]) -> Vec<Finding> {
+fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let most = |holds: &dyn Fn(&Pair) -> bool| !pairs.is_empty() && 2 * pairs.iter().filter(|pair| holds(pair)).count() > pairs.len();
     if most(&|pair| pair.mean < BLACK) {
@@ -190,12 +190,12 @@ fn judge(pairs: &[Pair]) -> Vec<Finding> {
     }
     let matches: Vec<&PatchMatch> = pairs.iter().flat_map(|pair| &pair.matches).collect();
     if matches.len() >= FEWEST_MATCHES {
-        findings.extend(judge_matches(&matches));
+        findings.extend(check_matches(&matches));
     }
     findings
 }
 
-fn judge_matches(matches: &[&PatchMatch]) -> Vec<Finding> {
+fn check_matches(matches: &[&PatchMatch]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let share = |holds: &dyn Fn(&PatchMatch) -> bool| matches.iter().filter(|one| holds(one)).count() as f64 / matches.len() as f64;
     if share(&|one| one.disparity_px < -1.0) > 0.6 {

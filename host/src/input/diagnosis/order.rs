@@ -39,7 +39,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// What is wrong with the order of consecutive images, the first of them frame `first`.
-pub fn judge(thumbnails: &[Vec<f64>], first: usize) -> Option<Finding> {
+pub fn check(thumbnails: &[Vec<f64>], first: usize) -> Option<Finding> {
     let count = thumbnails.len();
     if count < FEWEST {
         return None;

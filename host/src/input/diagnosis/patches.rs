@@ -1,4 +1,4 @@
-//! Patches of a left image found again in the right one, whatever the row: first at half size over a wide window, then at full size about it,
+//! Patches of a left image matched to the right one, also across rows: first at half size over a wide window, then at full size about it,
 //! and below the pixel by a parabola. Similarity is normalised, so that exposure does not matter.
 
 use crate::formats::Image;
@@ -88,8 +88,8 @@ fn has_corners(image: &Image<u8>, u: i32, v: i32) -> bool {
 /// The matches of a pair.
 pub fn matches(left: &Image<u8>, right: &Image<u8>) -> Vec<PatchMatch> {
     let (Some(small_left), Some(small_right)) = (half(left), half(right)) else { return Vec::new() };
-    let places = (STEP_PX..left.height()).step_by(STEP_PX).flat_map(|v| (STEP_PX..left.width()).step_by(STEP_PX).map(move |u| (u, v)));
-    places.filter_map(|(u, v)| find([left, right], [&small_left, &small_right], u as i32, v as i32)).collect()
+    let centers = (STEP_PX..left.height()).step_by(STEP_PX).flat_map(|v| (STEP_PX..left.width()).step_by(STEP_PX).map(move |u| (u, v)));
+    centers.filter_map(|(u, v)| find([left, right], [&small_left, &small_right], u as i32, v as i32)).collect()
 }
 
 fn find([left, right]: [&Image<u8>; 2], [small_left, small_right]: [&Image<u8>; 2], u: i32, v: i32) -> Option<PatchMatch> {

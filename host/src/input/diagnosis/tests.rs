@@ -7,7 +7,7 @@ use std::path::PathBuf;
 const WIDTH: usize = 480;
 const HEIGHT: usize = 200;
 
-/// Smooth noise of several scales about a place in the world.
+/// Smooth noise of several scales about a shift in the world.
 fn texture(x: f64, y: f64) -> f64 {
     let hash = |i: i64, j: i64, seed: u64| {
         let mixed = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (j as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F) ^ seed;
@@ -42,7 +42,7 @@ fn faults(right: impl Fn(f64, f64) -> ([f64; 2], f64)) -> Vec<Fault> {
         })
         .collect();
     assert!(pairs.iter().all(|pair| pair.difference < SAME || pair.mean < BLACK || pair.matches.len() > 20));
-    judge(&pairs).into_iter().map(|finding| finding.fault).collect()
+    diagnose(&pairs).into_iter().map(|finding| finding.fault).collect()
 }
 
 #[test]
@@ -57,37 +57,37 @@ fn a_clean_pair_gives_no_finding_and_each_fault_is_named() {
 }
 
 #[test]
-fn the_size_of_the_fault_stands_in_the_sentence_and_decides_on_refusal() {
-    let said = |rows: f64| {
+fn the_message_gives_the_size_of_the_fault_and_large_faults_are_refused() {
+    let finding_for = |rows: f64| {
         let pairs = [0.0, 400.0, 800.0].map(|shift| {
             let left = image(|u, v| texture(u + shift, v));
             Pair::of(&left, &image(|u, v| texture(u + shift + 12.0, v - rows)))
         });
-        let findings = judge(&pairs);
+        let findings = diagnose(&pairs);
         (findings[0].refused, findings[0].message.clone())
     };
-    let (refused, message) = said(3.0);
+    let (refused, message) = finding_for(3.0);
     assert!(refused && message.contains("3.0 px apart in height") && message.contains("--calibration"), "{message}");
-    assert!(!said(0.8).0, "a warning");
+    assert!(!finding_for(0.8).0, "a warning");
 }
 
 #[test]
 fn black_images_are_refused_and_few_matches_give_no_verdict() {
     let black = image(|_, _| 0.0);
-    assert_eq!(judge(&[Pair::of(&black, &black)])[0].fault, Fault::Black);
+    assert_eq!(diagnose(&[Pair::of(&black, &black)])[0].fault, Fault::Black);
     let grey = image(|u, _| 100.0 + u / 10.0);
     let other = image(|u, _| 90.0 + u / 10.0);
-    assert!(judge(&[Pair::of(&grey, &other)]).iter().all(|finding| finding.fault == Fault::Focus), "nothing can be matched");
+    assert!(diagnose(&[Pair::of(&grey, &other)]).iter().all(|finding| finding.fault == Fault::Focus), "nothing can be matched");
 }
 
 #[test]
 fn shuffled_frames_are_out_of_order_and_a_gap_is_a_jump() {
-    let thumbnails = |places: &[f64]| places.iter().map(|place| order::thumbnail(&image(|u, v| texture(u + place, v)))).collect::<Vec<_>>();
-    let drive: Vec<f64> = (0..16).map(|frame| 6.0 * f64::from(frame)).collect();
-    assert!(order::judge(&thumbnails(&drive), 0).is_none());
-    let shuffled: Vec<f64> = (0..16).map(|frame| drive[frame * 7 % 16]).collect();
-    assert_eq!(order::judge(&thumbnails(&shuffled), 0).unwrap().fault, Fault::Order);
-    assert!(order::judge(&thumbnails(&[5.0; 16]), 0).is_none(), "a standing camera");
+    let thumbnails = |shifts: &[f64]| shifts.iter().map(|shift| order::thumbnail(&image(|u, v| texture(u + shift, v)))).collect::<Vec<_>>();
+    let moving: Vec<f64> = (0..16).map(|frame| 6.0 * f64::from(frame)).collect();
+    assert!(order::check(&thumbnails(&moving), 0).is_none());
+    let shuffled: Vec<f64> = (0..16).map(|frame| moving[frame * 7 % 16]).collect();
+    assert_eq!(order::check(&thumbnails(&shuffled), 0).unwrap().fault, Fault::Order);
+    assert!(order::check(&thumbnails(&[5.0; 16]), 0).is_none(), "a standing camera");
 }
 
 #[test]

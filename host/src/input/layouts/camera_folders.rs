@@ -1,4 +1,4 @@
-//! Folders of camera images: which two belong together, and where the times of their images stand.
+//! Folders of camera images: which two form a pair, and which file has the times of their images.
 
 use super::names::{pictures_in, stem_of};
 use super::pairing::CameraFiles;

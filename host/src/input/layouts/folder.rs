@@ -41,7 +41,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
     })
 }
 
-/// The name of a folder, whatever way it was reached.
+/// The name of a folder, also where `path` is relative.
 pub fn name_of(path: &Path) -> String {
     path.canonicalize().ok().and_then(|full| Some(full.file_name()?.to_string_lossy().into_owned())).unwrap_or("folder".into())
 }

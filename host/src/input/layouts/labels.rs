@@ -124,8 +124,8 @@ mod tests {
         let car = &truth[2].objects[..];
         assert!(car.len() == 1 && car[0].id == 7 && car[0].moving && (car[0].speed_m_s - 12.0).abs() < 1e-9, "{car:?}");
         assert!((car[0].t_world_object.rotate(Vector3::z()) - Vector3::z()).norm() < 1e-3, "its z points forward");
-        let place = Vector3::from(car[0].t_world_object.translation_m) - Vector3::from(poses[2].translation_m);
-        assert!((place - Vector3::new(2.06, 1.6, 20.403)).norm() < 1e-9, "seen from the left camera, not from camera 0: {place}");
+        let position = Vector3::from(car[0].t_world_object.translation_m) - Vector3::from(poses[2].translation_m);
+        assert!((position - Vector3::new(2.06, 1.6, 20.403)).norm() < 1e-9, "seen from the left camera, not from camera 0: {position}");
         assert_eq!(truth[2].unlabelled, [PixelBox { left: 0, top: 0, width: 10, height: 10 }]);
         std::fs::write(&path, "0 7 Car 0 0\n").unwrap();
         assert!(read_labels(&path, &poses, Vector3::new(0.06, 0.0, 0.003), 0.1).unwrap_err().to_string().contains("line 1 is not a label"));

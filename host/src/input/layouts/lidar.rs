@@ -72,8 +72,8 @@ impl LidarFiles {
             f64::from(f32::from_le_bytes([point[4 * at], point[4 * at + 1], point[4 * at + 2], point[4 * at + 3]]))
         };
         let points_m = points.iter().map(|point| {
-            let place = Vector4::new(number(point, 0), number(point, 1), number(point, 2), 1.0);
-            (to_camera * place).into()
+            let homogeneous = Vector4::new(number(point, 0), number(point, 1), number(point, 2), 1.0);
+            (to_camera * homogeneous).into()
         });
         Ok(Some(LidarScan { points_m: points_m.collect(), cameras: self.cameras }))
     }
@@ -87,7 +87,7 @@ mod tests {
     fn rectification_turns_the_points_and_scaling_keeps_them_under_their_pixels() {
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("calib.txt");
-        // The sensor looks along x; rectification turns by a right angle about z, which nobody can overlook.
+        // The sensor looks along x; rectification turns by a right angle about z, so that an omitted turn is obvious.
         let text = "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP1: 700 0 600 -350 0 700 180 0 0 0 1 0\n\
                     R0_rect: 0 -1 0 1 0 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 -0.25\n";
         std::fs::write(&path, text).unwrap();

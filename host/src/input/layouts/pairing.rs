@@ -43,7 +43,7 @@ pub struct Pairing {
 }
 
 impl Pairing {
-    /// Pairs the images of two cameras; `None` where nothing tells which belong together.
+    /// Pairs the images of two cameras; `None` where neither names nor time stamps pair them.
     pub fn of(left: &CameraFiles, right: &CameraFiles) -> Option<Self> {
         let counts = (left.files.len(), right.files.len());
         let stems = |camera: &CameraFiles| camera.files.iter().map(|path| stem_of(path)).collect::<Vec<_>>();
@@ -92,12 +92,12 @@ impl Pairing {
 
 /// Positions of equal keys, in the order of the left ones.
 fn equal_keys(left: &[String], right: &[String]) -> Vec<(usize, usize)> {
-    let places: BTreeMap<&str, usize> = right.iter().enumerate().map(|(at, key)| (key.as_str(), at)).collect();
+    let positions: BTreeMap<&str, usize> = right.iter().enumerate().map(|(at, key)| (key.as_str(), at)).collect();
     // A key that stands for several images tells nothing.
-    if places.len() != right.len() || left.iter().collect::<std::collections::BTreeSet<_>>().len() != left.len() {
+    if positions.len() != right.len() || left.iter().collect::<std::collections::BTreeSet<_>>().len() != left.len() {
         return Vec::new();
     }
-    left.iter().enumerate().filter_map(|(at, key)| Some((at, *places.get(key.as_str())?))).collect()
+    left.iter().enumerate().filter_map(|(at, key)| Some((at, *positions.get(key.as_str())?))).collect()
 }
 
 /// For each left stamp the nearest right one within half a frame, where it in turn is the nearest of that.

@@ -31,7 +31,7 @@ pub struct Sequence {
     geometry: FittedGeometry,
     /// One a frame, ns; `None` where nothing tells them.
     stamps_ns: Option<Vec<u64>>,
-    /// Numbers of the frames, by which times are assumed where there are none.
+    /// Numbers of the frames; times are assumed from them where no file has times.
     numbers: Vec<usize>,
     truth: Option<Vec<Transform>>,
     masks: AvailableMasks,
@@ -92,7 +92,7 @@ impl Sequence {
     /// Pairs the images and gives each pair its time and pose.
     pub(super) fn from_parts(parts: Parts) -> Result<Self, InputError> {
         let mut notes = parts.notes;
-        let (pairs, stacking, left, places) = paired(parts.images, &mut notes)?;
+        let (pairs, stacking, left, positions) = paired(parts.images, &mut notes)?;
         let first = &pairs.first().ok_or_else(|| InputError::Empty { path: PathBuf::from(&parts.name) })?[0];
         let size = picture_size(first).map_err(InputError::image)?;
         let image_size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
@@ -100,17 +100,17 @@ impl Sequence {
         notes.extend(raw_note(&parts.cameras, &geometry));
         let bits = match parts.bits {
             Some(bits) => Some(bits),
-            None => told_bits(&pairs, &mut notes)?,
+            None => detected_bits(&pairs, &mut notes)?,
         };
         let number = |&at: &usize| if parts.numbered { frame_number(&left.files[at]).unwrap_or(at) } else { at };
-        let numbers: Vec<usize> = places.iter().map(number).collect();
+        let numbers: Vec<usize> = positions.iter().map(number).collect();
         let stamps_ns = match parts.times {
             Some((path, times)) => Some(rows_of(&times, &numbers).ok_or_else(|| InputError::Table {
                 reason: format!("it has {} times, but there are images up to number {}", times.len(), numbers.iter().max().unwrap_or(&0)),
                 action: format!("Give one line per image, or move the file away: {ASSUMED_HZ} Hz are then assumed"),
                 path,
             })?),
-            None => left.stamps_ns.as_ref().and_then(|stamps| rows_of(stamps, &places)),
+            None => left.stamps_ns.as_ref().and_then(|stamps| rows_of(stamps, &positions)),
         };
         if stamps_ns.is_none() {
             notes.push(format!("no times of the images: {ASSUMED_HZ} frames a second are assumed"));
@@ -180,8 +180,8 @@ fn paired(images: ImageFiles, notes: &mut Vec<String>) -> Result<Paired, InputEr
     let [left, right] = match images {
         ImageFiles::Stacked(files, stacking) => {
             let pairs = files.files.iter().map(|path| [path.clone(), path.clone()]).collect();
-            let places = (0..files.files.len()).collect();
-            return Ok((pairs, Some(stacking), files, places));
+            let positions = (0..files.files.len()).collect();
+            return Ok((pairs, Some(stacking), files, positions));
         }
         ImageFiles::Cameras(cameras) => cameras,
     };
@@ -195,13 +195,13 @@ fn paired(images: ImageFiles, notes: &mut Vec<String>) -> Result<Paired, InputEr
     })?;
     notes.extend(pairing.note());
     let pairs = pairing.pairs.iter().map(|&(l, r)| [left.files[l].clone(), right.files[r].clone()]).collect();
-    let places = pairing.pairs.iter().map(|&(at, _)| at).collect();
-    Ok((pairs, None, left, places))
+    let positions = pairing.pairs.iter().map(|&(at, _)| at).collect();
+    Ok((pairs, None, left, positions))
 }
 
 /// How many bits of 16-bit images are significant, from pictures spread over the sequence; `None` where the first is of 8 bit. A picture that
 /// cannot be read is passed over: it is refused when its turn comes.
-fn told_bits(pairs: &[[PathBuf; 2]], notes: &mut Vec<String>) -> Result<Option<u32>, InputError> {
+fn detected_bits(pairs: &[[PathBuf; 2]], notes: &mut Vec<String>) -> Result<Option<u32>, InputError> {
     let step = pairs.len().div_ceil(RANGE_PICTURES).max(1);
     let mut largest = None;
     for (at, [path, _]) in pairs.iter().step_by(step).enumerate() {

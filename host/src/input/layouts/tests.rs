@@ -1,5 +1,8 @@
 //! Each layout on a tiny folder, and everything that can be wrong with it.
 
+mod data_sets;
+mod folders;
+
 use super::*;
 use crate::formats::luma;
 use crate::input::source::{FrameSource, Scaled};
@@ -19,6 +22,16 @@ fn grey(path: PathBuf, width: u32, seed: u8) {
 fn colour(path: PathBuf) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     RgbImage::from_fn(40, 32, |u, v| ::image::Rgb([u as u8, v as u8, 200])).save(path).unwrap();
+}
+
+/// Frame `at` of a recording of two cameras.
+fn pair(at: u32) -> [GrayImage; 2] {
+    [0u32, 90].map(|shift| GrayImage::from_fn(40, 32, |u, v| Luma([(u * 3 + v * 5 + at * 17 + shift) as u8])))
+}
+
+fn save(image: &GrayImage, path: PathBuf) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    image.save(path).unwrap();
 }
 
 /// An odometry root with sequence 06 of `frames` grey frames.
@@ -248,159 +261,6 @@ fn half_size_averages_four_pixels_and_halves_the_rig() {
     let pixel = |u: u32, v: u32| u * 3 + v * 2;
     let mean = (pixel(10, 6) + pixel(11, 6) + pixel(10, 7) + pixel(11, 7) + 2) / 4;
     assert_eq!(half.frame(0).unwrap().left.get(5, 3), Some(mean as u8));
-}
-
-/// Four frames of two cameras, as anything can be dressed with them.
-fn pair(at: u32) -> [GrayImage; 2] {
-    [0u32, 90].map(|shift| GrayImage::from_fn(40, 32, |u, v| Luma([(u * 3 + v * 5 + at * 17 + shift) as u8])))
-}
-
-fn save(image: &GrayImage, path: PathBuf) {
-    fs::create_dir_all(path.parent().unwrap()).unwrap();
-    image.save(path).unwrap();
-}
-
-#[test]
-fn one_recording_dressed_in_every_folder_and_format_gives_the_same_frames() {
-    type Dress = fn(&Path, u32, &[GrayImage; 2]);
-    let dresses: [(&str, Dress); 9] = [
-        ("two folders, left and right", |root, at, [l, r]| {
-            save(l, root.join(format!("left/{}.png", at + 8)));
-            save(r, root.join(format!("right/{}.png", at + 8)));
-        }),
-        ("two folders, cam0 and cam1", |root, at, [l, r]| {
-            save(l, root.join(format!("cam0/data/{at:06}.pgm")));
-            save(r, root.join(format!("cam1/data/{at:06}.pgm")));
-        }),
-        ("two folders, infra1 and infra2", |root, at, [l, r]| {
-            save(l, root.join(format!("infra1/a_{at}.tiff")));
-            save(r, root.join(format!("infra2/b_{at:04}.bmp")));
-        }),
-        ("two folders, Left and Right", |root, at, [l, r]| {
-            let deep = |image: &GrayImage, path: PathBuf| {
-                fs::create_dir_all(path.parent().unwrap()).unwrap();
-                ImageBuffer::from_fn(40, 32, |u, v| Luma([u16::from(image.get_pixel(u, v)[0]) << 8])).save(path).unwrap();
-            };
-            deep(l, root.join(format!("Left/{at}.png")));
-            deep(r, root.join(format!("Right/{at}.png")));
-        }),
-        ("two folders, image_0 and image_1", |root, at, [l, r]| {
-            // The right camera is a millisecond late.
-            save(l, root.join(format!("image_0/{}.png", 1_403_636_579_000_000_000 + u64::from(at) * 50_000_000)));
-            save(r, root.join(format!("image_1/{}.png", 1_403_636_579_001_000_000 + u64::from(at) * 50_000_000)));
-        }),
-        ("one folder, the camera in the files' names", |root, at, [l, r]| {
-            save(l, root.join(format!("left_{}.png", at + 8)));
-            save(r, root.join(format!("right_{}.png", at + 8)));
-        }),
-        ("one folder, the camera in the files' names", |root, at, [l, r]| {
-            save(l, root.join(format!("{at:03}_0.ppm")));
-            save(r, root.join(format!("{at:03}_1.ppm")));
-        }),
-        ("one folder, both images in one file", |root, at, [l, r]| {
-            save(&GrayImage::from_fn(80, 32, |u, v| *if u < 40 { l } else { r }.get_pixel(u % 40, v)), root.join(format!("{at}.png")));
-        }),
-        ("one folder, both images in one file", |root, at, [l, r]| {
-            save(&GrayImage::from_fn(40, 64, |u, v| *if v < 32 { l } else { r }.get_pixel(u, v % 32)), root.join(format!("{at}.png")));
-        }),
-    ];
-    for (arrangement, dress) in dresses {
-        let root = TempDir::new().unwrap();
-        fs::write(root.path().join("calib.txt"), CALIB).unwrap();
-        (0..4).for_each(|at| dress(root.path(), at, &pair(at)));
-        assert_eq!(folder::describe(root.path()), arrangement);
-        let dataset = open(root.path(), &OpenOptions::default()).unwrap_or_else(|error| panic!("{arrangement}: {error}"));
-        assert_eq!((dataset.len(), dataset.size()), (4, (40, 32)), "{arrangement}");
-        for at in 0..4 {
-            let frame = dataset.frame(at).unwrap();
-            let expected = pair(at as u32).map(|image| image.into_raw());
-            assert_eq!([frame.left.pixels(), frame.right.pixels()], expected.each_ref().map(Vec::as_slice), "{arrangement} frame {at}");
-        }
-    }
-}
-
-#[test]
-fn images_of_one_camera_are_refused_unless_said_to_hold_both() {
-    let root = TempDir::new().unwrap();
-    fs::write(root.path().join("calib.txt"), CALIB).unwrap();
-    (0..2).for_each(|at| save(&pair(at)[0], root.path().join(format!("{at}.png"))));
-    assert!(refusal(root.path(), None).contains("--stacked side-by-side"));
-    let options = OpenOptions { stacking: Some(Stacking::SideBySide), ..OpenOptions::default() };
-    assert_eq!(open(root.path(), &options).unwrap().size(), (20, 32));
-}
-
-/// Four frames at 20 Hz in the layouts of other data sets, each with its own calibration and times.
-#[test]
-fn one_recording_dressed_as_each_data_set_gives_the_same_frames_rig_and_times() {
-    let each = |dress: &dyn Fn(u32, [GrayImage; 2])| (0..4).for_each(|at| dress(at, pair(at)));
-    let rect = CALIB.replace("P0", "P_rect_00").replace("P1", "P_rect_01").replace("P2", "P_rect_02").replace("P3", "P_rect_03");
-    let dates: String = (0..4).map(|at| format!("2011-09-26 13:02:25.{:09}\n", at * 50_000_000)).collect();
-    let start_ns: u64 = 1_317_042_145_000_000_000;
-    let write = |path: PathBuf, text: &str| {
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(path, text).unwrap();
-    };
-    let dress = |layout: Layout, root: &Path| match layout {
-        Layout::KittiRaw => {
-            let drive = root.join("2011_09_26_drive_0001_sync");
-            write(root.join("calib_cam_to_cam.txt"), &format!("calib_time: 09-Jan-2012\nS_rect_00: 40 32\n{rect}"));
-            each(&|at, [l, r]| {
-                save(&l, drive.join(format!("image_00/data/{at:010}.png")));
-                save(&r, drive.join(format!("image_01/data/{at:010}.png")));
-            });
-            ["image_00", "image_01"].iter().for_each(|camera| write(drive.join(camera).join("timestamps.txt"), &dates));
-        }
-        Layout::Kitti360 => {
-            let drive = root.join("data_2d_raw/2013_05_28_drive_0000_sync");
-            write(root.join("calibration/perspective.txt"), &rect);
-            each(&|at, [l, r]| {
-                save(&l, drive.join(format!("image_00/data_rect/{at:010}.png")));
-                save(&r, drive.join(format!("image_01/data_rect/{at:010}.png")));
-            });
-            ["image_00", "image_01"].iter().for_each(|camera| write(drive.join(camera).join("timestamps.txt"), &dates));
-        }
-        Layout::Cityscapes => {
-            let camera = r#"{"extrinsic": {"baseline": 0.5, "x": 1.7}, "intrinsic": {"fx": 50, "fy": 50.1, "u0": 20, "v0": 16}}"#;
-            write(root.join("camera/train/aachen/aachen_000001_000002_camera.json"), camera);
-            each(&|at, [l, r]| {
-                save(&l, root.join(format!("leftImg8bit_sequence/train/aachen/aachen_000001_{at:06}_leftImg8bit.png")));
-                save(&r, root.join(format!("rightImg8bit_sequence/train/aachen/aachen_000001_{at:06}_rightImg8bit.png")));
-            });
-        }
-        _ => {
-            write(root.join("mav0/calib.txt"), CALIB);
-            let table = |late: u64| {
-                let row = |at: u64| format!("{},{at}.png\r\n", start_ns + at * 50_000_000 + late);
-                format!("#timestamp [ns],filename\r\n{}", (0..4).map(row).collect::<String>())
-            };
-            each(&|at, [l, r]| {
-                save(&l, root.join(format!("mav0/cam0/data/{at}.png")));
-                save(&r, root.join(format!("mav0/cam1/data/{at}.png")));
-            });
-            write(root.join("mav0/cam0/data.csv"), &table(0));
-            write(root.join("mav0/cam1/data.csv"), &table(1_000_000));
-        }
-    };
-    for layout in [Layout::KittiRaw, Layout::Kitti360, Layout::Cityscapes, Layout::Euroc] {
-        let root = TempDir::new().unwrap();
-        dress(layout, root.path());
-        assert_eq!(Layout::guess(root.path()).unwrap(), layout);
-        let (found, sequences) = survey(root.path(), None).unwrap();
-        assert_eq!((found, sequences.len()), (layout, 1), "{layout:?}");
-        let dataset = open(root.path(), &OpenOptions::default()).unwrap_or_else(|error| panic!("{layout:?}: {error}"));
-        assert_eq!(
-            (dataset.len(), dataset.size(), dataset.rig().focal_px, dataset.rig().baseline_m),
-            (4, (40, 32), 50.0, 0.5),
-            "{layout:?}"
-        );
-        for at in 0..4 {
-            let frame = dataset.frame(at).unwrap();
-            let expected = pair(at as u32).map(|image| image.into_raw());
-            assert_eq!([frame.left.pixels(), frame.right.pixels()], expected.each_ref().map(Vec::as_slice), "{layout:?} frame {at}");
-            let ns = if layout == Layout::Cityscapes { at as u64 * 1_000_000_000 / 17 } else { start_ns + at as u64 * 50_000_000 };
-            assert_eq!(dataset.stamp_ns(at), Some(ns), "{layout:?} frame {at}");
-        }
-    }
 }
 
 #[test]

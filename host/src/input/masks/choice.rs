@@ -1,7 +1,7 @@
 //! Choosing a source and laying it over a data set.
 
 use super::{Frames, MaskSource, exact::Exact, indexed::Indexed, mnc::Mnc, mots::MotsPictures, mots::MotsText, noisy::Noisy};
-use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, Layer, Overlay, StereoImages};
+use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, Overlay, OverlaySource, StereoImages};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -68,7 +68,7 @@ pub fn attach(dataset: Box<dyn FrameSource>, choice: &MaskChoice) -> Result<Box<
     let Some(OpenedSource { source, note, fits_scaled }) = opened else { return Ok(dataset) };
     let scale = dataset.size().0 as f64 / dataset.full_size().0 as f64;
     let shrink = (!fits_scaled && dataset.size() != dataset.full_size()).then_some(scale);
-    Ok(Box::new(Overlay::new(dataset, MaskLayer { source, shrink }, note)))
+    Ok(Box::new(Overlay::new(dataset, MaskOverlay { source, shrink }, note)))
 }
 
 /// A source that was opened.
@@ -138,13 +138,13 @@ impl OpenedSource {
 }
 
 /// Masks, fitted to the images.
-struct MaskLayer {
+struct MaskOverlay {
     source: Box<dyn MaskSource>,
     /// How much masks must be scaled to fit the images.
     shrink: Option<f64>,
 }
 
-impl Layer for MaskLayer {
+impl OverlaySource for MaskOverlay {
     fn add(&self, dataset: &dyn FrameSource, index: usize, images: &mut StereoImages) -> Result<(), InputError> {
         let mut masks: FrameMasks = self.source.masks(index, images)?;
         if let Some(scale) = self.shrink {

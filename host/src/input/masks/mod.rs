@@ -4,9 +4,9 @@
 //! A source gives, frame by frame, owned [`crate::input::InstanceMask`]s, which the core takes as `Detection`s. Where a source says something that cannot be
 //! a mask (a file of another size, a line that is not a row) the run ends with a sentence; where it says too much or nothing usable (an
 //! instance without a row, an empty mask, an unknown class, more than the limits) that is counted in
-//! [`crate::input::MaskRefusals`]. The core judges the scores.
+//! [`crate::input::MaskRefusals`]. The core validates the scores.
 //!
-//! Memory: at most `MAX_MASKS` masks and `MAX_BYTES` bytes of them in a frame, whatever the files hold.
+//! Memory: at most `MAX_MASKS` masks and `MAX_BYTES` bytes of them in a frame; masks beyond that are counted.
 
 mod choice;
 mod exact;
@@ -39,7 +39,7 @@ struct Frames {
     size: (usize, usize),
 }
 
-/// The class of a name, whatever stands for its spaces.
+/// The class of a name; `_` and `-` may stand for spaces.
 fn class_of(name: &str) -> Option<Class> {
     Class::from_name(name).or_else(|| Class::from_name(&name.replace(['_', '-'], " ")))
 }

@@ -1,6 +1,6 @@
 //! KITTI-MOTS (Voigtlaender et al., *MOTS: Multi-Object Tracking and Segmentation*, CVPR 2019), as PNGs or as text.
 //!
-//! A 16-bit PNG a frame: `class * 1000 + instance`, 0 nothing, 10000 a region of which nothing is said. Or one text file a sequence, a row a
+//! A 16-bit PNG a frame: `class * 1000 + instance`, 0 nothing, 10000 a region to ignore. Or one text file a sequence, a row a
 //! mask: `frame id class height width runs`, with `id` as in the PNGs and [`crate::formats::rle`] for the runs. Class 1 is car, 2 pedestrian,
 //! 10 the region to ignore. There are no scores: all are 1. The tracks in the numbers are not used.
 
@@ -50,8 +50,8 @@ impl MaskSource for MotsPictures {
         let labels = read_labels(&path, self.frames.size)?;
         let boxes = bounding_boxes(&labels);
         let mut masks = FrameMasks::default();
-        let things = boxes.keys().filter(|label| **label / PER_CLASS != IGNORE);
-        let named = things.map(|&label| (label, class(label / PER_CLASS, &mut masks), 1.0)).collect();
+        let instances = boxes.keys().filter(|label| **label / PER_CLASS != IGNORE);
+        let named = instances.map(|&label| (label, class(label / PER_CLASS, &mut masks), 1.0)).collect();
         masks.extract(&labels, &boxes, named);
         Ok(masks)
     }
@@ -117,8 +117,8 @@ impl MaskSource for MotsText {
     }
 }
 
-/// The pieces of a run by column: column, first row, rows.
-fn pieces(runs: &[(usize, usize)], height: usize) -> impl Iterator<Item = (i32, i32, i32)> + '_ {
+/// The runs split by column: column, first row, rows.
+fn by_column(runs: &[(usize, usize)], height: usize) -> impl Iterator<Item = (i32, i32, i32)> + '_ {
     runs.iter().flat_map(move |&(start, length)| {
         let end = start + length;
         (start / height..=(end - 1) / height).map(move |u| {
@@ -129,13 +129,13 @@ fn pieces(runs: &[(usize, usize)], height: usize) -> impl Iterator<Item = (i32, 
 }
 
 fn around(runs: &[(usize, usize)], height: usize) -> Option<PixelBox> {
-    let boxes = pieces(runs, height).map(|(left, top, height)| PixelBox { left, top, width: 1, height });
+    let boxes = by_column(runs, height).map(|(left, top, height)| PixelBox { left, top, width: 1, height });
     boxes.reduce(|a, b| union(&a, &b))
 }
 
 fn filled(class: Class, pixels: PixelBox, runs: &[(usize, usize)], height: usize) -> InstanceMask {
     let mut mask = vec![0; pixels.area() as usize];
-    for (u, top, rows) in pieces(runs, height) {
+    for (u, top, rows) in by_column(runs, height) {
         for v in top..top + rows {
             mask[((v - pixels.top) * pixels.width + u - pixels.left) as usize] = 1;
         }

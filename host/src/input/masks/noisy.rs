@@ -1,6 +1,6 @@
 //! The same masks with a detector's faults, seeded: some are missed, cars beside one another become one, borders are ragged, scores vary,
-//! cars are called vans and the other way round, and things are seen that are not there. Each frame's draws depend on the seed and the
-//! frame's number alone.
+//! cars are called vans and the other way round, and false detections are added. Each frame's random numbers depend on
+//! the seed and the frame's number only.
 
 use super::MaskSource;
 use crate::input::source::{FrameMasks, InputError, InstanceMask, StereoImages, union};
@@ -94,7 +94,7 @@ fn joined(a: &InstanceMask, b: &InstanceMask) -> InstanceMask {
         .unwrap_or_else(|| a.clone())
 }
 
-/// A thing that is not there: an ellipse of some class somewhere below the sky.
+/// A false detection: an ellipse of some class somewhere below the sky.
 fn ghost(image: &PixelBox, random: &mut Random) -> Option<InstanceMask> {
     let classes = [Class::Car, Class::Car, Class::Person, Class::Truck, Class::Bus, Class::Other];
     let class = classes.get(random.below(classes.len() as u32) as usize).copied().unwrap_or_default();

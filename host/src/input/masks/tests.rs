@@ -28,12 +28,12 @@ fn rig() -> TempDir {
 }
 
 /// A rectangle of instance k at columns 4k.., rows 10..16, 3 px wide.
-fn thing(k: i32) -> PixelBox {
+fn pixels_of(k: i32) -> PixelBox {
     PixelBox { left: 4 * k, top: 10, width: 3, height: 6 }
 }
 
 fn labels(path: &Path, values: &[u16], deep: bool) {
-    let at = |u: u32, v: u32| (1..).zip(values).find(|(k, _)| thing(*k).contains(u as i32, v as i32)).map_or(0, |(_, value)| *value);
+    let at = |u: u32, v: u32| (1..).zip(values).find(|(k, _)| pixels_of(*k).contains(u as i32, v as i32)).map_or(0, |(_, value)| *value);
     if deep {
         ImageBuffer::from_fn(WIDTH, HEIGHT, |u, v| Luma([at(u, v)])).save(path).unwrap();
     } else {
@@ -59,7 +59,7 @@ fn listed(values: &[u16], list: &str) -> Result<FrameMasks, InputError> {
     first(root.path(), &MaskChoice::Auto)
 }
 
-fn said<T>(result: Result<T, InputError>) -> String {
+fn refusal_of<T>(result: Result<T, InputError>) -> String {
     result.map(|_| ()).unwrap_err().to_string()
 }
 
@@ -69,7 +69,7 @@ fn a_list_names_the_instances_of_the_picture_best_first() {
         listed(&[1, 2, 3], "# id class score x1 y1 x2 y2\n1 car 0.4 0 0 9 9\n3 person 0.9 1.5 2 3 4\n2 traffic light 0.7 0 0 1 1\n")
             .unwrap();
     let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.score, one.pixels)).collect();
-    assert_eq!(of, [(Class::Person, 0.9, thing(3)), (Class::Other, 0.7, thing(2)), (Class::Car, 0.4, thing(1))]);
+    assert_eq!(of, [(Class::Person, 0.9, pixels_of(3)), (Class::Other, 0.7, pixels_of(2)), (Class::Car, 0.4, pixels_of(1))]);
     assert!(masks.instances.iter().all(|one| one.mask.len() == 18 && one.mask.iter().all(|&pixel| pixel == 1)));
     assert_eq!(masks.refusals, MaskRefusals::default());
 }
@@ -83,7 +83,7 @@ fn what_cannot_be_used_of_a_list_is_counted() {
         [Class::Other, Class::Car],
         "an unknown class is kept as other"
     );
-    // Scores are the core's to judge: it refuses and counts these two.
+    // The core validates scores: it refuses and counts these two.
     let masks = listed(&[1, 2], "1 car nan 0 0 9 9\n2 car 1.5 0 0 9 9\n").unwrap();
     assert!(
         masks.instances.len() == 2
@@ -100,7 +100,7 @@ fn a_list_that_is_none_is_refused_with_its_line() {
         ("0 car 0.4 0 0 9 9\n", "line 1 is not"),
         ("1 car 0.4 0 0 9 9\n1 bus 0.4 0 0 9 9\n", "a second time"),
     ] {
-        let message = said(listed(&[1], list));
+        let message = refusal_of(listed(&[1], list));
         assert!(message.contains(reason) && message.contains("000000.txt") && message.contains("--instances"), "{message}");
     }
 }
@@ -112,18 +112,18 @@ fn masks_of_another_size_without_a_list_or_in_colour_are_refused() {
     fs::create_dir(&folder).unwrap();
     let png = folder.join("000000.png");
     labels(&png, &[1], false);
-    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("its list"));
+    assert!(refusal_of(first(root.path(), &MaskChoice::Auto)).contains("its list"));
     fs::write(folder.join("000000.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
     ImageBuffer::from_pixel(WIDTH - 1, HEIGHT, Luma([1u8])).save(&png).unwrap();
-    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("39 x 36 px, but the images are 40 x 36 px"));
+    assert!(refusal_of(first(root.path(), &MaskChoice::Auto)).contains("39 x 36 px, but the images are 40 x 36 px"));
     ImageBuffer::from_pixel(WIDTH, HEIGHT, image::Rgb([1u8, 2, 3])).save(&png).unwrap();
-    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("colour image"));
+    assert!(refusal_of(first(root.path(), &MaskChoice::Auto)).contains("colour image"));
     fs::write(&png, "no picture").unwrap();
-    assert!(said(first(root.path(), &MaskChoice::Auto)).contains("cannot be used"));
+    assert!(refusal_of(first(root.path(), &MaskChoice::Auto)).contains("cannot be used"));
 }
 
 #[test]
-fn a_frame_without_a_file_sees_nothing_and_a_folder_without_any_is_refused_unless_nobody_asked_for_it() {
+fn a_frame_without_a_file_has_no_masks_and_an_empty_folder_is_refused_only_if_given() {
     let root = rig();
     let folder = root.path().join("instances");
     fs::create_dir(&folder).unwrap();
@@ -134,12 +134,12 @@ fn a_frame_without_a_file_sees_nothing_and_a_folder_without_any_is_refused_unles
     assert_eq!(dataset.frame(0).unwrap().masks.refusals.missing, 1);
     assert_eq!(dataset.frame(1).unwrap().masks.instances.len(), 1);
     let empty = TempDir::new().unwrap();
-    let asked = |path: &Path| said(laid_over(root.path(), &MaskChoice::Files(path.to_path_buf())));
+    let asked = |path: &Path| refusal_of(laid_over(root.path(), &MaskChoice::Files(path.to_path_buf())));
     assert!(asked(empty.path()).contains("nothing for any frame; the first image is 000000.png"));
     assert!(asked(&empty.path().join("no")).contains("no such folder"));
     fs::remove_file(folder.join("000001.png")).unwrap();
     assert!(first(root.path(), &MaskChoice::Auto).unwrap().instances.is_empty());
-    assert!(said(laid_over(root.path(), &MaskChoice::Exact)).contains("only the synthetic street"));
+    assert!(refusal_of(laid_over(root.path(), &MaskChoice::Exact)).contains("only the synthetic street"));
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn mots_pictures_give_classes_and_leave_out_what_is_to_be_ignored() {
     labels(&folder.path().join("000000.png"), &[1005, 2001, 10_000, 7_000], true);
     let masks = first(root.path(), &MaskChoice::Mots(folder.path().to_path_buf())).unwrap();
     let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.pixels)).collect();
-    assert_eq!(of, [(Class::Car, thing(1)), (Class::Person, thing(2)), (Class::Other, thing(4))]);
+    assert_eq!(of, [(Class::Car, pixels_of(1)), (Class::Person, pixels_of(2)), (Class::Other, pixels_of(4))]);
     assert_eq!(masks.refusals, MaskRefusals { unknown_class: 1, ..MaskRefusals::default() });
 }
 
@@ -226,7 +226,7 @@ fn mots_text_that_is_none_is_refused_with_its_line() {
         ("0 1001 1 36 40 ooooooooooooo0\n".to_owned(), "35 bits"),
         ("0 1001 1 36 40 O1\n".to_owned(), "below 0"),
     ] {
-        let message = said(mots_text(&rows));
+        let message = refusal_of(mots_text(&rows));
         assert!(message.contains(reason) && message.contains("line 1") | message.contains("mots.txt"), "{rows}: {message}");
     }
     let empty = rle::encoded(|_, _| false, w, h);
@@ -241,8 +241,8 @@ fn ten_thousand_masks_are_kept_within_the_ceiling_and_the_rest_counted() {
     assert_eq!((masks.instances.len(), masks.refusals.beyond), (MAX_MASKS, 9_000));
     let mut large = FrameMasks::default();
     let kept = (0..200).filter(|_| {
-        let room = large.reserve(1 << 20);
-        if room {
+        let fits = large.reserve(1 << 20);
+        if fits {
             large.push(Some(InstanceMask {
                 class: Class::Car,
                 score: 1.0,
@@ -250,7 +250,7 @@ fn ten_thousand_masks_are_kept_within_the_ceiling_and_the_rest_counted() {
                 mask: vec![1; 1 << 20],
             }));
         }
-        room
+        fits
     });
     assert_eq!(kept.count(), MAX_BYTES >> 20);
 }
@@ -303,7 +303,7 @@ fn mnc_dumps_that_are_none_are_refused() {
         ("[4 6 6 8 0], 0.61, 7", FULL, "2 rows, but its box is 3 px high"),
         ("[4 6 6 7 0], 0.61, 7", "1 1 x\n1 1 1\n", "which is no number"),
     ] {
-        let message = said(mnc(&[(result, mask)]));
+        let message = refusal_of(mnc(&[(result, mask)]));
         assert!(message.contains(reason), "{result}: {message}");
     }
 }

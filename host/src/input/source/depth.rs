@@ -4,7 +4,7 @@ use crate::formats::Image;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::image::DISPARITY_ONE_PX;
 
-/// Below this, px or m, a value says that there is none.
+/// Values below this, px or m, mean unknown.
 const NONE_BELOW: f32 = 1e-5;
 
 /// Disparity of a frame from elsewhere.

@@ -66,9 +66,9 @@ pub enum InputError {
         /// Names there.
         known: String,
     },
-    /// Images of two cameras of which nothing tells which belong together.
+    /// Images of two cameras that cannot be paired.
     #[error(
-        "{left} and {right} cannot be paired: neither their names nor time stamps tell which images belong together, and there are {} left and \
+        "{left} and {right} cannot be paired: neither their names nor their time stamps pair the images, and there are {} left and \
          {} right ones. Give both images of a pair one name, or one number with a prefix or suffix for the side", counts.0, counts.1
     )]
     Pairs {

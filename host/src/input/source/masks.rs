@@ -138,9 +138,9 @@ impl FrameMasks {
 
     /// Whether a mask of so many bytes fits within the limits; if not it is counted.
     pub fn reserve(&mut self, bytes: usize) -> bool {
-        let room = self.instances.len() < MAX_MASKS && self.bytes.saturating_add(bytes) <= MAX_BYTES;
-        self.refusals.beyond += u32::from(!room);
-        room
+        let fits = self.instances.len() < MAX_MASKS && self.bytes.saturating_add(bytes) <= MAX_BYTES;
+        self.refusals.beyond += u32::from(!fits);
+        fits
     }
 
     /// Adds a mask that fits.

@@ -14,7 +14,7 @@ pub use error::{InputError, read_failed};
 pub use given_poses::read_given_poses;
 pub use lidar::LidarScan;
 pub use masks::{FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals, bounding_boxes, union};
-pub use overlay::{Layer, Overlay};
+pub use overlay::{Overlay, OverlaySource};
 pub use scaled::Scaled;
 pub use truth::{ObjectsTruth, TrueObject};
 
@@ -45,7 +45,7 @@ pub struct StereoImages {
 /// Exact values of a frame, from its renderer.
 #[derive(Clone, Debug)]
 pub struct ExactFrame {
-    /// Depth of the left pixels, m; 0 or infinite where there is none.
+    /// Depth of the left pixels, m; 0 or infinite where unknown.
     pub depth_m: Image<f32>,
     /// Whether the pixel belongs to an object that moves in this frame.
     pub moving: Image<bool>,

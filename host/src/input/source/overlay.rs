@@ -4,8 +4,8 @@ use super::{AvailableMasks, FrameSource, InputError, LidarScan, StereoImages};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
 
-/// What is laid over frames.
-pub trait Layer: Send + Sync {
+/// Adds depth or masks to the frames of a data set.
+pub trait OverlaySource: Send + Sync {
     /// Adds to a frame of `dataset`.
     ///
     /// # Errors
@@ -13,26 +13,26 @@ pub trait Layer: Send + Sync {
     fn add(&self, dataset: &dyn FrameSource, index: usize, images: &mut StereoImages) -> Result<(), InputError>;
 }
 
-/// A data set under a layer: all but the frames is the data set's own.
+/// A data set whose frames get what `source` adds; everything else is the data set's own.
 pub struct Overlay<L> {
     dataset: Box<dyn FrameSource>,
-    layer: L,
+    source: L,
     notes: Vec<String>,
 }
 
-impl<L: Layer> Overlay<L> {
-    /// Lays `layer` over `dataset`; `note` says of it what a user should know.
-    pub fn new(dataset: Box<dyn FrameSource>, layer: L, note: String) -> Self {
+impl<L: OverlaySource> Overlay<L> {
+    /// Lays `source` over `dataset`; `note` is a note about it for the user.
+    pub fn new(dataset: Box<dyn FrameSource>, source: L, note: String) -> Self {
         let mut notes = dataset.notes().to_vec();
         notes.push(note);
-        Self { dataset, layer, notes }
+        Self { dataset, source, notes }
     }
 }
 
-impl<L: Layer> FrameSource for Overlay<L> {
+impl<L: OverlaySource> FrameSource for Overlay<L> {
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let mut images = self.dataset.frame(index)?;
-        self.layer.add(self.dataset.as_ref(), index, &mut images)?;
+        self.source.add(self.dataset.as_ref(), index, &mut images)?;
         Ok(images)
     }
 
