@@ -4,7 +4,7 @@
 mod binary;
 
 use binary::{CALIB, dynvox, names, output_text, rig};
-use image::{GrayImage, Luma};
+use image::GrayImage;
 use std::fs;
 use std::process::Output;
 use tempfile::TempDir;

@@ -3,7 +3,7 @@
 
 mod binary;
 
-use binary::{dynvox, names, output_text, rig};
+use binary::{dynvox, output_text, rig};
 use image::{GrayImage, Luma};
 use std::fs;
 use tempfile::TempDir;

@@ -63,7 +63,8 @@ fn write_euroc(root: &Path) {
 
 #[test]
 fn every_data_set_gives_the_same_frames_rig_and_times() {
-    let layouts: [(Layout, fn(&Path)); 4] = [
+    type Write = fn(&Path);
+    let layouts: [(Layout, Write); 4] = [
         (Layout::KittiRaw, write_kitti_raw),
         (Layout::Kitti360, write_kitti_360),
         (Layout::Cityscapes, write_cityscapes),
