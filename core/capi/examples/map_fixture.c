@@ -1,9 +1,9 @@
-/* Maps a clip (dynvox fixtures pack FIXTURE --out clip.bin) and prints each frame's number and digest. The digests on file come of the
- * voxels and the pruning window that fixtures are replayed with (dynvox_clip::config), which are given behind the clip.
+/* Maps a clip (dynvox fixtures pack FIXTURE --out clip.bin) and prints each frame's number and digest. The digests on file come of the bounds and
+ * settings that the fixture is replayed with: BYTES of buffer, 0 for the profile tiny, and KEY=VALUE as in its settings.toml.
  *
  *   cargo build --release -p dynvox-capi
  *   cc -std=c11 -Icore/capi/include core/capi/examples/map_fixture.c target/release/libdynvox_capi.a -lm -lpthread -ldl -o map_fixture
- *   ./map_fixture clip.bin VOXEL_SIZE_M PRUNE_LAG
+ *   ./map_fixture clip.bin 0 volume.voxel_size_m=0.07 volume.prune_lag=8
  */
 #include "dynvox.h"
 
@@ -64,8 +64,8 @@ static uint8_t *read_file(const char *path) {
 }
 
 int main(int argc, char **argv) {
-  if (argc != 4) {
-    fprintf(stderr, "map_fixture CLIP VOXEL_SIZE_M PRUNE_LAG\n");
+  if (argc < 3) {
+    fprintf(stderr, "map_fixture CLIP BYTES [KEY=VALUE...]\n");
     return 1;
   }
   uint8_t *clip = read_file(argv[1]);
@@ -84,14 +84,25 @@ int main(int argc, char **argv) {
 
   DynvoxConfig config;
   check(dynvox_config_default(&rig, &config), "config");
-  config.voxel_size_m = strtof(argv[2], NULL);
-  config.prune_lag = (uint32_t)strtoul(argv[3], NULL, 10);
-  size_t bytes;
-  check(dynvox_bytes(DYNVOX_PROFILE_TINY, &bytes), "bytes");
+  float voxel_size_m = 0.05f;
+  for (int i = 3; i < argc; ++i) {
+    char *value = strchr(argv[i], '=');
+    if (!value) return 1;
+    *value++ = 0;
+    check(dynvox_config_set(&config, argv[i], value), argv[i]);
+    if (strcmp(argv[i], "volume.voxel_size_m") == 0) voxel_size_m = strtof(value, NULL);
+  }
+  size_t bytes = strtoull(argv[2], NULL, 10), least = 0;
+  DynvoxCapacity capacity;
+  if (bytes == 0)
+    check(dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &capacity), "capacity");
+  else
+    check(dynvox_capacity_for_budget(bytes, width, height, voxel_size_m, &capacity, &least), "capacity");
+  check(dynvox_bytes(&capacity, &bytes), "bytes");
   size_t alignment = dynvox_alignment();
   uint8_t *buffer = aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
   DynvoxMapper *mapper;
-  check(dynvox_create(DYNVOX_PROFILE_TINY, &config, buffer, bytes, &mapper), "create");
+  check(dynvox_create(&capacity, &config, buffer, bytes, &mapper), "create");
 
   DynvoxReport report;
   for (uint32_t index = 0; index < frames; ++index) {

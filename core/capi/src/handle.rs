@@ -4,12 +4,12 @@
 //! two never overlap, so the mapper's exclusive hold on the slab and a handle's access to the head do not meet.
 
 use crate::{
-    DynvoxConfig, DynvoxProfile, DynvoxStatus,
+    DynvoxCapacity, DynvoxConfig, DynvoxStatus,
+    capacity::given,
     given::{output, read},
-    types::capacity,
 };
 use core::{mem::MaybeUninit, ops::Range, ptr, slice};
-use dynvox_core::{Capacity, Mapper, memory::SLAB_ALIGN};
+use dynvox_core::{Capacity, Config, Mapper, memory::SLAB_ALIGN};
 
 /// A mapper; only ever behind a pointer.
 pub struct DynvoxMapper {
@@ -28,7 +28,8 @@ struct Head {
     mapper: MaybeUninit<Mapper<'static>>,
 }
 
-const HEAD_BYTES: usize = size_of::<Head>().next_multiple_of(SLAB_ALIGN);
+/// Bytes of a buffer before its slab.
+pub const HEAD_BYTES: usize = size_of::<Head>().next_multiple_of(SLAB_ALIGN);
 
 const fn bytes(capacity: &Capacity) -> usize {
     HEAD_BYTES + capacity.bytes()
@@ -40,14 +41,14 @@ pub extern "C" fn dynvox_alignment() -> usize {
     SLAB_ALIGN
 }
 
-/// Writes how many bytes of buffer a mapper of that profile takes.
+/// Writes how many bytes of buffer a mapper of that capacity takes.
 ///
 /// # Safety
-/// `bytes` is null or points to a number.
+/// `capacity` is null or points to a capacity, `bytes` is null or points to a number.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_bytes(profile: DynvoxProfile, bytes: *mut usize) -> DynvoxStatus {
-    // SAFETY: only looked at.
-    match (capacity(profile), unsafe { output(bytes) }) {
+pub unsafe extern "C" fn dynvox_bytes(capacity: *const DynvoxCapacity, bytes: *mut usize) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    match unsafe { (given(capacity), output(bytes)) } {
         (Ok(capacity), Ok(bytes)) => {
             // SAFETY: checked; of the right type by the caller's promise.
             unsafe { bytes.write(self::bytes(&capacity)) };
@@ -61,20 +62,39 @@ pub unsafe extern "C" fn dynvox_bytes(profile: DynvoxProfile, bytes: *mut usize)
 /// write, move or free it. What it holds before does not matter. Takes less than 32 KiB of stack, as a step does.
 ///
 /// # Safety
-/// `config` is null or points to a configuration, `buffer` is null or points to `len` bytes used by nothing else, `mapper` is null or points to
-/// a pointer.
+/// `capacity` is null or points to a capacity, `config` is null or points to a configuration, `buffer` is null or points to `len` bytes used by
+/// nothing else, `mapper` is null or points to a pointer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_create(
-    profile: DynvoxProfile,
+    capacity: *const DynvoxCapacity,
     config: *const DynvoxConfig,
     buffer: *mut u8,
     len: usize,
     mapper: *mut *mut DynvoxMapper,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
-    let (capacity, config, handle) = match (capacity(profile), unsafe { read(config) }, unsafe { output(mapper) }) {
+    unsafe {
+        make((capacity, config), (buffer, len), mapper, |capacity, config, slab| {
+            Mapper::new(capacity, config, slab).map_err(DynvoxStatus::from)
+        })
+    }
+}
+
+/// Makes a mapper by `new` in a caller's buffer.
+///
+/// # Safety
+/// As [`dynvox_create`].
+pub unsafe fn make(
+    (capacity, config): (*const DynvoxCapacity, *const DynvoxConfig),
+    (buffer, len): (*mut u8, usize),
+    mapper: *mut *mut DynvoxMapper,
+    new: impl FnOnce(&Capacity, &Config, &'static mut [u8]) -> Result<Mapper<'static>, DynvoxStatus>,
+) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    let given = unsafe { (given(capacity), read(config).and_then(|config| config.resolved()), output(mapper)) };
+    let (capacity, config, handle) = match given {
         (Ok(capacity), Ok(config), Ok(handle)) => (capacity, config, handle),
-        (Err(status), ..) | (_, Err(status), _) | (.., Err(status)) => return status,
+        (Err(status), ..) | (_, Err(status), _) | (_, _, Err(status)) => return status,
     };
     if buffer.is_null() {
         return DynvoxStatus::Null;
@@ -87,9 +107,9 @@ pub unsafe extern "C" fn dynvox_create(
     }
     // SAFETY: within the buffer, behind the head, which nothing but the mapper made here will use until it is destroyed.
     let slab: &'static mut [u8] = unsafe { slice::from_raw_parts_mut(buffer.add(HEAD_BYTES), capacity.bytes()) };
-    let made = match Mapper::new(&capacity, &config.resolved(), slab) {
+    let made = match new(&capacity, &config, slab) {
         Ok(made) => made,
-        Err(error) => return error.into(),
+        Err(status) => return status,
     };
     let head = buffer.cast::<Head>();
     // SAFETY: the buffer is aligned better than a head, and long enough; the handle was checked.

@@ -11,19 +11,27 @@
 extern crate std;
 
 mod callback;
+mod capacity;
+mod config;
 mod given;
 mod handle;
 mod map;
+mod snapshot;
 mod status;
 mod step;
+mod tracks;
 mod types;
 
 pub use callback::{DynvoxBlock, DynvoxLoadedBlock, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink, DynvoxVertex};
+pub use capacity::{
+    DYNVOX_PROFILE_DESKTOP, DYNVOX_PROFILE_ONBOARD, DYNVOX_PROFILE_SMALL, DYNVOX_PROFILE_TINY, DynvoxCapacity, DynvoxProfile,
+    dynvox_capacity_for_budget, dynvox_capacity_of_profile,
+};
+pub use config::{DYNVOX_SETTINGS_BYTES, DynvoxConfig, DynvoxRig, dynvox_config_default, dynvox_config_problem, dynvox_config_set};
 pub use handle::{DynvoxMapper, dynvox_alignment, dynvox_bytes, dynvox_create, dynvox_destroy};
 pub use map::{DynvoxPicture, dynvox_finish, dynvox_pose_matrix, dynvox_raycast, dynvox_stream_out, dynvox_triangles};
+pub use snapshot::{DynvoxRead, DynvoxWrite, dynvox_restore, dynvox_save};
 pub use status::{DynvoxStatus, dynvox_status_text};
 pub use step::{dynvox_pose, dynvox_step};
-pub use types::{
-    DYNVOX_PROFILE_DESKTOP, DYNVOX_PROFILE_ONBOARD, DYNVOX_PROFILE_SMALL, DYNVOX_PROFILE_TINY, DynvoxConfig, DynvoxDetection, DynvoxFrame,
-    DynvoxImage, DynvoxPose, DynvoxProfile, DynvoxReport, DynvoxRig, DynvoxSeverity, dynvox_config_default, dynvox_config_problem,
-};
+pub use tracks::{DynvoxMotionState, DynvoxTrack, dynvox_object_triangles, dynvox_tracks};
+pub use types::{DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxReport, DynvoxSeverity};

@@ -21,7 +21,7 @@ pub enum DynvoxStatus {
     Busy,
     /// A frame's memory lies within the mapper's buffer.
     Overlap,
-    /// An unknown profile, class or track.
+    /// An unknown profile, class, track or setting.
     Unknown,
     /// The configuration cannot be used: dynvox_config_problem says why. A calibration that is not finite is one reason.
     Config,
@@ -35,6 +35,14 @@ pub enum DynvoxStatus {
     TooMany,
     /// No frame yet.
     NoFrame,
+    /// A text is not a value of its setting.
+    Value,
+    /// A bound is not one a mapper can work with.
+    Capacity,
+    /// A snapshot is damaged, or of another version, capacity or configuration.
+    Snapshot,
+    /// A callback refused.
+    Callback,
 }
 
 impl DynvoxStatus {
@@ -54,6 +62,12 @@ impl DynvoxStatus {
             Self::SizeChanged => c"a frame's size differs from that of the frames before: create another mapper",
             Self::TooMany => c"too many detections: give the best 64",
             Self::NoFrame => c"no frame yet: step first",
+            Self::Value => c"the text is not a value of this setting: a run's config.toml shows one of each",
+            Self::Capacity => {
+                c"a bound is not one a mapper can work with: begin with dynvox_capacity_of_profile or dynvox_capacity_for_budget"
+            }
+            Self::Snapshot => c"the snapshot is damaged, or of another version, capacity or configuration",
+            Self::Callback => c"a callback refused",
         }
     }
 }
@@ -94,9 +108,28 @@ impl From<RaycastError> for DynvoxStatus {
 /// A sentence for a status, in static memory; "no such status" for another number.
 #[unsafe(no_mangle)]
 pub extern "C" fn dynvox_status_text(status: u32) -> *const c_char {
-    const ALL: [DynvoxStatus; 14] = {
+    const ALL: [DynvoxStatus; 18] = {
         use DynvoxStatus::*;
-        [Ok, Null, Misaligned, TooSmall, NoMapper, Busy, Overlap, Unknown, Config, Pose, Size, SizeChanged, TooMany, NoFrame]
+        [
+            Ok,
+            Null,
+            Misaligned,
+            TooSmall,
+            NoMapper,
+            Busy,
+            Overlap,
+            Unknown,
+            Config,
+            Pose,
+            Size,
+            SizeChanged,
+            TooMany,
+            NoFrame,
+            Value,
+            Capacity,
+            Snapshot,
+            Callback,
+        ]
     };
     ALL.get(status as usize).map_or(c"no such status", |status| status.text()).as_ptr()
 }

@@ -40,8 +40,8 @@ pub unsafe extern "C" fn dynvox_step(
                 colour: image(&frame, frame.colour, buffer)?,
                 class: None,
                 detections: detections(&frame, &mut buffered, buffer)?,
-                disparity_q8: None,
-                time_ns: None,
+                disparity_q8: disparity(&frame, buffer)?,
+                time_ns: if frame.time_ns.is_null() { None } else { Some(read(frame.time_ns)?) },
                 t_world_camera: if frame.t_world_camera.is_null() { None } else { Some(read(frame.t_world_camera)?.transform()?) },
             };
             let done = mapper.step_with(&frame_in_core, &Serial, &mut store, &mut NoSink)?;
@@ -82,6 +82,20 @@ unsafe fn image<'a, T>(frame: &DynvoxFrame, image: DynvoxImage, buffer: &Range<u
     // SAFETY: the caller's promise; a pixel is bytes, so that no alignment is asked of it.
     let pixels = unsafe { items(image.pixels.cast::<T>(), len, buffer)? };
     View::with_stride(pixels, frame.width, frame.height, image.stride).map(Some).ok_or(DynvoxStatus::Size)
+}
+
+/// The frame's own disparity; none where it is null.
+///
+/// # Safety
+/// It is as large as the frame says.
+unsafe fn disparity<'a>(frame: &DynvoxFrame, buffer: &Range<usize>) -> Result<Option<View<'a, u16>>, DynvoxStatus> {
+    if frame.disparity_q8.is_null() {
+        return Ok(None);
+    }
+    let len = frame.width.checked_mul(frame.height).ok_or(DynvoxStatus::Size)?;
+    // SAFETY: the caller's promise.
+    let pixels = unsafe { items(frame.disparity_q8, len, buffer)? };
+    View::new(pixels, frame.width, frame.height).map(Some).ok_or(DynvoxStatus::Size)
 }
 
 const NOTHING: Detection<'static> = Detection { class: Class::Other, score: 0.0, left: 0, top: 0, width: 0, height: 0, mask: &[] };

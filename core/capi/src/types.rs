@@ -1,135 +1,7 @@
 //! Plain values of the interface.
 
-use crate::{
-    DynvoxStatus,
-    given::{output, read},
-};
-use core::ffi::c_char;
-use dynvox_core::{Capacity, Config, Report, Severity, geometry::StereoRig, geometry::Transform};
-
-/// Size of a mapper. Numbers as in dynvox's own table of profiles.
-pub type DynvoxProfile = u32;
-/// Below 8 MiB, images up to 320 x 96, no colour.
-pub const DYNVOX_PROFILE_TINY: DynvoxProfile = 0;
-/// Below 64 MiB, images up to 640 x 192, no colour.
-pub const DYNVOX_PROFILE_SMALL: DynvoxProfile = 1;
-/// Below 256 MiB, images up to 1280 x 384, colour.
-pub const DYNVOX_PROFILE_ONBOARD: DynvoxProfile = 2;
-/// Below 2 GiB, images up to 1920 x 1088, colour.
-pub const DYNVOX_PROFILE_DESKTOP: DynvoxProfile = 3;
-
-pub(crate) fn capacity(profile: DynvoxProfile) -> Result<Capacity, DynvoxStatus> {
-    let (_, capacity) = Capacity::PROFILES.get(profile as usize).ok_or(DynvoxStatus::Unknown)?;
-    Ok(*capacity)
-}
-
-/// Two identical pinhole cameras, rectified.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct DynvoxRig {
-    /// Focal length, px.
-    pub focal_px: f64,
-    /// Principal point, px from the centre of the upper left pixel.
-    pub center_u_px: f64,
-    /// Principal point, px from the centre of the upper left pixel.
-    pub center_v_px: f64,
-    /// Distance between the cameras, m.
-    pub baseline_m: f64,
-}
-
-/// The settings that are changed most often. dynvox_config_default fills it.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct DynvoxConfig {
-    /// The cameras.
-    pub rig: DynvoxRig,
-    /// Distance between voxels, m.
-    pub voxel_size_m: f32,
-    /// Distance from a surface up to which voxels are kept, m.
-    pub truncation_m: f32,
-    /// Nearest depth fused, m.
-    pub near_m: f32,
-    /// Farthest depth fused, m.
-    pub far_m: f32,
-    /// Voxels seen at most this often are reset when they leave the window; 0 is off.
-    pub prune_weight: u8,
-    /// Length of the window, frames.
-    pub prune_lag: u32,
-    /// Whether detections are tracked and kept out of the static map.
-    pub dynamic: bool,
-}
-
-impl DynvoxConfig {
-    pub(crate) fn resolved(&self) -> Config {
-        let DynvoxRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
-        let mut config = Config::for_rig(StereoRig { focal_px, center_u_px, center_v_px, baseline_m });
-        config.volume.voxel_size_m = self.voxel_size_m;
-        config.volume.truncation_m = self.truncation_m;
-        config.volume.near_m = self.near_m;
-        config.volume.far_m = self.far_m;
-        config.volume.prune_weight = self.prune_weight;
-        config.volume.prune_lag = self.prune_lag;
-        config.tracking.dynamic = self.dynamic;
-        config
-    }
-}
-
-/// Writes all defaults for a rig.
-///
-/// # Safety
-/// `rig` is null or points to a rig, `config` is null or points to a configuration.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_config_default(rig: *const DynvoxRig, config: *mut DynvoxConfig) -> DynvoxStatus {
-    // SAFETY: the caller's promise.
-    let (rig, config) = match unsafe { (read(rig), output(config)) } {
-        (Ok(rig), Ok(config)) => (rig, config),
-        (Err(status), _) | (_, Err(status)) => return status,
-    };
-    let DynvoxRig { focal_px, center_u_px, center_v_px, baseline_m } = rig;
-    let defaults = Config::for_rig(StereoRig { focal_px, center_u_px, center_v_px, baseline_m });
-    let value = DynvoxConfig {
-        rig,
-        voxel_size_m: defaults.volume.voxel_size_m,
-        truncation_m: defaults.volume.truncation_m,
-        near_m: defaults.volume.near_m,
-        far_m: defaults.volume.far_m,
-        prune_weight: defaults.volume.prune_weight,
-        prune_lag: defaults.volume.prune_lag,
-        dynamic: defaults.tracking.dynamic,
-    };
-    // SAFETY: not null and aligned, as checked; of the right type, as promised.
-    unsafe { config.write(value) };
-    DynvoxStatus::Ok
-}
-
-/// Writes the first problem of a configuration as text that ends in a zero byte, truncated to `len` bytes; the empty text without a
-/// problem.
-///
-/// # Safety
-/// `config` is null or points to a configuration, `text` is null or to `len` bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_config_problem(config: *const DynvoxConfig, text: *mut c_char, len: usize) -> DynvoxStatus {
-    // SAFETY: the caller's promise.
-    let config = match unsafe { read(config) } {
-        Ok(config) => config,
-        Err(status) => return status,
-    };
-    if text.is_null() {
-        return DynvoxStatus::Null;
-    }
-    let Some(most) = len.checked_sub(1) else { return DynvoxStatus::TooSmall };
-    let problems = config.resolved().validate();
-    let parts = problems.first().map_or(["", "", ""], |problem| [problem.key, " ", problem.rule]);
-    let mut written = 0;
-    for byte in parts.into_iter().flat_map(str::bytes).take(most) {
-        // SAFETY: below `len`.
-        unsafe { text.add(written).write(byte as c_char) };
-        written += 1;
-    }
-    // SAFETY: at most `len - 1`.
-    unsafe { text.add(written).write(0) };
-    DynvoxStatus::Ok
-}
+use crate::DynvoxStatus;
+use dynvox_core::{Report, Severity, geometry::Transform};
 
 /// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world. Camera axes: x right, y down, z forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -171,7 +43,7 @@ pub struct DynvoxImage {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxDetection {
-    /// 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle, 10 animal.
+    /// 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle, 10 animal, 11 moving object.
     pub class_code: u8,
     /// How sure the detector is, 0 to 1.
     pub score: f32,
@@ -207,6 +79,12 @@ pub struct DynvoxFrame {
     pub detection_count: usize,
     /// Where the camera is, for those who know; null lets the mapper find out.
     pub t_world_camera: *const DynvoxPose,
+    /// When the pair was taken, ns since any moment that stays the same, rising from frame to frame; null where nothing tells: then
+    /// "tracking.frame_interval_s" has passed since the frame before.
+    pub time_ns: *const u64,
+    /// Disparity of the left pixels in 1/256 px, 0 where there is none, `width` times `height` values without padding; null lets the mapper
+    /// match the pair.
+    pub disparity_q8: *const u16,
 }
 
 /// How much a step's events matter.

@@ -3,7 +3,10 @@
 #![expect(clippy::undocumented_unsafe_blocks, reason = "each call keeps the header's promises, but for the one it breaks on purpose")]
 
 use dynvox_capi::*;
-use std::{ffi::c_void, ptr};
+use std::{
+    ffi::{CStr, c_void},
+    ptr,
+};
 
 const WIDTH: usize = 160;
 const HEIGHT: usize = 64;
@@ -18,7 +21,8 @@ struct Buffer {
 impl Buffer {
     fn new() -> Self {
         let mut len = 0;
-        assert_eq!(unsafe { dynvox_bytes(DYNVOX_PROFILE_TINY, &raw mut len) }, DynvoxStatus::Ok);
+        let capacity = capacity();
+        assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut len) }, DynvoxStatus::Ok);
         let bytes = vec![0xAA; len + 2 * dynvox_alignment()];
         let start = bytes.as_ptr().align_offset(dynvox_alignment());
         Self { bytes, start, len }
@@ -29,17 +33,28 @@ impl Buffer {
     }
 }
 
+fn capacity() -> DynvoxCapacity {
+    let mut capacity = unsafe { std::mem::zeroed() };
+    assert_eq!(unsafe { dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &raw mut capacity) }, DynvoxStatus::Ok);
+    capacity
+}
+
+fn set(config: &mut DynvoxConfig, key: &CStr, value: &CStr) -> DynvoxStatus {
+    unsafe { dynvox_config_set(config, key.as_ptr(), value.as_ptr()) }
+}
+
 fn config() -> DynvoxConfig {
     let rig = DynvoxRig { focal_px: 100.0, center_u_px: 80.0, center_v_px: 32.0, baseline_m: 0.5 };
     let mut config = unsafe { std::mem::zeroed() };
     assert_eq!(unsafe { dynvox_config_default(&raw const rig, &raw mut config) }, DynvoxStatus::Ok);
-    config.voxel_size_m = 0.1;
+    assert_eq!(set(&mut config, c"volume.voxel_size_m", c"0.1"), DynvoxStatus::Ok);
     config
 }
 
 fn create(buffer: &mut Buffer, config: &DynvoxConfig) -> Result<*mut DynvoxMapper, DynvoxStatus> {
     let (len, mut mapper) = (buffer.len, ptr::null_mut());
-    match unsafe { dynvox_create(DYNVOX_PROFILE_TINY, config, buffer.at(0), len, &raw mut mapper) } {
+    let capacity = capacity();
+    match unsafe { dynvox_create(&raw const capacity, config, buffer.at(0), len, &raw mut mapper) } {
         DynvoxStatus::Ok => Ok(mapper),
         status => Err(status),
     }
@@ -60,6 +75,8 @@ fn frame(pixels: &[u8]) -> DynvoxFrame {
         detections: ptr::null(),
         detection_count: 0,
         t_world_camera: ptr::null(),
+        time_ns: ptr::null(),
+        disparity_q8: ptr::null(),
     }
 }
 
@@ -71,14 +88,19 @@ fn step(mapper: *mut DynvoxMapper, frame: &DynvoxFrame) -> DynvoxStatus {
 fn buffers_too_small_null_or_misaligned_are_refused() {
     let mut buffer = Buffer::new();
     let (config, len, mut mapper) = (config(), buffer.len, ptr::null_mut());
-    let mut make = |profile, config: *const _, start, len| unsafe { dynvox_create(profile, config, start, len, &raw mut mapper) };
-    assert_eq!(make(0, &raw const config, buffer.at(0), len - 1), DynvoxStatus::TooSmall);
-    assert_eq!(make(0, &raw const config, buffer.at(8), len), DynvoxStatus::Misaligned);
-    assert_eq!(make(0, &raw const config, ptr::null_mut(), len), DynvoxStatus::Null);
-    assert_eq!(make(0, ptr::null(), buffer.at(0), len), DynvoxStatus::Null);
-    assert_eq!(make(9, &raw const config, buffer.at(0), len), DynvoxStatus::Unknown);
-    assert_eq!(make(0, &raw const config, buffer.at(0), len), DynvoxStatus::Ok);
-    assert_eq!(unsafe { dynvox_bytes(0, ptr::null_mut()) }, DynvoxStatus::Null);
+    let (tiny, none) = (capacity(), DynvoxCapacity { blocks: 0, ..capacity() });
+    let mut make =
+        |capacity: *const _, config: *const _, start, len| unsafe { dynvox_create(capacity, config, start, len, &raw mut mapper) };
+    let (good, config) = (&raw const tiny, &raw const config);
+    assert_eq!(make(good, config, buffer.at(0), len - 1), DynvoxStatus::TooSmall);
+    assert_eq!(make(good, config, buffer.at(8), len), DynvoxStatus::Misaligned);
+    assert_eq!(make(good, config, ptr::null_mut(), len), DynvoxStatus::Null);
+    assert_eq!(make(good, ptr::null(), buffer.at(0), len), DynvoxStatus::Null);
+    assert_eq!(make(ptr::null(), config, buffer.at(0), len), DynvoxStatus::Null);
+    assert_eq!(make(&raw const none, config, buffer.at(0), len), DynvoxStatus::Capacity);
+    assert_eq!(make(good, config, buffer.at(0), len), DynvoxStatus::Ok);
+    assert_eq!(unsafe { dynvox_bytes(good, ptr::null_mut()) }, DynvoxStatus::Null);
+    assert_eq!(unsafe { dynvox_capacity_of_profile(9, ptr::null_mut()) }, DynvoxStatus::Unknown);
 }
 
 #[test]
@@ -178,4 +200,85 @@ fn a_callback_cannot_call_its_own_mapper() {
     let status = unsafe { dynvox_triangles(mapper, Some(call_back), (&raw mut context).cast(), &raw mut count) };
     assert_eq!((status, u64::from(context.1)), (DynvoxStatus::Ok, count));
     assert!(count > 0, "the callback was called");
+}
+
+#[test]
+fn every_setting_has_a_key_and_a_wrong_one_changes_nothing() {
+    let mut config = config();
+    assert_eq!(set(&mut config, c"tracking.motion.samples", c"77"), DynvoxStatus::Ok);
+    assert_eq!(set(&mut config, c"mapper.egomotion", c"icp"), DynvoxStatus::Ok);
+    let before = config.settings_len;
+    assert_eq!(set(&mut config, c"volume.voxels", c"1"), DynvoxStatus::Unknown);
+    assert_eq!(set(&mut config, c"volume.far_m", c"wide"), DynvoxStatus::Value);
+    assert_eq!(set(&mut config, c"volume.far_m", c"1\n"), DynvoxStatus::Value);
+    assert_eq!(unsafe { dynvox_config_set(&raw mut config, ptr::null(), c"1".as_ptr()) }, DynvoxStatus::Null);
+    assert_eq!(config.settings_len, before);
+    while set(&mut config, c"volume.far_m", c"20") == DynvoxStatus::Ok {}
+    assert_eq!(set(&mut config, c"volume.far_m", c"20"), DynvoxStatus::TooSmall, "no space is left");
+    config.settings_len = usize::MAX;
+    assert_eq!(set(&mut config, c"volume.far_m", c"20"), DynvoxStatus::Config);
+    assert_eq!(create(&mut Buffer::new(), &config), Err(DynvoxStatus::Config));
+}
+
+#[test]
+fn a_budget_is_a_bound_on_the_buffer_and_a_refusal_names_the_least() {
+    let (mut capacity, mut least, mut bytes) = (capacity(), 0, 0);
+    let solve = |bytes, capacity: &mut _, least: &mut _| unsafe { dynvox_capacity_for_budget(bytes, 752, 480, 0.05, capacity, least) };
+    assert_eq!(solve(48 << 20, &mut capacity, &mut least), DynvoxStatus::Ok);
+    assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut bytes) }, DynvoxStatus::Ok);
+    assert!(bytes <= 48 << 20 && bytes > 46 << 20, "{bytes}");
+    assert_eq!(solve(1 << 20, &mut capacity, &mut least), DynvoxStatus::TooSmall);
+    assert_eq!(solve(least, &mut capacity, &mut bytes), DynvoxStatus::Ok, "{least} bytes are enough");
+    assert_eq!(solve(least - 1, &mut capacity, &mut bytes), DynvoxStatus::TooSmall);
+}
+
+extern "C" fn write(context: *mut c_void, bytes: *const u8, len: usize) -> bool {
+    // SAFETY: the context is the test's snapshot, and there are as many bytes as the header promises.
+    unsafe { (*context.cast::<Vec<u8>>()).extend_from_slice(std::slice::from_raw_parts(bytes, len)) };
+    true
+}
+
+extern "C" fn read(context: *mut c_void, bytes: *mut u8, len: usize) -> bool {
+    // SAFETY: the context is the test's rest of a snapshot, and there is space for as many bytes as the header promises.
+    unsafe {
+        let rest = &mut *context.cast::<&[u8]>();
+        let Some((front, behind)) = rest.split_at_checked(len) else { return false };
+        std::slice::from_raw_parts_mut(bytes, len).copy_from_slice(front);
+        *rest = behind;
+    }
+    true
+}
+
+#[test]
+fn a_restored_mapper_continues_as_the_saved_one_and_a_damaged_snapshot_makes_none() {
+    let (mut buffer, mut other) = (Buffer::new(), Buffer::new());
+    let (pixels, config, capacity) = (pixels(), config(), capacity());
+    let mapper = create(&mut buffer, &config).unwrap();
+    let (mut frame, time_ns) = (frame(&pixels), 5u64);
+    frame.time_ns = &raw const time_ns;
+    assert_eq!(step(mapper, &frame), DynvoxStatus::Ok);
+    let mut bytes = Vec::new();
+    assert_eq!(unsafe { dynvox_save(mapper, Some(write), (&raw mut bytes).cast()) }, DynvoxStatus::Ok);
+    let mut restore = |bytes: &[u8]| {
+        let (len, mut rest, mut restored) = (other.len, bytes, ptr::null_mut());
+        let context = (&raw mut rest).cast();
+        let status =
+            unsafe { dynvox_restore(&raw const capacity, &raw const config, other.at(0), len, Some(read), context, &raw mut restored) };
+        (status, restored)
+    };
+    assert_eq!(restore(&bytes[..bytes.len() - 1]).0, DynvoxStatus::Callback);
+    let mut damaged = bytes.clone();
+    damaged[bytes.len() / 2] ^= 1;
+    assert_eq!(restore(&damaged).0, DynvoxStatus::Snapshot);
+    let (status, restored) = restore(&bytes);
+    assert_eq!(status, DynvoxStatus::Ok);
+    let mut reports: [DynvoxReport; 2] = unsafe { std::mem::zeroed() };
+    for (mapper, report) in [mapper, restored].into_iter().zip(&mut reports) {
+        assert_eq!(unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), report) }, DynvoxStatus::Ok);
+    }
+    assert_eq!((reports[0].frame, reports[0].digest), (1, reports[1].digest));
+    let (mut tracks, mut count): ([DynvoxTrack; 2], usize) = (unsafe { std::mem::zeroed() }, 9);
+    assert_eq!(unsafe { dynvox_tracks(restored, tracks.as_mut_ptr(), 2, &raw mut count) }, DynvoxStatus::Ok);
+    assert_eq!(count, 0);
+    assert_eq!(unsafe { dynvox_object_triangles(restored, 1, Some(call_back), ptr::null_mut(), ptr::null_mut()) }, DynvoxStatus::Unknown);
 }

@@ -9,6 +9,7 @@ mod frame;
 mod localization;
 mod raycast;
 mod report;
+mod set;
 mod settings;
 pub mod snapshot;
 mod static_map;
@@ -22,6 +23,7 @@ pub use digests::{Digested, ObjectDigest, ObjectDigests, StageDigests};
 pub use error::{MIN_HEIGHT, MIN_WIDTH, NewError, StepError};
 pub use frame::StereoFrame;
 pub use report::{BlockCount, PoseOrigin, Report, Severity};
+pub use set::SetError;
 pub use settings::{MapperConfig, MotionSource};
 pub use snapshot::RestoreError;
 
@@ -228,6 +230,11 @@ impl<'s> Mapper<'s> {
     /// Where the left camera was in the last frame: camera to world; the identity before the first.
     pub fn t_world_camera(&self) -> &Transform {
         self.camera.t_world_camera()
+    }
+
+    /// The settings it was made with.
+    pub fn config(&self) -> &Config {
+        &self.config
     }
 
     /// What is tracked, as it stands after the last frame, by age.

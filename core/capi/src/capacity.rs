@@ -1,0 +1,164 @@
+//! The bounds of a mapper.
+
+use crate::{
+    DynvoxStatus,
+    given::{output, read},
+    handle::HEAD_BYTES,
+};
+use dynvox_core::{BudgetError, BudgetOptions, Capacity};
+
+/// A capacity by name. Numbers as in dynvox's own table of profiles.
+pub type DynvoxProfile = u32;
+/// Below 8 MiB, images up to 320 x 96, no colour.
+pub const DYNVOX_PROFILE_TINY: DynvoxProfile = 0;
+/// Below 64 MiB, images up to 640 x 192, no colour.
+pub const DYNVOX_PROFILE_SMALL: DynvoxProfile = 1;
+/// Below 256 MiB, images up to 1280 x 384, colour.
+pub const DYNVOX_PROFILE_ONBOARD: DynvoxProfile = 2;
+/// Below 2 GiB, images up to 1920 x 1088, colour.
+pub const DYNVOX_PROFILE_DESKTOP: DynvoxProfile = 3;
+
+/// Every bound of a mapper. Bytes follow from them alone. dynvox_capacity_of_profile and dynvox_capacity_for_budget fill it.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct DynvoxCapacity {
+    /// Widest image, px.
+    pub image_width: usize,
+    /// Highest image, px.
+    pub image_height: usize,
+    /// Features kept for each image.
+    pub features: usize,
+    /// Matches kept for each frame.
+    pub matches: usize,
+    /// Voxel blocks of the static map.
+    pub blocks: usize,
+    /// Blocks visible in one frame.
+    pub visible_blocks: usize,
+    /// Frames the pruning window can span.
+    pub history_frames: usize,
+    /// Detections in one frame, at most 64.
+    pub detections: usize,
+    /// Words of 64 pixels for the masks of one frame.
+    pub mask_words: usize,
+    /// Tracks.
+    pub tracks: usize,
+    /// Objects reconstructed at once.
+    pub objects: usize,
+    /// Voxel blocks of one object.
+    pub object_blocks: usize,
+    /// Pixels of crops that wait for their object's motion.
+    pub crop_pixels: usize,
+    /// Whether voxels have colour: 0 or 1.
+    pub colour: u8,
+}
+
+impl From<&Capacity> for DynvoxCapacity {
+    fn from(of: &Capacity) -> Self {
+        Self {
+            image_width: of.image_width,
+            image_height: of.image_height,
+            features: of.features,
+            matches: of.matches,
+            blocks: of.blocks,
+            visible_blocks: of.visible_blocks,
+            history_frames: of.history_frames,
+            detections: of.detections,
+            mask_words: of.mask_words,
+            tracks: of.tracks,
+            objects: of.objects,
+            object_blocks: of.object_blocks,
+            crop_pixels: of.crop_pixels,
+            colour: u8::from(of.colour),
+        }
+    }
+}
+
+impl DynvoxCapacity {
+    /// As the core takes it; refused where a bound is not one a mapper can work with.
+    pub(crate) fn checked(&self) -> Result<Capacity, DynvoxStatus> {
+        let capacity = Capacity {
+            image_width: self.image_width,
+            image_height: self.image_height,
+            raw_width: 0,
+            raw_height: 0,
+            features: self.features,
+            matches: self.matches,
+            blocks: self.blocks,
+            visible_blocks: self.visible_blocks,
+            history_frames: self.history_frames,
+            detections: self.detections,
+            mask_words: self.mask_words,
+            tracks: self.tracks,
+            objects: self.objects,
+            object_blocks: self.object_blocks,
+            crop_pixels: self.crop_pixels,
+            colour: self.colour != 0,
+        };
+        capacity.validate().map(|()| capacity).map_err(|_| DynvoxStatus::Capacity)
+    }
+}
+
+/// Writes the bounds of a profile.
+///
+/// # Safety
+/// `capacity` is null or points to a capacity.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_capacity_of_profile(profile: DynvoxProfile, capacity: *mut DynvoxCapacity) -> DynvoxStatus {
+    let Some((_, of)) = Capacity::PROFILES.get(profile as usize) else { return DynvoxStatus::Unknown };
+    // SAFETY: only looked at.
+    match unsafe { output(capacity) } {
+        Ok(capacity) => {
+            // SAFETY: checked; of the right type by the caller's promise.
+            unsafe { capacity.write(of.into()) };
+            DynvoxStatus::Ok
+        }
+        Err(status) => status,
+    }
+}
+
+/// Divides a buffer of `bytes` bytes between the stages, for images of a size: writes the largest capacity for which dynvox_bytes is at most
+/// `bytes`. `voxel_size_m` is that of the configuration. Of too few bytes DYNVOX_STATUS_TOO_SMALL, and the least that works is written to
+/// `least`, which may be null.
+///
+/// # Safety
+/// `capacity` is null or points to a capacity, `least` is null or points to a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_capacity_for_budget(
+    bytes: usize,
+    width: usize,
+    height: usize,
+    voxel_size_m: f32,
+    capacity: *mut DynvoxCapacity,
+    least: *mut usize,
+) -> DynvoxStatus {
+    // SAFETY: only looked at.
+    let capacity = match unsafe { output(capacity) } {
+        Ok(capacity) => capacity,
+        Err(status) => return status,
+    };
+    let options = BudgetOptions { voxel_size_m: Some(voxel_size_m), ..BudgetOptions::default() };
+    match Capacity::for_budget(bytes.saturating_sub(HEAD_BYTES), width, height, &options) {
+        Ok(solved) => {
+            // SAFETY: checked; of the right type by the caller's promise.
+            unsafe { capacity.write((&solved).into()) };
+            DynvoxStatus::Ok
+        }
+        Err(BudgetError::TooSmall { least: needed }) => {
+            if !least.is_null() && least.is_aligned() {
+                // SAFETY: checked; of the right type by the caller's promise.
+                unsafe { least.write(needed.saturating_add(HEAD_BYTES)) };
+            }
+            DynvoxStatus::TooSmall
+        }
+        Err(_) => DynvoxStatus::Capacity,
+    }
+}
+
+/// Reads a caller's capacity.
+///
+/// # Safety
+/// `capacity` is null, misaligned or points to a capacity.
+pub(crate) unsafe fn given(capacity: *const DynvoxCapacity) -> Result<Capacity, DynvoxStatus> {
+    // SAFETY: the caller's promise.
+    unsafe { read(capacity) }?.checked()
+}
