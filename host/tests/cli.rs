@@ -74,16 +74,16 @@ fn bad_input_fails_with_a_sentence_and_leaves_no_folder() {
     fails(&["rig", "--scale", "0"], "--scale 0");
     fails(&["rig", "--profile", "tiny", "--set", "volume.prune_lag=65"], "profile tiny has a history of 64");
     fails(&["rig", "--threads", "0"], "must be at least 1");
-    // In the middle of a run: the last image is cut short.
-    let image = root.path().join("rig/right/002.png");
+    // The first image is cut short.
+    let image = root.path().join("rig/right/000.png");
     let bytes = fs::read(&image).unwrap();
     fs::write(&image, &bytes[..bytes.len() / 2]).unwrap();
-    fails(&tiny, "right/002.png cannot be read");
+    fails(&tiny, "right/000.png cannot be read");
     GrayImage::new(100, 64).save(&image).unwrap();
-    fails(&tiny, "right/002.png is 100 x 64 px");
+    fails(&tiny, "right/000.png is 100 x 64 px");
     fs::remove_file(&image).unwrap();
     fs::write(root.path().join("rig/calib.txt"), CALIB.replace("0.5\n", "0\n")).unwrap();
-    fs::remove_file(root.path().join("rig/left/002.png")).unwrap();
+    fs::remove_file(root.path().join("rig/left/000.png")).unwrap();
     fails(&tiny, "the baseline is 0 m");
 }
 
@@ -109,22 +109,22 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
 }
 
 #[test]
-fn a_strict_run_fails_at_the_first_frame_that_affects_the_map_and_names_the_cause() {
+fn a_strict_run_ends_at_the_first_frame_that_affects_the_map_and_names_the_cause() {
     let root = TempDir::new().unwrap();
     let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=4", "--profile", "tiny", "--quiet"];
     let run = |more: &[&str]| dynvox(root.path(), &[&["run", "--out", "result"], &street[..], more].concat());
     let strict = run(&["--strict"]);
-    assert_eq!(strict.status.code(), Some(1));
+    assert_eq!(strict.status.code(), Some(4));
     assert!(
         output_text(&strict).contains("frame 0: map affected: ") && output_text(&strict).contains("block requests refused"),
         "{}",
         output_text(&strict)
     );
-    assert!(names(root.path()).is_empty(), "nothing half-written");
-    let full = run(&["--strict", "--set", "volume.voxel_size_m=0.2"]);
+    assert_eq!(names(root.path()), ["result"], "what was mapped is there");
+    let full = run(&["--overwrite", "--strict", "--set", "volume.voxel_size_m=0.2"]);
     assert!(output_text(&full).contains("objects refused"), "{}", output_text(&full));
     let coarse = ["--set", "volume.voxel_size_m=0.2", "--instances", "none"];
-    assert!(run(&[&["--strict"], &coarse[..]].concat()).status.success(), "no frame affects a map that fits");
+    assert!(run(&[&["--overwrite", "--strict"], &coarse[..]].concat()).status.success(), "no frame affects a map that fits");
     let lenient = run(&["--overwrite"]);
     assert!(lenient.status.success(), "{}", output_text(&lenient));
 }
@@ -161,7 +161,7 @@ fn more_resident_memory_than_allowed_ends_the_run_with_a_sentence() {
     rig(root.path(), 2);
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--out", "result", "--rss-limit-mib", "1"]);
     if cfg!(target_os = "linux") {
-        assert_eq!(run.status.code(), Some(1));
+        assert_eq!(run.status.code(), Some(4));
         assert!(
             output_text(&run).contains("more than the 1048576 allowed") && output_text(&run).contains("--rss-limit-mib"),
             "{}",

@@ -140,7 +140,7 @@ fn stopped() -> TempDir {
     GrayImage::new(50, 50).save(&image).unwrap();
     let args = ["run", "rig", "--profile", "tiny", "--config", "settings.toml", "--quiet", "--out", "out/it", "--snapshot-every", "2"];
     let run = dynvox(root.path(), &args);
-    assert_eq!(run.status.code(), Some(1));
+    assert_eq!(run.status.code(), Some(4));
     assert!(
         output_text(&run).contains("left/005.png is 50 x 50 px")
             && output_text(&run).contains("`dynvox run --resume out/it` resumes the run"),
@@ -148,8 +148,12 @@ fn stopped() -> TempDir {
         output_text(&run)
     );
     fs::rename(root.path().join("005.png"), &image).unwrap();
-    assert_eq!(names(&root.path().join("out")), [".it.partial"]);
-    assert_eq!(names(&root.path().join("out/.it.partial")), ["map.blocks", "run.snapshot"]);
+    assert_eq!(names(&root.path().join("out")), ["it"]);
+    let files = names(&root.path().join("out/it"));
+    assert!(
+        ["map.blocks", "map.ply", "run.snapshot", "summary.json"].iter().all(|name| files.iter().any(|file| file == name)),
+        "{files:?}"
+    );
     root
 }
 
@@ -162,17 +166,17 @@ fn a_run_that_failed_resumes_when_the_cause_is_repaired() {
     assert!(resumed.status.success(), "{}", output_text(&resumed));
     assert_same(root.path(), "whole", "out/it");
     let twice = dynvox(root.path(), &["run", "--resume", "out/it"]);
-    assert!(output_text(&twice).contains("it is complete"), "{}", output_text(&twice));
+    assert!(output_text(&twice).contains("it has no snapshot: it is complete"), "{}", output_text(&twice));
 }
 
 /// Resuming the run of [`stopped`] is refused with a sentence and changes nothing.
 fn assert_refused(root: &TempDir, sentence: &str) {
-    let snapshot = root.path().join("out/.it.partial/run.snapshot");
+    let snapshot = root.path().join("out/it/run.snapshot");
     let before = fs::read(&snapshot).unwrap();
     let run = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
     assert_eq!(run.status.code(), Some(1));
     assert!(output_text(&run).starts_with("error: ") && output_text(&run).contains(sentence), "{sentence}: {}", output_text(&run));
-    assert_eq!(names(&root.path().join("out")), [".it.partial"]);
+    assert_eq!(names(&root.path().join("out")), ["it"]);
     assert!(fs::read(&snapshot).unwrap() == before);
 }
 
@@ -195,7 +199,7 @@ fn assert_resumes(root: &TempDir) {
 fn damaged_snapshots_and_stores_are_refused_by_name() {
     let root = stopped();
     let path = |name: &str| root.path().join(name);
-    let snapshot = "out/.it.partial/run.snapshot";
+    let snapshot = "out/it/run.snapshot";
     let whole = fs::read(path(snapshot)).unwrap();
     let refused = |bytes: &[u8], sentence: &str| assert_refused_with(&root, snapshot, bytes, sentence);
     let changed = |at: usize, byte: u8| {
@@ -204,17 +208,17 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
         bytes
     };
     refused(b"P5 3 1 255", "is not a snapshot of a run");
-    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 2");
+    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 3");
     for at in [15, 20, 30, 5_000, whole.len() / 2, whole.len() - 1] {
         refused(&changed(at, !whole[at]), "run.snapshot is damaged");
     }
     refused(&whole[..whole.len() - 1], "run.snapshot is damaged");
     refused(&[&whole[..], b"1"].concat(), "run.snapshot is damaged");
-    let blocks = path("out/.it.partial/map.blocks");
+    let blocks = path("out/it/map.blocks");
     fs::rename(&blocks, path("blocks")).unwrap();
     assert_refused(&root, "map.blocks is missing");
     fs::rename(path("blocks"), &blocks).unwrap();
-    assert_refused_with(&root, "out/.it.partial/map.blocks", b"dynvox", "map.blocks is not as the run left it");
+    assert_refused_with(&root, "out/it/map.blocks", b"dynvox", "map.blocks is not as the run left it");
     assert_resumes(&root);
 }
 

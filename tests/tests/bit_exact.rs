@@ -40,7 +40,7 @@ fn the_fixtures_give_the_digests_on_file_on_one_two_and_eight_threads() {
     for fixture in fixtures::all(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures"))).expect("there are fixtures") {
         let verify = |executor: &dyn Fn() -> Result<Verdict, FixtureError>| {
             let verdict = executor().expect("the fixture is whole");
-            assert_eq!(verdict.difference, None, "bits have changed: fixtures/README.md says what to do when that is meant");
+            assert_eq!(verdict.differences, [], "bits have changed: fixtures/README.md says what to do when that is meant");
         };
         verify(&|| fixtures::verify(&fixture, &Serial));
         for threads in [1, 2, 8] {
@@ -66,12 +66,13 @@ fn a_changed_pixel_of_a_fixture_is_named_and_a_blessing_keeps_its_reason_beside_
     for name in ["calib.txt", "fixture.toml", "digests.txt", "blessings.txt"] {
         std::fs::copy(from.join(name), copy.join(name)).expect("a copy");
     }
-    let difference = |path: &Path| fixtures::verify(path, &Serial).expect("a whole fixture").difference;
-    let found = difference(&copy).expect("it differs");
-    assert_eq!((found.frame, found.column.as_str()), (2, "input"));
+    let differences = |path: &Path| fixtures::verify(path, &Serial).expect("a whole fixture").differences;
+    let found = differences(&copy);
+    assert_eq!(found.iter().map(|one| one.frame).collect::<Vec<_>>(), [2], "pairs are matched each by itself");
+    assert_eq!(found[0].columns, ["input", "disparity", "digest"]);
     assert!(matches!(fixtures::bless(&copy, " \n ", &Serial), Err(FixtureError::NoReason)));
     assert_eq!(fixtures::bless(&copy, "The image is shown twice", &Serial).expect("a blessing"), Blessing::Written);
-    assert_eq!(difference(&copy), None);
+    assert_eq!(differences(&copy), []);
     assert_eq!(fixtures::bless(&copy, "Again", &Serial).expect("a blessing"), Blessing::Unchanged);
     let log = |fixture: &Path| std::fs::read_to_string(fixture.join("blessings.txt")).expect("a log");
     let added = log(&copy).strip_prefix(&log(&from)).map(str::to_owned).expect("what stood there before");

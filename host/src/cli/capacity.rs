@@ -1,5 +1,6 @@
 //! Which bounds a run has: a named profile, a byte budget, or a file; without any of them 256 MiB for the images that come.
 
+use crate::formats::CapacityTable;
 use anyhow::{Context, bail};
 use dynvox_core::rectify::{Rectification, RectifiedImages, Rectifier};
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
@@ -123,43 +124,19 @@ impl FromStr for ImageSize {
 
 /// A capacity as a file.
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Capacity", deny_unknown_fields)]
-struct CapacityDef {
-    image_width: usize,
-    image_height: usize,
-    #[serde(default)]
-    raw_width: usize,
-    #[serde(default)]
-    raw_height: usize,
-    features: usize,
-    matches: usize,
-    blocks: usize,
-    visible_blocks: usize,
-    history_frames: usize,
-    detections: usize,
-    mask_words: usize,
-    tracks: usize,
-    objects: usize,
-    object_blocks: usize,
-    crop_pixels: usize,
-    colour: bool,
-}
-
-#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CapacityFile {
-    #[serde(with = "CapacityDef")]
-    capacity: Capacity,
+    capacity: CapacityTable,
 }
 
 /// A capacity as TOML, for `--capacity`.
 pub fn to_toml(capacity: &Capacity) -> anyhow::Result<String> {
-    Ok(toml::to_string(&CapacityFile { capacity: *capacity })?)
+    Ok(toml::to_string(&CapacityFile { capacity: CapacityTable(*capacity) })?)
 }
 
 /// A capacity as JSON.
 pub fn to_json(capacity: &Capacity) -> anyhow::Result<serde_json::Value> {
-    Ok(serde_json::to_value(CapacityFile { capacity: *capacity })?)
+    Ok(serde_json::to_value(CapacityFile { capacity: CapacityTable(*capacity) })?)
 }
 
 fn read(path: &Path) -> anyhow::Result<Capacity> {
@@ -168,10 +145,10 @@ fn read(path: &Path) -> anyhow::Result<Capacity> {
     let hint = "`dynvox budget --memory 48MiB --image 752x480` prints such a file";
     let file: CapacityFile = toml::from_str(&text)
         .map_err(|error| anyhow::anyhow!("{shown} is not a capacity: {}. {hint}", error.message().replace('\n', " ")))?;
-    if let Err(problem) = file.capacity.validate() {
+    if let Err(problem) = file.capacity.0.validate() {
         bail!("{shown} cannot be used: {problem}. {hint}");
     }
-    Ok(file.capacity)
+    Ok(file.capacity.0)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use crate::run::write_whole;
 use anyhow::bail;
 use dynvox_core::Serial;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub struct FixturesArgs {
@@ -15,11 +15,19 @@ pub struct FixturesArgs {
 
 #[derive(Debug, clap::Subcommand)]
 enum Action {
+    /// Make a fixture of frames of a data set: pictures, calibration, masks, settings, bounds and their digests
+    New(Box<NewArgs>),
     /// Replay fixtures and compare every digest with the golden ones
     Verify {
         /// A fixture, or a folder of fixtures
         #[arg(default_value = "fixtures", value_name = "DIR")]
         path: PathBuf,
+        /// Write the verdicts to standard output as JSON, and nothing else
+        #[arg(long)]
+        json: bool,
+        /// Write the verdicts as JUnit XML, for a CI server
+        #[arg(long, value_name = "FILE")]
+        junit: Option<PathBuf>,
     },
     /// Rewrite the golden digests, with the reason
     Bless {
@@ -27,8 +35,11 @@ enum Action {
         #[arg(default_value = "fixtures", value_name = "DIR")]
         path: PathBuf,
         /// Why the digests are meant to change
-        #[arg(long, value_name = "TEXT")]
-        reason: String,
+        #[arg(long, value_name = "TEXT", required_unless_present = "dry_run")]
+        reason: Option<String>,
+        /// Say what would be blessed, and write nothing
+        #[arg(long)]
+        dry_run: bool,
     },
     /// Pack a fixture into one file that a firmware can embed
     Pack {
@@ -40,18 +51,108 @@ enum Action {
     },
 }
 
+/// What `dynvox fixtures new` is told. Options are those of `dynvox run`.
+#[derive(Debug, clap::Args)]
+struct NewArgs {
+    /// Folder to write
+    folder: PathBuf,
+    /// Data set to take the frames from
+    #[arg(long, value_name = "DATASET")]
+    from: String,
+    /// Frames to take
+    #[arg(long, default_value_t = 24, value_name = "N")]
+    frames: usize,
+    /// First frame
+    #[arg(long, value_name = "N")]
+    start: Option<String>,
+    /// Shrink the images, above 0 and up to 1
+    #[arg(long, value_name = "S")]
+    scale: Option<String>,
+    /// Bytes of memory to replay in, divided for the images [default: 32MiB]
+    #[arg(long, value_name = "BYTES", conflicts_with = "profile")]
+    memory: Option<String>,
+    /// Bounds by name
+    #[arg(long, value_name = "NAME")]
+    profile: Option<String>,
+    /// Sequence within the data set
+    #[arg(long, value_name = "NAME")]
+    sequence: Option<String>,
+    /// Calibration in place of the recording's own
+    #[arg(long, value_name = "FILE")]
+    calibration: Vec<String>,
+    /// Source of instance masks
+    #[arg(long, value_name = "SOURCE")]
+    instances: Option<String>,
+    /// Settings from a file
+    #[arg(long, value_name = "FILE")]
+    config: Option<String>,
+    /// One setting; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+impl NewArgs {
+    /// The same as a command line of `dynvox run`.
+    fn as_run(&self) -> Vec<String> {
+        let mut line = ["dynvox", &self.from, "--quiet", "--frames"].map(str::to_owned).to_vec();
+        line.push(self.frames.to_string());
+        let memory = if self.profile.is_none() { Some(self.memory.clone().unwrap_or_else(|| DEFAULT_MEMORY.to_owned())) } else { None };
+        let single = [
+            ("--start", &self.start),
+            ("--scale", &self.scale),
+            ("--memory", &memory),
+            ("--profile", &self.profile),
+            ("--sequence", &self.sequence),
+            ("--instances", &self.instances),
+            ("--config", &self.config),
+        ];
+        line.extend(single.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value.clone()?])).flatten());
+        let repeated = [("--calibration", &self.calibration), ("--set", &self.set)];
+        let each = repeated.into_iter().flat_map(|(name, values)| values.iter().map(move |value| [name.to_owned(), value.clone()]));
+        line.extend(each.flatten());
+        line
+    }
+}
+
+/// The default budget of a new fixture: a microcontroller with external memory.
+const DEFAULT_MEMORY: &str = "32MiB";
+
+fn new(args: &NewArgs) -> anyhow::Result<()> {
+    let plan = super::run::plan_of(&args.as_run())?;
+    let frames = fixtures::create(&args.folder, &plan, &Serial)?;
+    let (shown, mib) = (args.folder.display(), plan.capacity.bytes() as f64 / f64::from(1 << 20));
+    outln!("{shown}: {frames} frames, replayed in {mib:.1} MiB. Commit the folder, and compare with: dynvox fixtures verify {shown}");
+    Ok(())
+}
+
+fn verify(path: &Path, json: bool, junit: Option<&Path>) -> anyhow::Result<()> {
+    let verdicts = fixtures::all(path)?.iter().map(|fixture| fixtures::verify(fixture, &Serial)).collect::<Result<Vec<_>, _>>()?;
+    if let Some(file) = junit {
+        write_whole(file, |out| out.write_all(fixtures::junit(&verdicts).as_bytes()))?;
+    }
+    if json {
+        outln!("{}", serde_json::to_string_pretty(&verdicts)?);
+    } else {
+        verdicts.iter().for_each(|verdict| outln!("{}", sentence(verdict)));
+    }
+    if verdicts.iter().any(|verdict| !verdict.differences.is_empty()) {
+        bail!("digests have changed. If that is meant: dynvox fixtures bless {} --reason \"why\"", path.display());
+    }
+    Ok(())
+}
+
 pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
     match &args.action {
-        Action::Verify { path } => {
-            let verdicts = fixtures::all(path)?.iter().map(|fixture| fixtures::verify(fixture, &Serial)).collect::<Result<Vec<_>, _>>()?;
-            verdicts.iter().for_each(|verdict| outln!("{}", sentence(verdict)));
-            if verdicts.iter().any(|verdict| verdict.difference.is_some()) {
-                bail!("digests have changed. If that is meant: dynvox fixtures bless --reason \"why\"");
+        Action::New(args) => new(args)?,
+        Action::Verify { path, json, junit } => verify(path, *json, junit.as_deref())?,
+        Action::Bless { path, dry_run: true, .. } => {
+            for fixture in fixtures::all(path)? {
+                outln!("{}", sentence(&fixtures::verify(&fixture, &Serial)?));
             }
         }
-        Action::Bless { path, reason } => {
+        Action::Bless { path, reason, .. } => {
             for fixture in fixtures::all(path)? {
-                let outcome = match fixtures::bless(&fixture, reason, &Serial)? {
+                let outcome = match fixtures::bless(&fixture, reason.as_deref().unwrap_or_default(), &Serial)? {
                     Blessing::Unchanged => "is unchanged",
                     Blessing::Written => "is blessed",
                 };
@@ -67,10 +168,19 @@ pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Frames named in a sentence, at most.
+const NAMED: usize = 3;
+
 fn sentence(verdict: &Verdict) -> String {
     let name = verdict.fixture.display();
-    match &verdict.difference {
-        None => format!("{name}: {} frames, all digests equal", verdict.frames),
-        Some(difference) => format!("{name}: first divergence: frame {}, {}", difference.frame, difference.column),
-    }
+    let Some(first) = verdict.differences.first() else { return format!("{name}: {} frames, all digests equal", verdict.frames) };
+    let columns = first.columns.join(", ");
+    let others: Vec<String> = verdict.differences.iter().skip(1).take(NAMED).map(|one| one.frame.to_string()).collect();
+    let more = verdict.differences.len().saturating_sub(1 + NAMED);
+    let more = match (others.is_empty(), more) {
+        (true, _) => String::new(),
+        (false, 0) => format!("; frames {} differ too", others.join(", ")),
+        (false, more) => format!("; frames {} and {more} more differ too", others.join(", ")),
+    };
+    format!("{name}: first divergence: frame {}, {columns}{more}", first.frame)
 }

@@ -21,6 +21,7 @@ mod inspect;
 mod output;
 mod run;
 mod settings;
+mod signals;
 mod sweep;
 mod synth;
 
@@ -49,9 +50,13 @@ Examples:
   dynvox evaluate stereo ~/kitti-stereo-2015        D1 and coverage of the matcher, by region
   dynvox sweep street ~/kitti:06 --out sweep    prune weights, frame rates and scales on one page
   dynvox synth --out street --set street.frames=50
+  dynvox fixtures new pinned --from ~/my-rig --memory 32MiB   digests of your own rig, for your CI
   dynvox diff out/a out/b                       the first frame and stage in which two runs diverge
 
-A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open the last in a browser.";
+A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open the last in a browser.
+
+Exit codes: 0 done; 1 failed; 2 wrong command line; 3 images refused; 4 the run ended early or lacks a file: what was mapped is in its folder,
+and summary.json says why under `incomplete`.";
 
 /// Dense stereo mapping of dynamic scenes, within a fixed byte budget and bit-exact on every machine.
 #[derive(Debug, Parser)]
@@ -85,6 +90,8 @@ enum Command {
 
 /// Exit code of a run whose images would give a meaningless map.
 const REFUSED_INPUT: u8 = 3;
+/// Exit code of a run that ended early, or whose results lack a file.
+const INCOMPLETE: u8 = 4;
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
@@ -104,7 +111,11 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", sentence(&error));
-            if error.is::<crate::input::diagnosis::RefusedInput>() { ExitCode::from(REFUSED_INPUT) } else { ExitCode::FAILURE }
+            match () {
+                () if error.is::<crate::input::diagnosis::RefusedInput>() => ExitCode::from(REFUSED_INPUT),
+                () if error.is::<run::IncompleteRun>() => ExitCode::from(INCOMPLETE),
+                () => ExitCode::FAILURE,
+            }
         }
     }
 }

@@ -1,19 +1,24 @@
 //! `dynvox run`.
 
+mod results;
 mod resume;
+mod stream;
 
 use super::capacity::CapacityArgs;
 use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
-use crate::formats;
 use crate::input::depth::{self, DepthChoice};
-use crate::input::diagnosis::{self, RefusedInput};
+use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
 use crate::input::masks::{self, MaskChoice};
-use crate::input::{self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking};
+use crate::input::stream::WhenLate;
+use crate::input::{self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking, StopRequest};
 use crate::observe::Reference;
+use crate::report;
 use crate::report::text::counted;
-use crate::report::{self, Summary};
-use crate::run::{self, BLOCKS_FILE, Checkpoint, FolderError, HOST_OVERHEAD_BYTES, Plan, RunError, RunFolder, RunRecord, Streaming};
+use crate::run::{
+    self, BLOCKS_FILE, Checkpoint, FrameNumbers, HOST_OVERHEAD_BYTES, Incomplete, MAP_FILE, Plan, RunError, RunFolder, RunRecord,
+    SNAPSHOT_FILE, Streaming,
+};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -25,7 +30,7 @@ const DEFAULT_PARENT: &str = "out";
 
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
-    /// Data set to map; the synthetic street without one
+    /// Data set to map; - for a stream of PGM or PPM images from standard input, left and right in turn; the synthetic street without one
     path: Option<PathBuf>,
     /// Sequence within the data set: 06, 0003
     #[arg(long, value_name = "NAME")]
@@ -39,9 +44,18 @@ pub struct RunArgs {
     /// Significant bits of 16-bit images, 8 to 16; told from the largest value of some of them otherwise
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=16))]
     bits: Option<u32>,
-    /// Both images of a pair lie in one file [default: told from the calibration]
+    /// Both images of a pair lie in one, the left one left [default: told from the calibration]
+    #[arg(long)]
+    side_by_side: bool,
+    /// Both images of a pair lie in one, the left one above
+    #[arg(long, conflicts_with = "side_by_side")]
+    top_bottom: bool,
+    /// Frames a second of a stream
+    #[arg(long, value_name = "HZ", value_parser = rate_hz)]
+    rate: Option<f64>,
+    /// Frames of a stream that come while the mapper is busy: wait lets the stream wait, drop drops the oldest and counts it [default: wait]
     #[arg(long, value_enum, value_name = "HOW")]
-    stacked: Option<Stacking>,
+    when_late: Option<WhenLate>,
     /// Calibration in place of the recording's own: of raw images in any format `dynvox calibration` reads (give it twice where each camera
     /// has a file), of rectified ones KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
     #[arg(long, value_name = "FILE")]
@@ -103,13 +117,16 @@ pub struct RunArgs {
     /// Evaluate the map at a frame's pose N frames later, after pruning
     #[arg(long, default_value_t = 0, value_name = "N", requires = "evaluate")]
     evaluation_delay: usize,
-    /// Fail at the first frame that affects the map: an extrapolated pose, anything refused or lost
+    /// End at the first frame that affects the map: an extrapolated pose, anything refused or lost
     #[arg(long)]
     strict: bool,
+    /// Leave out frames that cannot be read or mapped, and count them; otherwise the run ends before the first of them
+    #[arg(long)]
+    skip_bad_frames: bool,
     /// Map images that are refused as exchanged, unrectified, out of order, black or the same in both cameras
     #[arg(long)]
     force: bool,
-    /// Fail when the process uses more than so many MiB [default: the slab and 256]
+    /// End when the process uses more than so many MiB [default: the slab and 256]
     #[arg(long, value_name = "MIB")]
     rss_limit_mib: Option<u64>,
     /// Write a snapshot every N frames, from which an interrupted run can be resumed. Cannot be combined with --evaluate
@@ -161,13 +178,23 @@ impl RunArgs {
             sequence: self.sequence.clone(),
             cameras: self.images,
             bits: self.bits,
-            stacking: self.stacked,
+            stacking: self.stacking(),
             calibration: self.calibration.clone(),
         }
     }
 
-    fn open(&self, settings: &Settings) -> anyhow::Result<Box<dyn FrameSource>> {
+    fn stacking(&self) -> Option<Stacking> {
+        match (self.side_by_side, self.top_bottom) {
+            (true, _) => Some(Stacking::SideBySide),
+            (_, true) => Some(Stacking::TopBottom),
+            _ => None,
+        }
+    }
+
+    fn open(&self, settings: &Settings, stop: &StopRequest) -> anyhow::Result<Box<dyn FrameSource>> {
         let dataset: Box<dyn FrameSource> = match &self.path {
+            Some(path) if stream::is_stream(path) => stream::open(self, stop)?,
+            _ if self.rate.is_some() || self.when_late.is_some() => bail!("--rate and --when-late are for a stream: `dynvox run -`"),
             Some(path) => input::open(path, &self.options())?,
             None if self.dataset.is_some() || self.sequence.is_some() => {
                 bail!("--dataset and --sequence need a data set. Give its path: `dynvox run PATH`")
@@ -178,6 +205,11 @@ impl RunArgs {
         let dataset = if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) };
         Ok(masks::attach(dataset, &self.instances)?)
     }
+}
+
+fn rate_hz(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+    rate.ok_or_else(|| "must be a number above 0".to_owned())
 }
 
 fn on_or_off(text: &str) -> Result<bool, String> {
@@ -194,15 +226,18 @@ fn examined(args: &RunArgs, dataset: &dyn FrameSource, indices: &[usize]) -> any
         // The synthetic street knows what it renders.
         return Ok(Vec::new());
     }
-    let findings = diagnosis::examine(dataset, indices)?;
-    if findings.iter().any(|finding| finding.refused) && !args.force {
+    let stream = dataset.stream().is_some();
+    // Of a stream the first frame can be looked at, and a camera may begin in the dark.
+    let findings = diagnosis::examine(dataset, if stream { &[0] } else { indices })?;
+    let refused = |finding: &Finding| finding.refused && !(stream && finding.fault == Fault::Black);
+    if findings.iter().any(refused) && !args.force {
         return Err(RefusedInput { findings }.into());
     }
     Ok(findings.into_iter().map(|finding| finding.message).collect())
 }
 
 /// The plan of a run.
-fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
+fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
     let mut settings = Settings::resolve(args.config.as_deref(), &args.set)?;
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
     if threads > MOST_THREADS {
@@ -211,11 +246,11 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     if threads == 0 || args.stride == 0 || args.frames == Some(0) {
         bail!("--threads, --stride and --frames must be at least 1. Give a larger number");
     }
-    let dataset = args.open(&settings)?;
+    let dataset = args.open(&settings, stop)?;
     let (profile, capacity) = args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;
     settings.fit(&capacity);
-    let indices = run::frame_indices(dataset.len(), args.start, args.stride, args.frames)?;
-    if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &indices) {
+    let frames = FrameNumbers::of(dataset.as_ref(), args.start, args.stride, args.frames)?;
+    if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &frames) {
         settings.set_frame_interval_s(interval_s);
     }
     if args.instances.finds_motion() {
@@ -228,12 +263,14 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         settings.set_fuse_every(fuse_every);
     }
     let poses = match &args.egomotion {
-        Some(choice) => choice.apply(&mut settings, dataset.as_ref(), &indices)?,
+        Some(choice) => choice.apply(&mut settings, dataset.as_ref(), frames.listed())?,
         None => None,
     };
     Ok(Plan {
-        warnings: examined(args, dataset.as_ref(), &indices)?,
-        indices,
+        warnings: examined(args, dataset.as_ref(), frames.listed())?,
+        frames,
+        skip_bad_frames: args.skip_bad_frames,
+        stop: stop.clone(),
         poses,
         profile,
         capacity,
@@ -266,16 +303,24 @@ fn map(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> anyho
     })
 }
 
+/// The plan of a command line, the program's name first.
+pub fn plan_of(line: &[String]) -> anyhow::Result<Plan> {
+    plan(&RunArgs::parse(line)?, &StopRequest::default())
+}
+
 /// A run without a folder: its files go to a scratch directory and are removed.
 pub fn record(args: &RunArgs, scratch_dir: &Path) -> anyhow::Result<RunRecord> {
-    map(&plan(args)?, &RunFolder::begin(scratch_dir, true)?, None)
+    let record = map(&plan(args, &StopRequest::default())?, &RunFolder::begin(scratch_dir, true)?, None)?;
+    record.incomplete.as_ref().map_or(Ok(()), |incomplete| Err(anyhow::anyhow!("{}", incomplete.reason)))?;
+    Ok(record)
 }
 
 pub fn run(args: &RunArgs) -> anyhow::Result<()> {
+    let stop = super::signals::stop_request()?;
     if let Some(target) = &args.resume {
-        return resume::run(args, target);
+        return resume::run(args, target, &stop);
     }
-    let mut plan = plan(args)?;
+    let mut plan = plan(args, &stop)?;
     plan.checkpoints = args.snapshot_every.map(|every| resume::checkpoints(&plan, every)).transpose()?;
     let target = args.out.clone().unwrap_or_else(|| RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name()));
     let folder = RunFolder::begin(&target, args.overwrite)?;
@@ -288,48 +333,52 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     finish(args, &plan, folder, None)
 }
 
+/// A run whose results are written, and incomplete.
+#[derive(Debug, thiserror::Error)]
+#[error("{reason}.\nWhat was mapped until then is in {folder}{more}", folder = .folder.display())]
+pub struct IncompleteRun {
+    reason: String,
+    folder: PathBuf,
+    /// What is missing there, and how to go on.
+    more: String,
+}
+
+impl IncompleteRun {
+    fn new(incomplete: &Incomplete, folder: PathBuf) -> Self {
+        let missing = if incomplete.missing.is_empty() { String::new() } else { format!(", without {}", incomplete.missing.join(", ")) };
+        let resume = if folder.join(SNAPSHOT_FILE).is_file() {
+            format!("; `dynvox run --resume {}` resumes the run", folder.display())
+        } else {
+            String::new()
+        };
+        Self { reason: incomplete.reason.clone(), more: missing + &resume, folder }
+    }
+}
+
 /// Maps, writes the results, and renames the folder to its target.
-fn finish(args: &RunArgs, plan: &Plan, folder: RunFolder, checkpoint: Option<Checkpoint>) -> anyhow::Result<()> {
-    let record = map(plan, &folder, checkpoint)?;
-    let summary = Summary::of(&record);
-    write(&folder, plan, &record, &summary)?;
-    let temporary: &[&str] = if record.keeps_blocks() { &[] } else { &[BLOCKS_FILE] };
-    let target = folder.commit(temporary)?;
+fn finish(args: &RunArgs, plan: &Plan, mut folder: RunFolder, checkpoint: Option<Checkpoint>) -> anyhow::Result<()> {
+    let mut record = map(plan, &folder, checkpoint)?;
+    // From here on there is something to lose.
+    folder.keep();
+    let summary = results::write(&folder, &mut record)?;
+    let resumable = record.incomplete.is_some() && folder.snapshot().is_file();
+    let blocks =
+        resumable || record.keeps_blocks() || record.incomplete.as_ref().is_some_and(|of| of.missing.iter().any(|name| name == MAP_FILE));
+    let temporary = [(BLOCKS_FILE, blocks), (SNAPSHOT_FILE, resumable)].into_iter().filter(|(_, stays)| !stays);
+    let target = folder.commit(&temporary.map(|(name, _)| name).collect::<Vec<_>>())?;
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {
         out!("{}", report::summary_lines(&record, &target));
     }
-    Ok(())
-}
-
-fn write(folder: &RunFolder, plan: &Plan, run: &RunRecord, summary: &Summary) -> Result<(), FolderError> {
-    let sections = &run.sections;
-    let (times_s, poses) = (&sections.trajectory.times_s, &sections.trajectory.poses);
-    let stamp_ns = |(&index, &time_s): (&usize, &f64)| plan.dataset.stamp_ns(index).unwrap_or((time_s * 1e9).round() as u64);
-    let times_ns: Vec<u64> = plan.indices.iter().zip(times_s).map(stamp_ns).collect();
-    if let Some(text) = report::rig::calibration_toml(run) {
-        folder.write("calibration.toml", |out| std::io::Write::write_all(out, text.as_bytes()))?;
-    }
-    folder.write("config.toml", |out| std::io::Write::write_all(out, run.header.config_toml.as_bytes()))?;
-    folder.write("trajectory_kitti.txt", |out| formats::write_kitti(out, poses))?;
-    folder.write("trajectory_tum.txt", |out| formats::write_tum(out, &times_ns, poses))?;
-    folder.write("frames.csv", |out| report::write_frames(out, &run.frames))?;
-    folder.write("tracks.csv", |out| report::write_tracks(out, &sections.tracks.frames))?;
-    if !sections.tracks.comparisons.is_empty() {
-        folder.write("tracks_truth.csv", |out| report::write_tracks_truth(out, &sections.tracks))?;
-    }
-    if let Some(reference) = &sections.reference {
-        folder.write("lidar.csv", |out| report::write_reference(out, &reference.frames))?;
-    }
-    folder.write("report.html", |out| report::html::write(out, run))?;
-    folder.write("summary.json", |out| Ok(serde_json::to_writer_pretty(out, summary)?))
+    record.incomplete.map_or(Ok(()), |incomplete| Err(IncompleteRun::new(&incomplete, target).into()))
 }
 
 fn print_header(plan: &Plan) {
     let (width, height) = plan.dataset.size();
-    let (name, frames, threads) = (plan.dataset.name(), plan.indices.len(), counted(plan.threads, "thread"));
-    eprintln!("{name}: {frames} frames of {width} x {height} px, profile {}, {threads}", plan.profile);
+    let (name, threads) = (plan.dataset.name(), counted(plan.threads, "thread"));
+    let frames = plan.frames.count().map_or_else(|| "a stream".to_owned(), |count| format!("{count} frames"));
+    eprintln!("{name}: {frames} of {width} x {height} px, profile {}, {threads}", plan.profile);
     for note in plan.dataset.notes() {
         eprintln!("note: {note}");
     }

@@ -246,6 +246,29 @@ mod tests {
     }
 
     #[test]
+    fn the_core_sets_every_key_of_the_file_to_the_same_value() {
+        let other = [
+            "volume.voxel_size_m=0.1",
+            "volume.observation_weight=depth",
+            "tracking.motion.samples=77",
+            "tracking.segmentation.enabled=true",
+            "rig.self_calibration=report",
+            "rig.disparity_correction.offset_px=0.125",
+            "egomotion.confidence=0.99",
+            "volume.when_full=refuse",
+            "tracking.overlap=box",
+        ];
+        let given = sets(&other).unwrap();
+        let table: Table = given.to_toml(false).unwrap().parse().unwrap();
+        let mut config = dynvox_core::Config::for_rig(any_rig());
+        for (key, value) in leaves("", &table) {
+            let text = value.to_string();
+            assert_eq!(config.set(&key, text.trim_matches(['"', '[', ']'])), Ok(()), "{key} = {text}");
+        }
+        assert_eq!(config, given.config(any_rig(), None));
+    }
+
+    #[test]
     fn unknown_keys_and_wrong_kinds_are_named() {
         let refusal = |set: &str| format!("{:#}", sets(&[set]).unwrap_err());
         let message = refusal("volume.voxel_sise_m=0.1");

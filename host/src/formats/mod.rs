@@ -4,6 +4,7 @@
 //! Readers of images are told the size that is expected where a header could ask for any amount of memory.
 
 pub mod calibration;
+mod capacity;
 mod error;
 mod image;
 mod opencv_xml;
@@ -17,6 +18,7 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
+pub use capacity::CapacityTable;
 pub use error::{FormatError, read_text};
 pub use image::{Image, luma};
 pub use opencv_xml::read_opencv_depth;

@@ -100,8 +100,16 @@ impl PlyWriter {
         Ok(index)
     }
 
-    /// Appends the faces and fills in the counts.
-    pub fn finish(mut self) -> io::Result<Mesh> {
+    /// Appends the faces and fills in the counts. After a failure the file of faces is removed, and what is at the path is not a PLY.
+    pub fn finish(self) -> io::Result<Mesh> {
+        let faces_path = self.faces_path.clone();
+        self.complete().inspect_err(|_| {
+            // The disk has failed already.
+            let _ = std::fs::remove_file(&faces_path);
+        })
+    }
+
+    fn complete(mut self) -> io::Result<Mesh> {
         if let Some(error) = self.failed {
             return Err(error);
         }

@@ -1,6 +1,7 @@
 //! Where frames come from: data sets on disk, the synthetic street, and the depth and masks that other programs made of them.
 //!
-//! [`source`] says what a source of frames is and what a frame holds; it depends on nothing else here. [`layouts`] reads recordings,
+//! [`source`] says what a source of frames is and what a frame holds; it depends on nothing else here. [`layouts`] reads recordings, [`stream`] what comes
+//! through a pipe or from an iterator,
 //! [`depth`] and [`masks`] lay files over any source; [`diagnosis`] examines images before they are mapped. Loaders guess nothing silently: what they assume stands in [`FrameSource::notes`], and
 //! what they cannot use is an [`InputError`] that says what to do.
 
@@ -9,9 +10,10 @@ pub mod diagnosis;
 pub mod layouts;
 pub mod masks;
 pub mod source;
+pub mod stream;
 
 pub use layouts::{CameraPair, Found, Layout, OpenOptions, Sequence, Stacking, StreetFrames, open, sequences_at, survey};
 pub use source::{
     AvailableMasks, DepthRefusals, ExactFrame, FrameMasks, FrameSource, GivenDepth, InputError, InstanceMask, LidarScan, MaskRefusals,
-    ObjectsTruth, Scaled, StereoImages, TrueObject, read_given_poses,
+    ObjectsTruth, Scaled, StereoImages, StopRequest, StreamState, TrueObject, read_given_poses,
 };

@@ -23,7 +23,9 @@ pub struct StageTime {
 pub struct FrameRow {
     /// Number of the frame in the data set.
     pub frame: usize,
-    /// Its time, s.
+    /// When it was taken, ns, where that is known.
+    pub stamp_ns: Option<u64>,
+    /// Its time, s: by its stamp, else by an assumed rate.
     pub time_s: f64,
     /// What the core reports.
     pub report: Report,

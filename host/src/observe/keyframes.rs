@@ -51,7 +51,13 @@ impl Observer for KeyframesObserver {
     type Section = KeyframesSection;
 
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
-        if spread(setup.indices.len(), KEYFRAMES)(frame.at) {
+        let position = frame.position;
+        // Of a stream the first frame, and others ever further apart.
+        let chosen = setup.frames.map_or_else(|| position == 0 || position.is_power_of_two(), |frames| spread(frames, KEYFRAMES)(position));
+        if chosen {
+            if self.keyframes.len() == KEYFRAMES {
+                self.keyframes.remove(0);
+            }
             self.keyframes.extend(keyframe(frame));
         }
         Ok(())

@@ -62,8 +62,8 @@ pub enum ObserveError {
 pub struct Setup<'p> {
     /// The frames.
     pub dataset: &'p dyn FrameSource,
-    /// Numbers of the frames that the run takes.
-    pub indices: &'p [usize],
+    /// Frames that the run takes; `None` where a stream's end is unknown.
+    pub frames: Option<usize>,
     /// The bounds.
     pub capacity: &'p Capacity,
     /// The settings.
@@ -98,8 +98,8 @@ pub struct RetiredVolume {
 
 /// A frame after its step.
 pub struct FrameContext<'a, 's> {
-    /// Its position in the run.
-    pub at: usize,
+    /// Its position among the frames that the run takes, those left out included.
+    pub position: usize,
     /// What is recorded of it.
     pub row: &'a FrameRow,
     /// The images and ground truth of the data set.
@@ -201,6 +201,13 @@ pub struct Sections {
     pub blocks: BlocksSection,
     /// What was refused.
     pub health: HealthSection,
+}
+
+impl Observers {
+    /// Why a file of theirs could not be written, if so. They continue without it.
+    pub fn failure(&self) -> Option<&str> {
+        self.objects.failure()
+    }
 }
 
 impl Observer for Observers {

@@ -50,6 +50,8 @@ pub struct ReconstructedObject {
 pub struct ObjectsSection {
     /// All objects handed over, in that order.
     pub objects: Vec<ReconstructedObject>,
+    /// Names of objects whose files could not be written.
+    pub unwritten: Vec<String>,
     /// Triangles of the static map in the volume that moving objects swept; known where the truth is exact.
     pub swept_triangles: Option<u64>,
 }
@@ -62,6 +64,9 @@ pub struct ObjectsObserver {
     /// The true surface seen of each, where that is known.
     sides: BTreeMap<(u32, u32), SeenSide>,
     retired: Vec<ReconstructedObject>,
+    /// Names of objects whose files could not be written, and why the first of them could not.
+    unwritten: Vec<String>,
+    failure: Option<String>,
     swept: Option<Swept>,
 }
 
@@ -87,7 +92,7 @@ impl Observer for ObjectsObserver {
     }
 
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
-        self.write_all(setup, frame.retired)?;
+        self.write_all(setup, frame.retired);
         for object in fused(frame) {
             self.paths.entry((object.id, object.segment_id)).or_default().push((frame.row.frame, object.t_world_object));
         }
@@ -96,13 +101,19 @@ impl Observer for ObjectsObserver {
     }
 
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
-        self.write_all(setup, end.retired)
+        self.write_all(setup, end.retired);
+        Ok(())
     }
 
     fn finish(self, _: &Setup<'_>, finished: &Finished<'_>) -> Result<ObjectsSection, ObserveError> {
-        let swept = self.swept.as_ref().map(|swept| swept.triangles(&finished.mesh_path)).transpose();
+        let mesh = finished.mesh_path.is_file();
+        let swept = self.swept.as_ref().filter(|_| mesh).map(|swept| swept.triangles(&finished.mesh_path)).transpose();
         let failed = |source| ObserveError::Write { path: finished.mesh_path.clone(), source };
-        Ok(ObjectsSection { objects: self.retired, swept_triangles: swept.map_err(failed)? })
+        Ok(ObjectsSection {
+            objects: self.retired,
+            unwritten: self.unwritten,
+            swept_triangles: swept.map_err(failed)?,
+        })
     }
 }
 
@@ -136,12 +147,31 @@ impl ObjectsObserver {
         }
     }
 
-    fn write_all(&mut self, setup: &Setup<'_>, retired: &[RetiredVolume]) -> Result<(), ObserveError> {
-        retired.iter().try_for_each(|one| self.write(setup, one))
+    /// Why an object's files could not be written, if so.
+    pub fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
+    }
+
+    /// Writes objects. One that cannot be written is noted, and the run goes on without it.
+    fn write_all(&mut self, setup: &Setup<'_>, retired: &[RetiredVolume]) {
+        for one in retired {
+            let name = self.name_of(one);
+            if let Err(error) = self.write(setup, one, &name) {
+                files(&name).iter().for_each(|file| drop(std::fs::remove_file(setup.folder.join(FOLDER).join(file))));
+                self.unwritten.push(name);
+                self.failure.get_or_insert_with(|| error.to_string());
+            }
+        }
+    }
+
+    /// The track's number; `7-2` for the second object of track 7.
+    fn name_of(&self, RetiredVolume { summary, .. }: &RetiredVolume) -> String {
+        let before = self.retired.iter().filter(|known| known.id == summary.id).count();
+        if before == 0 { summary.id.to_string() } else { format!("{}-{}", summary.id, before + 1) }
     }
 
     /// Writes an object's mesh and poses. One without triangles leaves no file.
-    fn write(&mut self, setup: &Setup<'_>, RetiredVolume { summary, volume }: &RetiredVolume) -> Result<(), ObserveError> {
+    fn write(&mut self, setup: &Setup<'_>, RetiredVolume { summary, volume }: &RetiredVolume, name: &str) -> Result<(), ObserveError> {
         let poses = self.paths.remove(&(summary.id, summary.segment_id)).unwrap_or_default();
         let side = self.sides.remove(&(summary.id, summary.segment_id));
         let folder = setup.folder.join(FOLDER);
@@ -151,13 +181,11 @@ impl ObjectsObserver {
         if triangles.is_empty() {
             return Ok(());
         }
-        let before = self.retired.iter().filter(|known| known.id == summary.id).count();
-        let name = if before == 0 { summary.id.to_string() } else { format!("{}-{}", summary.id, before + 1) };
-        write_files(&folder, &name, &triangles, &poses)?;
+        write_files(&folder, name, &triangles, &poses)?;
         self.retired.push(ReconstructedObject {
             id: summary.id,
             segment: summary.segment_id,
-            name,
+            name: name.to_owned(),
             class: summary.class,
             state: summary.state,
             frames: summary.frames,

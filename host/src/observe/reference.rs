@@ -118,7 +118,7 @@ impl Observer for ReferenceObserver {
 
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
         let Some(plan) = &setup.reference else { return Ok(()) };
-        let pending = if plan.positions.binary_search(&frame.at).is_ok() { pending(setup, plan, frame)? } else { None };
+        let pending = if plan.positions.binary_search(&frame.position).is_ok() { pending(setup, plan, frame)? } else { None };
         let Some(due) = self.pending.step(plan.delay, pending) else { return Ok(()) };
         // Object poses of past frames are not kept: later the background is viewed alone.
         let seen = match plan.delay {
@@ -186,7 +186,7 @@ fn pending(setup: &Setup<'_>, plan: &ReferencePlan, frame: &FrameContext<'_, '_>
     Ok(scan.map(|scan| {
         let mut pending = PendingFrame::new(frame.row.frame, frame.row.report.t_world_camera, &scan, input_px, region);
         let rectified = mapper.rectified_pair().map(|[left, _]| Image::from_view(&left));
-        pending.picture = plan.drawn.contains(&frame.at).then(|| rectified.unwrap_or_else(|| images.left.clone()));
+        pending.picture = plan.drawn.contains(&frame.position).then(|| rectified.unwrap_or_else(|| images.left.clone()));
         pending
     }))
 }

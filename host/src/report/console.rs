@@ -11,6 +11,7 @@ use std::path::Path;
 /// The figures of a run whose folder is `folder`, line by line.
 pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     let mut lines = vec![("frames", format!("{} at {:.1} fps", run.frames.len(), run.fps()))];
+    lines.extend(ending_lines(run));
     let Sections { trajectory, reference, tracks, .. } = &run.sections;
     lines.extend(trajectory.errors.iter().flat_map(trajectory_lines));
     lines.extend(reference.iter().filter_map(|reference| reference.figures.as_ref()).flat_map(reference_lines));
@@ -27,6 +28,21 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     lines.push(("digest", format!("{:016x}", run.digest())));
     lines.push(("results", folder.display().to_string()));
     lines.iter().map(|(name, value)| format!("{name:<22}{value}\n")).collect()
+}
+
+fn ending_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
+    let mut lines = Vec::new();
+    if let Some(incomplete) = &run.incomplete {
+        let left = incomplete.frames_left.map_or_else(String::new, |left| format!(" ({left} frames left)"));
+        lines.push(("INCOMPLETE", format!("{}{left}", incomplete.reason)));
+    }
+    if run.skipped.count > 0 {
+        lines.push(("frames left out", format!("{}; summary.json lists them", run.skipped.count)));
+    }
+    if run.dropped > 0 {
+        lines.push(("frames dropped", format!("{} came while the mapper was busy", run.dropped)));
+    }
+    lines
 }
 
 fn trajectory_lines(errors: &TrajectoryErrors) -> Vec<(&'static str, String)> {

@@ -5,7 +5,7 @@ use crate::evaluate::objects::{ObjectFigures, TrackErrors};
 use crate::evaluate::reference::ReferenceFigures;
 use crate::evaluate::surfaces::SurfaceFigures;
 use crate::observe::{BlockTotals, BlocksSection, ReconstructedObject, TrackRecord, TrajectorySection, state_name};
-use crate::run::{RunRecord, StageStatistics};
+use crate::run::{Incomplete, RunRecord, SkippedFrames, StageStatistics};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -19,6 +19,9 @@ pub struct Summary {
     seconds: f64,
     fps: f64,
     digest: String,
+    /// Why the results are incomplete, if they are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    incomplete: Option<Incomplete>,
     slab_bytes: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     rss_peak_bytes: Option<u64>,
@@ -45,6 +48,10 @@ pub struct Summary {
 struct InputSummary {
     /// Sentences that say what is doubtful about the images.
     warnings: Vec<String>,
+    /// Frames left out because they could not be read or mapped.
+    skipped: SkippedFrames,
+    /// Frames of a stream that came while the mapper was busy.
+    dropped: u64,
 }
 
 #[derive(Debug, Serialize)]
@@ -189,6 +196,7 @@ impl Summary {
             seconds: run.seconds,
             fps: run.fps(),
             digest: format!("{:016x}", run.digest()),
+            incomplete: run.incomplete.clone(),
             slab_bytes: run.header.slab_bytes,
             rss_peak_bytes: run.rss_peak_bytes,
             stages: run.stage_statistics().into_iter().map(|(name, of)| (name, stage(of))).collect(),
@@ -207,7 +215,11 @@ impl Summary {
             prune: PruneSummary::of(&sections.blocks.totals),
             evict: EvictSummary::of(&sections.blocks),
             health: HealthSummary::of(run),
-            input: InputSummary { warnings: run.header.warnings.clone() },
+            input: InputSummary {
+                warnings: run.header.warnings.clone(),
+                skipped: run.skipped.clone(),
+                dropped: run.dropped,
+            },
         }
     }
 }

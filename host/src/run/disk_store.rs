@@ -12,6 +12,8 @@ use std::fs::File;
 
 /// Name of the file in the run folder.
 pub const BLOCKS_FILE: &str = "map.blocks";
+/// Name of the mesh in the run folder.
+pub const MAP_FILE: &str = "map.ply";
 
 /// How evicted blocks are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,6 +60,11 @@ impl DiskStore {
         self.0.as_ref().map(BlockFile::position).transpose()
     }
 
+    /// Whether the disk refused, and not the limit that was asked for.
+    pub fn disk_failed(&self) -> bool {
+        self.0.as_ref().is_some_and(BlockFile::disk_failed)
+    }
+
     /// Why blocks are no longer stored, if so.
     pub fn failure(&self) -> Option<String> {
         self.0.as_ref().and_then(BlockFile::failure).map(ToString::to_string)
@@ -66,7 +73,8 @@ impl DiskStore {
 
 /// A mesh on its way to disk.
 pub struct MeshOutput {
-    ply: PlyWriter,
+    /// Or why there is no file.
+    ply: std::io::Result<PlyWriter>,
     store: DiskStore,
     /// Blocks that are in the mesh already.
     meshed: HashSet<BlockCoord>,
@@ -75,9 +83,8 @@ pub struct MeshOutput {
 
 impl MeshOutput {
     /// Begins `map.ply`. Meshes the pool's blocks when none was evicted, or when nothing more can be stored; otherwise evicts them to the store.
-    pub fn begin(mapper: &mut Mapper<'_>, mut store: DiskStore, folder: &RunFolder) -> Result<Self, FolderError> {
-        let path = folder.file("map.ply");
-        let mut ply = PlyWriter::begin(&path).map_err(|source| FolderError::Write { path, source })?;
+    pub fn begin(mapper: &mut Mapper<'_>, mut store: DiskStore, folder: &RunFolder) -> Self {
+        let mut ply = PlyWriter::begin(&folder.file(MAP_FILE));
         let mut report = EvictionReport::default();
         let mut meshed = HashSet::new();
         if store.0.as_ref().is_none_or(|file| file.records() == 0 || file.failure().is_some()) {
@@ -87,29 +94,37 @@ impl MeshOutput {
         } else {
             report = mapper.stream_out(&mut store);
         }
-        Ok(Self { ply, store, meshed, report })
+        Self { ply, store, meshed, report }
     }
 
-    /// Adds the stored blocks, reading them piece by piece into `slab`, and ends the file.
+    /// Adds the stored blocks, reading them piece by piece into `slab`, and ends the file. What cannot be written leaves no file, and the reason.
     pub fn finish(
         mut self,
         slab: &mut [u8],
         (capacity, config): (&Capacity, &Config),
         folder: &RunFolder,
-    ) -> Result<(Mesh, StoreStats), FolderError> {
+    ) -> (Result<Mesh, FolderError>, StoreStats) {
         let mut stats = StoreStats { end: self.report, failure: self.store.failure(), ..StoreStats::default() };
-        let failed = |source| FolderError::Write { path: folder.file("map.ply"), source };
+        let mut failed = None;
         if let Some(file) = self.store.0.as_mut() {
             let ply = &mut self.ply;
             let (how, memory) = ((&config.volume, &config.mesh), (slab, capacity.colour));
             let meshed = store::mesh::triangles(file, how, memory, &self.meshed, &mut |triangle| add(ply, triangle));
-            meshed.map_err(|error| failed(std::io::Error::other(format!("the slab is too small for a piece of the map: {error:?}"))))?;
+            failed = meshed.err().map(|error| std::io::Error::other(format!("the slab is too small for a piece of the map: {error:?}")));
             (stats.records, stats.bytes, stats.unreadable) = (file.records(), file.bytes(), file.unreadable());
         }
-        Ok((self.ply.finish().map_err(failed)?, stats))
+        let written = failed.map_or(Ok(()), Err).and_then(|()| self.ply?.finish());
+        let path = folder.file(MAP_FILE);
+        let written = written.map_err(|source| {
+            // It may not exist.
+            let _ = std::fs::remove_file(&path);
+            FolderError::Write { path, source }
+        });
+        (written, stats)
     }
 }
 
-fn add(ply: &mut PlyWriter, Triangle { vertices }: Triangle) {
+fn add(ply: &mut std::io::Result<PlyWriter>, Triangle { vertices }: Triangle) {
+    let Ok(ply) = ply else { return };
     ply.triangle(vertices.map(|vertex| (vertex.position_m, vertex.colour)));
 }

@@ -88,7 +88,7 @@ pub enum RunError {
         reason: String,
     },
     /// The core refuses a frame.
-    #[error("frame {frame} was refused: {reason}. End before it with --frames, or skip it with --start")]
+    #[error("frame {frame} was refused: {reason}. Leave such frames out with --skip-bad-frames, or end before it with --frames")]
     Step {
         /// Number of the frame.
         frame: usize,
@@ -111,6 +111,14 @@ pub enum RunError {
         frame: usize,
         /// The cause.
         cause: String,
+    },
+    /// A signal asked for the end.
+    #[error("the run was stopped by {} after {frames} frames. Run it again, or map so many frames with --frames {frames}", signal_name(*.signal))]
+    Signal {
+        /// The signal's number.
+        signal: usize,
+        /// Frames mapped.
+        frames: usize,
     },
     /// The process uses more memory than allowed.
     #[error(
@@ -136,6 +144,26 @@ pub enum RunError {
         /// The system's error.
         source: rayon::ThreadPoolBuildError,
     },
+}
+
+impl RunError {
+    /// Whether it is about one frame, without which the run may go on.
+    pub(super) fn is_of_one_frame(&self) -> bool {
+        match self {
+            Self::Dataset(error) => !error.ends_source(),
+            Self::Step { .. } => true,
+            _ => false,
+        }
+    }
+}
+
+/// `SIGINT` for 2.
+fn signal_name(signal: usize) -> String {
+    match signal {
+        2 => "SIGINT".to_owned(),
+        15 => "SIGTERM".to_owned(),
+        other => format!("signal {other}"),
+    }
 }
 
 /// Why there is no reference, and what to do.

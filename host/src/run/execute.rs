@@ -1,37 +1,51 @@
 //! One run: frames in; map, trajectory and figures out.
 
 use super::checkpoint::Checkpoint;
-use super::disk_store::MeshOutput;
+use super::disk_store::{MAP_FILE, MeshOutput};
+use super::ending::Incomplete;
 use super::error::RunError;
 use super::record::{RunHeader, RunRecord};
 use super::session::Session;
 use super::state::RunState;
 use super::{Plan, RunFolder, resident_bytes};
+use crate::formats::Mesh;
 use crate::observe::{Finished, Observer, Setup};
 use crate::slab::HostSlab;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
 use std::time::Instant;
 
-/// Maps the planned frames, or of an interrupted run those that are left, and writes the mesh into the folder.
+/// Maps the planned frames, or of an interrupted run those that are left, and writes the mesh into the folder. What stops the run after its first
+/// frame is in [`RunRecord::incomplete`], and the record is of what was mapped until then.
 ///
 /// # Errors
-/// The plan cannot be run, a frame cannot be read or mapped, or the disk refuses.
+/// The plan cannot be run, or not even its first frame can be mapped.
 pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> Result<RunRecord, RunError> {
     plan.check()?;
     let slab_bytes = plan.capacity.bytes();
     let mut slab = HostSlab::map(slab_bytes).ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
-    let Mapped { setup, mut state, mut since, regions, blocks, pruned, output } = map(plan, slab.bytes_mut(), folder, checkpoint)?;
+    let Mapped { setup, mut state, mut since, regions, blocks, pruned, output, mut incomplete } =
+        map(plan, slab.bytes_mut(), folder, checkpoint)?;
     // The mapper is gone: its slab serves to read the map piece by piece.
-    let (mesh, store) = output.finish(slab.bytes_mut(), (&plan.capacity, &plan.config), folder)?;
-    let mesh_path = folder.file("map.ply");
+    let (written, store) = output.finish(slab.bytes_mut(), (&plan.capacity, &plan.config), folder);
+    let mesh = written.unwrap_or_else(|error| {
+        Incomplete::add_missing(&mut incomplete, MAP_FILE, &error.to_string());
+        Mesh::default()
+    });
+    let mesh_path = folder.file(MAP_FILE);
     let finished = Finished { rows: &state.rows, regions, blocks, pruned, mesh, mesh_path, store };
     let sections = std::mem::take(&mut state.observers).finish(&setup, &finished)?;
+    for name in &sections.objects.unwritten {
+        Incomplete::add_missing(&mut incomplete, &format!("objects/{name}.ply"), "an object could not be written");
+    }
     let mapping_seconds = state.timers.mapping().as_secs_f64();
     state.timers.add_since(&mut since);
     Ok(RunRecord {
         header: header(plan),
         frames: state.rows,
+        skipped: state.skipped,
+        dropped: plan.dataset.stream().map_or(0, |stream| stream.dropped),
+        incomplete,
         sections,
         seconds: state.timers.total.as_secs_f64(),
         mapping_seconds,
@@ -48,6 +62,7 @@ struct Mapped<'p> {
     blocks: usize,
     pruned: PruneReport,
     output: MeshOutput,
+    incomplete: Option<Incomplete>,
 }
 
 /// Maps the planned frames in `slab`.
@@ -56,14 +71,15 @@ fn map<'p>(plan: &'p Plan, slab: &mut [u8], folder: &'p RunFolder, checkpoint: O
         None => Session::begin(plan, folder, slab)?,
         Some(checkpoint) => Session::resume(plan, folder, slab, checkpoint)?,
     };
-    session.frames()?;
+    let incomplete = session.frames()?.or_else(|| session.of_disk());
     let pruned = session.end()?;
     let Session { mut mapper, store, state, setup, since, .. } = session;
     Ok(Mapped {
         regions: mapper.footprint().regions().to_vec(),
         blocks: mapper.background().pool().len(),
         pruned,
-        output: MeshOutput::begin(&mut mapper, store, folder)?,
+        output: MeshOutput::begin(&mut mapper, store, folder),
+        incomplete,
         setup,
         state,
         since,

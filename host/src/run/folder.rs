@@ -1,5 +1,5 @@
-//! The run folder: written under another name next to its target, and renamed when it is complete. One that holds a snapshot stays there
-//! when its run ends early, so that the run can be resumed.
+//! The run folder: written under another name next to its target, and renamed when its run has ended. A snapshot in it, of a run that was
+//! killed or ended early, is what resumes the run.
 
 #[cfg(test)]
 mod tests;
@@ -77,8 +77,12 @@ pub enum FolderError {
     },
 }
 
-/// Name of the snapshot in a folder under construction.
-const SNAPSHOT: &str = "run.snapshot";
+/// Name of the snapshot in the folder of a run that can be resumed.
+pub const SNAPSHOT_FILE: &str = "run.snapshot";
+/// Name of a file that keeps disk space for trajectory, rows and summary, should the disk become full during the run.
+const RESERVE_FILE: &str = ".reserve";
+/// Its bytes.
+const RESERVE_BYTES: usize = 2 << 20;
 
 /// A folder under construction, locked against other runs. Unless [`RunFolder::commit`] is reached or there is a snapshot, nothing of it
 /// remains.
@@ -89,6 +93,8 @@ pub struct RunFolder {
     overwrite: bool,
     /// Whether the folder stays when this is dropped.
     keep: bool,
+    /// Whether it is that of a run that ended early, and goes back to its target unless there is a new end.
+    reopened: bool,
     /// Locked while this exists; `None` where the system cannot lock a folder.
     _lock: Option<File>,
 }
@@ -105,12 +111,13 @@ impl RunFolder {
         let failed = |source| FolderError::Write { path: partial.clone(), source };
         std::fs::create_dir_all(&partial).map_err(failed)?;
         let lock = lock(&partial, &target)?;
-        if partial.join(SNAPSHOT).is_file() && !overwrite {
+        if partial.join(SNAPSHOT_FILE).is_file() && !overwrite {
             return Err(FolderError::Interrupted { path: target });
         }
-        let folder = Self { partial, overwrite, keep: false, _lock: lock, target };
+        let folder = Self { partial, overwrite, keep: false, reopened: false, _lock: lock, target };
         clear(&folder.partial)?;
         folder.try_rename()?;
+        folder.reserve()?;
         Ok(folder)
     }
 
@@ -122,19 +129,49 @@ impl RunFolder {
         let target = resolved(target)?;
         let partial = sibling(&target, "partial");
         let nothing = |reason| FolderError::NothingToResume { path: target.clone(), reason };
-        if !partial.join(SNAPSHOT).is_file() {
+        let killed = partial.join(SNAPSHOT_FILE).is_file();
+        let ended_early = !partial.is_dir() && target.join(SNAPSHOT_FILE).is_file();
+        if !killed && !ended_early {
             return Err(nothing(match (partial.is_dir(), target.join("summary.json").is_file()) {
                 (true, _) => "it was interrupted before its first snapshot. Start it again",
-                (false, true) => "it is complete",
+                (false, true) => "it has no snapshot: it is complete, or ran without --snapshot-every",
                 (false, false) => "there is no such run. Give the --out of the interrupted run",
             }));
         }
-        let lock = lock(&partial, &target)?;
-        let folder = Self { target, partial, overwrite: false, keep: false, _lock: lock };
+        let lock = lock(if killed { &partial } else { &target }, &target)?;
+        if ended_early {
+            std::fs::rename(&target, &partial).map_err(|source| FolderError::Fixed { path: target.clone(), source })?;
+        }
+        let folder = Self {
+            target,
+            partial,
+            overwrite: false,
+            keep: false,
+            reopened: ended_early,
+            _lock: lock,
+        };
+        folder.reserve()?;
         match std::fs::remove_file(sibling(&folder.snapshot(), "partial")) {
             Err(source) if source.kind() != ErrorKind::NotFound => Err(FolderError::Write { path: folder.snapshot(), source }),
             _ => Ok(folder),
         }
+    }
+
+    /// Takes disk space for what is written last.
+    fn reserve(&self) -> Result<(), FolderError> {
+        let path = self.file(RESERVE_FILE);
+        std::fs::write(&path, vec![0; RESERVE_BYTES]).map_err(|source| FolderError::Write { path, source })
+    }
+
+    /// Gives the disk space back that was kept for what is written last.
+    pub fn release_reserve(&self) {
+        // Without it there is nothing to give back.
+        let _ = std::fs::remove_file(self.file(RESERVE_FILE));
+    }
+
+    /// Lets the folder stay where it is, whatever comes.
+    pub fn keep(&mut self) {
+        self.keep = true;
     }
 
     /// Tries the renaming of the end with what is at the target now.
@@ -159,7 +196,7 @@ impl RunFolder {
 
     /// Where the snapshot is, or will be.
     pub fn snapshot(&self) -> PathBuf {
-        self.file(SNAPSHOT)
+        self.file(SNAPSHOT_FILE)
     }
 
     /// Where it will be.
@@ -183,7 +220,7 @@ impl RunFolder {
         self.partial.join(name)
     }
 
-    /// Creates a file and hands a buffered writer to `write`.
+    /// Creates a file and hands a buffered writer to `write`. What cannot be written leaves no file.
     pub fn write(
         &self,
         name: &str,
@@ -194,16 +231,21 @@ impl RunFolder {
             write(&mut file)?;
             std::io::Write::flush(&mut file)
         });
-        made.map_err(|source| FolderError::Write { path, source })
+        made.map_err(|source| {
+            // It may not exist.
+            let _ = std::fs::remove_file(&path);
+            FolderError::Write { path, source }
+        })
     }
 
-    /// Renames the folder to its target, which is returned. Snapshot and temporary files are removed only then, so that a run killed in its
-    /// last moment can still be resumed.
+    /// Renames the folder to its target, which is returned. Temporary files, the snapshot among them, are removed only then, so that a run killed
+    /// in its last moment can still be resumed.
     ///
     /// # Errors
     /// It cannot be renamed, and stays where it is, complete; or a temporary file cannot be removed.
     pub fn commit(mut self, temporary: &[&str]) -> Result<PathBuf, FolderError> {
         self.keep = true;
+        self.release_reserve();
         let not_moved = |reason: String| FolderError::NotMoved { partial: self.partial.clone(), path: self.target.clone(), reason };
         check_target(&self.target, self.overwrite).map_err(|error| not_moved(error.to_string()))?;
         let old = unused(&self.target, "replaced");
@@ -221,7 +263,7 @@ impl RunFolder {
         if replaced {
             std::fs::remove_dir_all(&old).map_err(|source| FolderError::Write { path: old, source })?;
         }
-        for name in temporary.iter().chain([&SNAPSHOT]) {
+        for name in temporary {
             let path = self.target.join(name);
             match std::fs::remove_file(&path) {
                 Err(source) if source.kind() != ErrorKind::NotFound => return Err(FolderError::Write { path, source }),
@@ -234,9 +276,17 @@ impl RunFolder {
 
 impl Drop for RunFolder {
     fn drop(&mut self) {
-        if !self.keep && !self.snapshot().is_file() {
-            // A failure here changes nothing: the run has failed already.
+        if self.keep {
+            return;
+        }
+        // A failure here changes nothing: the run has failed already.
+        if !self.snapshot().is_file() {
             let _ = std::fs::remove_dir_all(&self.partial);
+            return;
+        }
+        self.release_reserve();
+        if self.reopened {
+            let _ = std::fs::rename(&self.partial, &self.target);
         }
     }
 }
@@ -278,6 +328,9 @@ fn clear(folder: &Path) -> Result<(), FolderError> {
 
 /// Refuses a target that is taken.
 fn check_target(target: &Path, overwrite: bool) -> Result<(), FolderError> {
+    if !overwrite && target.join(SNAPSHOT_FILE).is_file() {
+        return Err(FolderError::Interrupted { path: target.to_path_buf() });
+    }
     let empty = !target.exists() || target.read_dir().is_ok_and(|mut entries| entries.next().is_none());
     match (overwrite || empty, empty || target.join("summary.json").is_file()) {
         (true, true) => Ok(()),

@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod disk_store;
+mod ending;
 mod error;
 mod execute;
 mod folder;
@@ -18,13 +19,14 @@ mod threads;
 mod view;
 
 pub use checkpoint::{Checkpoint, CheckpointPlan, ResumeError, RunManifest};
-pub use disk_store::{BLOCKS_FILE, DiskStore, MeshOutput, Streaming};
+pub use disk_store::{BLOCKS_FILE, DiskStore, MAP_FILE, MeshOutput, Streaming};
+pub use ending::{Incomplete, IncompleteCause, SkippedFrame, SkippedFrames};
 pub use error::RunError;
 pub use execute::run;
-pub use folder::{FolderError, RunFolder, write_whole};
-pub use plan::{HOST_OVERHEAD_BYTES, Plan, frame_indices, frame_interval_s};
+pub use folder::{FolderError, RunFolder, SNAPSHOT_FILE, write_whole};
+pub use plan::{FrameNumbers, HOST_OVERHEAD_BYTES, Plan, frame_interval_s};
 pub use progress::Progress;
-pub use reader::{AHEAD, read_ahead};
+pub use reader::{AHEAD, ReadFrame, read_ahead};
 pub use record::{RunHeader, RunRecord, StageStatistics};
 pub use resident::resident_bytes;
 pub use threads::Threads;

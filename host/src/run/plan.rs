@@ -3,7 +3,7 @@
 use super::disk_store::Streaming;
 use super::{CheckpointPlan, RunError, RunFolder};
 use crate::evaluate::quantile::median;
-use crate::input::FrameSource;
+use crate::input::{FrameSource, StopRequest};
 use crate::observe::{Reference, ReferencePlan, Setup};
 use dynvox_core::MotionSource;
 use dynvox_core::geometry::Transform;
@@ -17,8 +17,12 @@ pub const HOST_OVERHEAD_BYTES: u64 = 256 << 20;
 pub struct Plan {
     /// The frames.
     pub dataset: Box<dyn FrameSource>,
-    /// Numbers of the frames to take.
-    pub indices: Vec<usize>,
+    /// Which of them to take.
+    pub frames: FrameNumbers,
+    /// Whether frames that cannot be read or mapped are left out; otherwise the run ends before the first of them.
+    pub skip_bad_frames: bool,
+    /// Asks the run to end.
+    pub stop: StopRequest,
     /// Poses of these frames to take in place of the camera's own motion.
     pub poses: Option<Vec<Transform>>,
     /// Name of the profile.
@@ -55,7 +59,7 @@ impl Plan {
         let dataset = self.dataset.as_ref();
         Setup {
             dataset,
-            indices: &self.indices,
+            frames: self.frames.count(),
             capacity: &self.capacity,
             config: &self.config,
             folder: folder.path().to_path_buf(),
@@ -65,8 +69,8 @@ impl Plan {
                 (None, MotionSource::Icp) => "icp",
             },
             reference: match self.evaluate {
-                Some(reference) => ReferencePlan::all(dataset, &self.indices, reference, self.evaluation_delay),
-                None => ReferencePlan::sampled(dataset, &self.indices),
+                Some(reference) => ReferencePlan::all(dataset, self.frames.listed(), reference, self.evaluation_delay),
+                None => ReferencePlan::sampled(dataset, self.frames.listed()),
             },
         }
     }
@@ -75,9 +79,9 @@ impl Plan {
     pub(super) fn check(&self) -> Result<(), RunError> {
         let (width, height) = self.dataset.size();
         if let Some(reference) = self.evaluate
-            && ReferencePlan::all(self.dataset.as_ref(), &self.indices, reference, self.evaluation_delay).is_none()
+            && ReferencePlan::all(self.dataset.as_ref(), self.frames.listed(), reference, self.evaluation_delay).is_none()
         {
-            return Err(RunError::NoReference { reference, frames: self.indices.len(), delay: self.evaluation_delay });
+            return Err(RunError::NoReference { reference, frames: self.frames.listed().len(), delay: self.evaluation_delay });
         }
         let fits = |capacity: &Capacity| width <= capacity.image_width && height <= capacity.image_height;
         if !fits(&self.capacity) {
@@ -109,25 +113,92 @@ impl Plan {
     }
 }
 
-/// The frames a run takes: from `start`, every `stride`-th, at most `frames`.
-pub fn frame_indices(len: usize, start: usize, stride: usize, frames: Option<usize>) -> Result<Vec<usize>, RunError> {
-    let indices: Vec<usize> = (start..len).step_by(stride.max(1)).take(frames.unwrap_or(usize::MAX)).collect();
-    if indices.is_empty() { Err(RunError::NoFrames { start, len }) } else { Ok(indices) }
+/// The frames a run takes, by their numbers in the source.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FrameNumbers {
+    /// These.
+    Listed(Vec<usize>),
+    /// Of a source without a known end: from `start`, every `stride`-th, at most `most`.
+    Open {
+        /// The first.
+        start: usize,
+        /// From one to the next.
+        stride: usize,
+        /// How many at most.
+        most: usize,
+    },
+}
+
+impl FrameNumbers {
+    /// From `start`, every `stride`-th, at most `frames`.
+    ///
+    /// # Errors
+    /// Nothing is left of the source.
+    pub fn of(source: &dyn FrameSource, start: usize, stride: usize, frames: Option<usize>) -> Result<Self, RunError> {
+        let (stride, most) = (stride.max(1), frames.unwrap_or(usize::MAX));
+        if source.stream().is_some() {
+            return Ok(Self::Open { start, stride, most });
+        }
+        let len = source.len();
+        let listed: Vec<usize> = (start..len).step_by(stride).take(most).collect();
+        if listed.is_empty() { Err(RunError::NoFrames { start, len }) } else { Ok(Self::Listed(listed)) }
+    }
+
+    /// All of them; empty where the end is unknown.
+    pub fn listed(&self) -> &[usize] {
+        match self {
+            Self::Listed(listed) => listed,
+            Self::Open { .. } => &[],
+        }
+    }
+
+    /// How many; `None` where the end is unknown.
+    pub fn count(&self) -> Option<usize> {
+        match self {
+            Self::Listed(listed) => Some(listed.len()),
+            Self::Open { .. } => None,
+        }
+    }
+
+    /// Positions and numbers from a position on.
+    pub fn from_position(&self, first: usize) -> Box<dyn Iterator<Item = (usize, usize)> + Send + '_> {
+        match self {
+            Self::Listed(listed) => Box::new(listed.iter().copied().enumerate().skip(first)),
+            &Self::Open { start, stride, most } => {
+                Box::new((0..most).map_while(move |at| Some((at, at.checked_mul(stride)?.checked_add(start)?))))
+            }
+        }
+    }
+
+    /// The position of a frame.
+    pub fn position_of(&self, index: usize) -> Option<usize> {
+        self.listed().binary_search(&index).ok()
+    }
 }
 
 /// Median time between two of the frames, s; `None` where there is only one.
-pub fn frame_interval_s(dataset: &dyn FrameSource, indices: &[usize]) -> Option<f64> {
-    median(indices.windows(2).map(|pair| dataset.time_s(pair[1]) - dataset.time_s(pair[0])))
+pub fn frame_interval_s(source: &dyn FrameSource, frames: &FrameNumbers) -> Option<f64> {
+    match frames {
+        FrameNumbers::Listed(listed) => median(listed.windows(2).map(|pair| source.time_s(pair[1]) - source.time_s(pair[0]))),
+        &FrameNumbers::Open { stride, .. } => Some(source.time_s(stride) - source.time_s(0)),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::StreetFrames;
+    use crate::synth::StreetConfig;
 
     #[test]
     fn frames_are_taken_from_start_by_stride_up_to_a_number() {
-        assert_eq!(frame_indices(10, 2, 3, None).unwrap(), [2, 5, 8]);
-        assert_eq!(frame_indices(10, 0, 1, Some(2)).unwrap(), [0, 1]);
-        assert!(frame_indices(10, 10, 1, None).unwrap_err().to_string().contains("leaves none of the 10 frames"));
+        let street = StreetFrames::new(StreetConfig { frames: 10, ..StreetConfig::default() }).unwrap();
+        let of = |start, stride, frames| FrameNumbers::of(&street, start, stride, frames);
+        assert_eq!(of(2, 3, None).unwrap().listed(), [2, 5, 8]);
+        assert_eq!(of(0, 1, Some(2)).unwrap().listed(), [0, 1]);
+        assert!(of(10, 1, None).unwrap_err().to_string().contains("leaves none of the 10 frames"));
+        let open = FrameNumbers::Open { start: 4, stride: 2, most: 3 };
+        assert_eq!(open.from_position(0).collect::<Vec<_>>(), [(0, 4), (1, 6), (2, 8)]);
+        assert_eq!((open.count(), open.listed().len()), (None, 0));
     }
 }

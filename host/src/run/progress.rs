@@ -6,6 +6,8 @@ use std::time::Instant;
 
 /// Lines written without a terminal, besides the last.
 const PLAIN_LINES: usize = 10;
+/// Frames from one line to the next where their number is unknown.
+const OPEN_EVERY: usize = 100;
 
 /// How progress is shown.
 pub enum Progress {
@@ -15,24 +17,27 @@ pub enum Progress {
     Bar(ProgressBar),
     /// A line every so many frames.
     Lines {
-        /// Frames in all.
-        frames: usize,
+        /// Frames in all, where that is known.
+        frames: Option<usize>,
         /// When the run began.
         begin: Instant,
     },
 }
 
 impl Progress {
-    /// Progress over `frames` frames, on standard error.
-    pub fn new(frames: usize, quiet: bool) -> Self {
+    /// Progress over `frames` frames, or over as many as come, on standard error.
+    pub fn new(frames: Option<usize>, quiet: bool) -> Self {
         if quiet {
             return Self::Quiet;
         }
         if !std::io::stderr().is_terminal() {
             return Self::Lines { frames, begin: Instant::now() };
         }
-        let bar = ProgressBar::new(frames as u64);
-        let style = ProgressStyle::with_template("{bar:32.cyan/blue} {pos}/{len} frames  {msg}  {eta} left");
+        let (bar, template) = match frames {
+            Some(frames) => (ProgressBar::new(frames as u64), "{bar:32.cyan/blue} {pos}/{len} frames  {msg}  {eta} left"),
+            None => (ProgressBar::no_length(), "{spinner:.cyan} {pos} frames  {msg}"),
+        };
+        let style = ProgressStyle::with_template(template);
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self::Bar(bar)
     }
@@ -55,9 +60,15 @@ impl Progress {
                 bar.set_message(words);
             }
             Self::Lines { frames, begin } => {
-                let every = frames.div_ceil(PLAIN_LINES).max(1);
-                if done == 1 || done.is_multiple_of(every) || done == *frames {
-                    eprintln!("frame {done}/{frames}  {words}  {:.1} s", begin.elapsed().as_secs_f64());
+                let (due, of) = match frames {
+                    Some(frames) => {
+                        let every = frames.div_ceil(PLAIN_LINES).max(1);
+                        (done == 1 || done.is_multiple_of(every) || done == *frames, format!("{done}/{frames}"))
+                    }
+                    None => (done == 1 || done.is_multiple_of(OPEN_EVERY), done.to_string()),
+                };
+                if due {
+                    eprintln!("frame {of}  {words}  {:.1} s", begin.elapsed().as_secs_f64());
                 }
             }
         }

@@ -6,21 +6,44 @@ use std::sync::mpsc::{Receiver, sync_channel};
 /// Frames decoded and not yet taken.
 pub const AHEAD: usize = 2;
 
-/// Runs `consume` with frames `indices` of the data set, decoded ahead in order. It ends when `consume` returns.
+/// A frame as the reader found it.
+pub struct ReadFrame {
+    /// Its position in the run.
+    pub position: usize,
+    /// Its number in the source.
+    pub index: usize,
+    /// When it was taken, ns, where that is known.
+    pub stamp_ns: Option<u64>,
+    /// Its time, s: by its stamp, else by an assumed rate.
+    pub time_s: f64,
+    /// What was decoded, or why nothing was.
+    pub images: Result<StereoImages, InputError>,
+}
+
+/// Runs `consume` with the frames of the source that `frames` numbers, decoded ahead in order. Reading ends after an error, or after one that
+/// ends the source where `skip_bad_frames` is set; all ends when `consume` returns.
 pub fn read_ahead<R>(
-    dataset: &dyn FrameSource,
-    indices: &[usize],
-    consume: impl FnOnce(&Receiver<(usize, Result<StereoImages, InputError>)>) -> R,
+    source: &dyn FrameSource,
+    frames: impl Iterator<Item = (usize, usize)> + Send,
+    skip_bad_frames: bool,
+    consume: impl FnOnce(&Receiver<ReadFrame>) -> R,
 ) -> R {
     std::thread::scope(|scope| {
         // One frame more is with the sender while it waits.
         let (sender, receiver) = sync_channel(AHEAD - 1);
         scope.spawn(move || {
-            for &index in indices {
-                let frame = dataset.frame(index);
-                let last = frame.is_err();
+            for (position, index) in frames {
+                let images = source.frame(index);
+                let last = images.as_ref().is_err_and(|error| error.ends_source() || !skip_bad_frames);
+                let frame = ReadFrame {
+                    position,
+                    index,
+                    stamp_ns: source.stamp_ns(index),
+                    time_s: source.time_s(index),
+                    images,
+                };
                 // A receiver that is gone has ended the run.
-                if sender.send((index, frame)).is_err() || last {
+                if sender.send(frame).is_err() || last {
                     break;
                 }
             }

@@ -1,6 +1,6 @@
 //! A finished run: what was run, frame by frame, and the sections of its observers.
 
-use super::Streaming;
+use super::{Incomplete, SkippedFrames, Streaming};
 use crate::evaluate::quantile::{ascending, quantile};
 use crate::observe::{FrameRow, STAGES, Sections, StageTime};
 use dynvox_core::geometry::StereoRig;
@@ -42,6 +42,12 @@ pub struct RunRecord {
     pub header: RunHeader,
     /// Frame by frame.
     pub frames: Vec<FrameRow>,
+    /// Frames left out because they could not be read or mapped.
+    pub skipped: SkippedFrames,
+    /// Frames of a stream that came while the mapper was busy, and were dropped.
+    pub dropped: u64,
+    /// Why the results are incomplete, if they are.
+    pub incomplete: Option<Incomplete>,
     /// What the observers found.
     pub sections: Sections,
     /// Wall time of the run, s.

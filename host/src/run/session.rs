@@ -5,15 +5,15 @@ use super::disk_store::{BLOCKS_FILE, DiskStore};
 use super::error::{RunError, refused, step_reason};
 use super::state::RunState;
 use super::view::LiveMap;
-use super::{FolderError, Plan, Progress, RunFolder, Threads, read_ahead, resident_bytes};
-use crate::input::InstanceMask;
-use crate::input::StereoImages;
+use super::{FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes};
+use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{EndContext, FrameContext, FrameRow, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy, from_first};
 use dynvox_core::geometry::Transform;
 use dynvox_core::objects::{ObjectSink, RetiredObject};
 use dynvox_core::tracking::{Detection, MotionState};
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Mapper, Report, Severity, Stage, StereoFrame};
+use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 /// A run under way.
@@ -84,78 +84,151 @@ impl<'p, 's> Session<'p, 's> {
 
     /// Refuses a data set whose last mapped frame changed since the checkpoint.
     fn check_last_frame(&self) -> Result<(), RunError> {
-        let Some((at, row)) = self.state.rows.iter().enumerate().next_back() else { return Ok(()) };
+        let Some(row) = self.state.rows.last() else { return Ok(()) };
+        let position = self.plan.frames.position_of(row.frame).unwrap_or_default();
         let images = self.plan.dataset.frame(row.frame)?;
         let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
-        let digest = self.stereo_frame(at, &images, &detections).map(|frame| frame.digest());
+        let digest = self.stereo_frame((position, row.stamp_ns), &images, &detections).map(|frame| frame.digest());
         if digest == Some(row.report.digests.input) {
             return Ok(());
         }
         Err(ResumeError::Different { differences: format!("frame {} of the data set has changed", row.frame) }.into())
     }
 
-    /// The mapper's input at position `at`; `None` where an image is empty.
-    fn stereo_frame<'f>(&self, at: usize, images: &'f StereoImages, detections: &'f [Detection<'f>]) -> Option<StereoFrame<'f>> {
+    /// The mapper's input at a position and time; `None` where an image is empty.
+    fn stereo_frame<'f>(
+        &self,
+        (position, stamp_ns): (usize, Option<u64>),
+        images: &'f StereoImages,
+        detections: &'f [Detection<'f>],
+    ) -> Option<StereoFrame<'f>> {
         Some(StereoFrame {
             left: images.left.view()?,
             right: images.right.view()?,
             colour: images.colour.as_ref().and_then(|colour| colour.view()),
             class: None,
             disparity_q8: images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()),
-            t_world_camera: self.poses.as_ref().and_then(|poses| poses.get(at).copied()),
-            time_ns: self.plan.indices.get(at).and_then(|&index| self.plan.dataset.stamp_ns(index)),
+            t_world_camera: self.poses.as_ref().and_then(|poses| poses.get(position).copied()),
+            time_ns: stamp_ns,
             detections,
         })
     }
 
-    /// Maps the remaining frames.
-    pub fn frames(&mut self) -> Result<(), RunError> {
-        let (frames, done) = (self.plan.indices.len(), self.state.rows.len());
-        let progress = Progress::new(frames, self.plan.quiet);
-        let remaining = self.plan.indices.get(done..).unwrap_or_default();
-        let mapped = read_ahead(self.plan.dataset.as_ref(), remaining, |decoded| {
-            for (at, (index, images)) in (done..).zip(decoded.iter()) {
-                self.frame(at, index, &images?, &progress)?;
-                if let Some(row) = self.state.rows.last().filter(|_| at == done).cloned() {
-                    // Memory for all rows is taken now, so that growth during the run is a leak.
-                    self.state.rows.resize(frames, row);
-                    self.state.rows.truncate(at + 1);
-                }
-            }
-            Ok(())
-        });
+    /// Maps the remaining frames. What ends the run early is returned once a frame is mapped; before, it is an error.
+    pub fn frames(&mut self) -> Result<Option<Incomplete>, RunError> {
+        let (plan, taken) = (self.plan, self.state.taken);
+        let progress = Progress::new(plan.frames.count(), plan.quiet);
+        let remaining = plan.frames.from_position(taken);
+        let mapped = read_ahead(plan.dataset.as_ref(), remaining, plan.skip_bad_frames, |read| self.take(read, &progress));
         progress.finish();
-        mapped
+        let Err(error) = mapped else {
+            return if self.state.rows.is_empty() { Err(self.no_frame()) } else { Ok(None) };
+        };
+        if self.state.rows.is_empty() {
+            return Err(error);
+        }
+        // After a failed observation the state is not that of one frame.
+        if !matches!(error, RunError::Observe(_)) && plan.checkpoints.is_some() {
+            self.write_checkpoint_or_warn(&progress);
+        }
+        Ok(Some(Incomplete::of(&error, plan.frames.count().map(|count| count.saturating_sub(self.state.taken)))))
+    }
+
+    /// That evicted blocks were lost to the disk, where all frames were mapped.
+    pub fn of_disk(&self) -> Option<Incomplete> {
+        let failure = self.store.failure().filter(|_| self.store.disk_failed())?;
+        Some(Incomplete::of_disk(format!("map.blocks could not grow ({failure}), and blocks were lost. Free disk space and run again")))
+    }
+
+    /// Why there is no frame at all.
+    fn no_frame(&self) -> RunError {
+        let frames = self.state.taken;
+        match self.state.skipped.first.first() {
+            Some(first) => RunError::Step { frame: first.frame, reason: first.reason.clone() },
+            None => RunError::Dataset(InputError::PastEnd { frames }),
+        }
+    }
+
+    /// Maps frames as they are read, until there is none or the run is asked to end.
+    fn take(&mut self, read: &Receiver<ReadFrame>, progress: &Progress) -> Result<(), RunError> {
+        let plan = self.plan;
+        let open = plan.frames.count().is_none();
+        for frame in read {
+            match plan.stop.signal() {
+                // Of a stream this is the usual end.
+                Some(_) if open => return Ok(()),
+                Some(signal) => return Err(RunError::Signal { signal, frames: self.state.rows.len() }),
+                None => {}
+            }
+            let (position, index) = (frame.position, frame.index);
+            match self.frame(frame, progress) {
+                Ok(()) => {}
+                Err(RunError::Dataset(InputError::PastEnd { .. })) if open => return Ok(()),
+                Err(error) if plan.skip_bad_frames && error.is_of_one_frame() => {
+                    progress.warn(&format!("frame {index} is left out: {error}"));
+                    self.state.skipped.add(index, error.to_string());
+                    self.state.taken = position + 1;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
     }
 
     /// Steps, observes, and writes a checkpoint where one is due.
-    fn frame(&mut self, at: usize, index: usize, images: &StereoImages, progress: &Progress) -> Result<(), RunError> {
-        let stored_before = self.store.failure().is_none();
-        let (mut row, retired) = self.step(at, index, images)?;
-        self.check_limits(&row)?;
-        if let Some(failure) = self.store.failure().filter(|_| stored_before) {
-            progress.warn(&format!("frame {index}: map.blocks cannot grow ({failure}). Blocks evicted from here on are lost"));
-        }
+    fn frame(&mut self, read: ReadFrame, progress: &Progress) -> Result<(), RunError> {
+        let (position, index) = (read.position, read.index);
+        let failed_before = (self.store.failure().is_some(), self.state.observers.failure().is_some());
+        let (row, retired, images) = self.step(read)?;
         self.state.timers.add_since(&mut self.since);
-        let (blocks, timers) = (row.report.blocks, &self.state.timers);
-        let fps = (at + 1) as f64 / timers.mapping().as_secs_f64();
-        progress.frame(at + 1, fps, f64::from(blocks.used) / f64::from(blocks.capacity), row.held());
+        self.state.taken = position + 1;
+        self.push(row);
+        let RunState { rows, observers, timers, .. } = &mut self.state;
+        let (done, Some(row)) = (rows.len(), rows.last_mut()) else { return Ok(()) };
+        let blocks = row.report.blocks;
+        let fps = done as f64 / timers.mapping().as_secs_f64();
+        progress.frame(position + 1, fps, f64::from(blocks.used) / f64::from(blocks.capacity), row.held());
         let mut view = LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
-        let mut context = FrameContext { at, row: &row, images, retired: &retired, view: &mut view };
-        self.state.observers.frame(&self.setup, &mut context)?;
+        let mut context = FrameContext { position, row: &*row, images: &images, retired: &retired, view: &mut view };
+        observers.frame(&self.setup, &mut context)?;
         row.stages[Stage::Raycast as usize] = view.first_raycast.unwrap_or_default();
-        self.state.rows.push(row);
-        if let Some(failure) = self.write_checkpoint(at).err() {
-            progress.warn(&format!("frame {index}: checkpoint not written ({failure}). A resumed run starts from the one before"));
+        self.warn_of_disk(index, failed_before, progress);
+        self.check_limits()?;
+        if self.plan.checkpoints.as_ref().is_some_and(|plan| (position + 1).is_multiple_of(plan.every)) {
+            self.write_checkpoint_or_warn(progress);
         }
         self.state.timers.overhead += self.since.elapsed();
         Ok(())
     }
 
-    fn step(&mut self, at: usize, index: usize, images: &StereoImages) -> Result<(FrameRow, Vec<RetiredVolume>), RunError> {
+    /// Adds a row. With the first one memory for all is taken, so that growth during the run is a leak.
+    fn push(&mut self, row: FrameRow) {
+        let rows = &mut self.state.rows;
+        if let Some(frames) = self.plan.frames.count().filter(|&frames| rows.capacity() < frames) {
+            let len = rows.len();
+            rows.resize(frames, row.clone());
+            rows.truncate(len);
+        }
+        rows.push(row);
+    }
+
+    /// Warns of a disk that refused for the first time in this frame.
+    fn warn_of_disk(&self, index: usize, (store_before, files_before): (bool, bool), progress: &Progress) {
+        if let Some(failure) = self.store.failure().filter(|_| !store_before) {
+            progress.warn(&format!("frame {index}: map.blocks cannot grow ({failure}). Blocks evicted from here on are lost"));
+        }
+        if let Some(failure) = self.state.observers.failure().filter(|_| !files_before) {
+            progress.warn(&format!("frame {index}: {failure}. The run continues without this object's mesh"));
+        }
+    }
+
+    fn step(&mut self, read: ReadFrame) -> Result<(FrameRow, Vec<RetiredVolume>, StereoImages), RunError> {
+        let ReadFrame { position, index, stamp_ns, time_s, images } = read;
+        let images = images?;
         let refused = |reason: String| RunError::Step { frame: index, reason };
         let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
-        let frame = self.stereo_frame(at, images, &detections).ok_or_else(|| refused("the images are empty".to_owned()))?;
+        let frame =
+            self.stereo_frame((position, stamp_ns), &images, &detections).ok_or_else(|| refused("the images are empty".to_owned()))?;
         self.threads.take_times();
         let begin = Instant::now();
         let (mapper, threads, store) = (&mut self.mapper, &self.threads, &mut self.store);
@@ -164,27 +237,31 @@ impl<'p, 's> Session<'p, 's> {
         let report = stepped.map_err(|error| refused(step_reason(error)))?;
         let step_ms = begin.elapsed().as_secs_f64() * 1e3;
         let stages = self.threads.take_times();
-        Ok((self.row(index, images, report, (step_ms, stages)), retired.0))
+        let row = FrameRow { frame: index, stamp_ns, time_s, step_ms, stages, ..self.row(&images, report) };
+        Ok((row, retired.0, images))
     }
 
-    fn row(&self, index: usize, images: &StereoImages, report: Report, (step_ms, stages): (f64, [StageTime; STAGES])) -> FrameRow {
+    /// What is recorded of a frame, but for its number and times.
+    fn row(&self, images: &StereoImages, report: Report) -> FrameRow {
         let tracks_in = |state: MotionState| self.mapper.tracks().filter(|track| track.detected && track.state == state).count() as u32;
         FrameRow {
-            frame: index,
-            time_s: self.plan.dataset.time_s(index),
+            frame: 0,
+            stamp_ns: None,
+            time_s: 0.0,
             report,
             history_frames: self.mapper.background().history().len(),
             track_states: [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(tracks_in),
             mask_refusals: images.masks.refusals,
             depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count()) + report.stereo.refused,
-            step_ms,
+            step_ms: 0.0,
             rss_bytes: resident_bytes().map(|(now, _)| now),
-            stages,
+            stages: [StageTime::default(); STAGES],
         }
     }
 
-    /// Refuses a frame beyond the limits of the run.
-    fn check_limits(&self, row: &FrameRow) -> Result<(), RunError> {
+    /// Ends a run whose last frame went beyond its limits.
+    fn check_limits(&self) -> Result<(), RunError> {
+        let Some(row) = self.state.rows.last() else { return Ok(()) };
         if self.plan.strict && row.severity() >= Severity::MapAffected {
             return Err(RunError::Strict { frame: row.frame, cause: row.cause() });
         }
@@ -195,9 +272,15 @@ impl<'p, 's> Session<'p, 's> {
         }
     }
 
-    /// Writes a checkpoint where one is due.
-    fn write_checkpoint(&mut self, at: usize) -> Result<(), FolderError> {
-        let Some(plan) = self.plan.checkpoints.as_ref().filter(|plan| (at + 1).is_multiple_of(plan.every)) else { return Ok(()) };
+    /// Writes a checkpoint of the frames mapped so far. One that cannot be written leaves the one before.
+    fn write_checkpoint_or_warn(&mut self, progress: &Progress) {
+        if let Some(failure) = self.write_checkpoint().err() {
+            progress.warn(&format!("checkpoint not written ({failure}). A resumed run starts from the one before"));
+        }
+    }
+
+    fn write_checkpoint(&mut self) -> Result<(), FolderError> {
+        let Some(plan) = &self.plan.checkpoints else { return Ok(()) };
         let position = self.store.position();
         let blocks = position.map_err(|source| FolderError::Write { path: self.folder.file(BLOCKS_FILE), source })?;
         checkpoint::write(self.folder, &plan.manifest, blocks, &self.state, &mut self.mapper)

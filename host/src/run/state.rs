@@ -1,5 +1,6 @@
 //! The state of a run next to its mapper, as plain data: all of it goes into a checkpoint.
 
+use super::SkippedFrames;
 use crate::observe::{FrameRow, Observers};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
@@ -8,6 +9,9 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct RunState {
     pub rows: Vec<FrameRow>,
+    /// Frames taken from the source, those left out included.
+    pub taken: usize,
+    pub skipped: SkippedFrames,
     pub observers: Observers,
     pub timers: Timers,
 }

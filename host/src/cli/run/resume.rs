@@ -1,18 +1,22 @@
 //! `dynvox run --resume`: an interrupted run continues from its last snapshot, as it was started.
 
 use super::{RunArgs, finish, plan, print_header};
+use crate::input::StopRequest;
 use crate::run::{Checkpoint, CheckpointPlan, Plan, RunFolder, RunManifest};
 use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 30] = [
+pub const FIXED_ARGUMENTS: [&str; 34] = [
     "path",
     "sequence",
     "dataset",
     "images",
     "bits",
-    "stacked",
+    "side_by_side",
+    "top_bottom",
+    "rate",
+    "when_late",
     "calibration",
     "profile",
     "memory",
@@ -34,6 +38,7 @@ pub const FIXED_ARGUMENTS: [&str; 30] = [
     "evaluate",
     "evaluation_delay",
     "strict",
+    "skip_bad_frames",
     "force",
     "out",
     "overwrite",
@@ -50,7 +55,7 @@ pub fn checkpoints(plan: &Plan, every: usize) -> anyhow::Result<CheckpointPlan> 
 }
 
 /// Resumes the interrupted run to `target`.
-pub fn run(args: &RunArgs, target: &Path) -> anyhow::Result<()> {
+pub fn run(args: &RunArgs, target: &Path, stop: &StopRequest) -> anyhow::Result<()> {
     let target = std::path::absolute(target)?;
     let mut folder = RunFolder::reopen(&target)?;
     let checkpoint = Checkpoint::read(&folder)?;
@@ -65,13 +70,13 @@ pub fn run(args: &RunArgs, target: &Path) -> anyhow::Result<()> {
     original.rss_limit_mib = args.rss_limit_mib.or(original.rss_limit_mib);
     original.snapshot_every = args.snapshot_every.or(original.snapshot_every);
     (original.json, original.quiet) = (args.json, args.quiet);
-    let mut plan = plan(&original)?;
+    let mut plan = plan(&original, stop)?;
     manifest.require(&plan)?;
     folder.check_target(original.overwrite)?;
     plan.checkpoints = original.snapshot_every.map(|every| CheckpointPlan { every, manifest });
     if !args.silent() {
         print_header(&plan);
-        eprintln!("note: resuming after frame {} of {}", checkpoint.frames(), plan.indices.len());
+        eprintln!("note: resuming after frame {} of {}", checkpoint.frames(), plan.frames.listed().len());
     }
     finish(&original, &plan, folder, Some(checkpoint))
 }

@@ -13,7 +13,7 @@ mod tests;
 use crate::formats::Image;
 use crate::input::source::{FrameSource, InputError};
 use patches::PatchMatch;
-use rectified::RectifiedSource;
+pub use rectified::RectifiedSource;
 
 /// Pairs that are matched.
 const PAIRS: usize = 10;

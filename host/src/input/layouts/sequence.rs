@@ -6,13 +6,12 @@ use super::pairing::{CameraFiles, Pairing};
 use super::stacked::Stacking;
 use crate::formats::calibration::{CameraGeometry, FittedGeometry};
 use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
-use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages};
+use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState};
+use crate::input::stream::ASSUMED_HZ;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
 use std::path::{Path, PathBuf};
 
-/// Frames per second where the data set has no times.
-pub const ASSUMED_HZ: f64 = 10.0;
 /// Pictures whose largest value tells how many bits of 16 are significant.
 const RANGE_PICTURES: usize = 8;
 const NS_PER_S: f64 = 1e9;
@@ -232,6 +231,10 @@ impl FrameSource for Sequence {
         self.pairs.len()
     }
 
+    fn stream(&self) -> Option<StreamState> {
+        None
+    }
+
     fn size(&self) -> (usize, usize) {
         self.geometry.size
     }
@@ -262,8 +265,7 @@ impl FrameSource for Sequence {
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
-        let absent = || InputError::Absent { path: PathBuf::from(format!("{} frame {index}", self.name)) };
-        let [left, right] = self.images(self.pairs.get(index).ok_or_else(absent)?)?;
+        let [left, right] = self.images(self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?)?;
         Ok(StereoImages {
             left: left.grey,
             right: right.grey,

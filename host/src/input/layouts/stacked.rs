@@ -3,7 +3,7 @@
 use crate::formats::{Decoded, Image};
 
 /// How two images lie in one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stacking {
     /// The left image, then the right one.
     SideBySide,

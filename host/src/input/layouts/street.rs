@@ -2,7 +2,7 @@
 
 use crate::formats::Image;
 use crate::input::source::{
-    AvailableMasks, ExactFrame, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, TrueObject,
+    AvailableMasks, ExactFrame, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState, TrueObject,
 };
 use crate::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::geometry::{StereoRig, Transform};
@@ -36,6 +36,10 @@ impl FrameSource for StreetFrames {
 
     fn len(&self) -> usize {
         self.frames
+    }
+
+    fn stream(&self) -> Option<StreamState> {
+        None
     }
 
     fn size(&self) -> (usize, usize) {

@@ -90,8 +90,8 @@ pub enum InputError {
     },
     /// One image a frame, of one camera.
     #[error(
-        "{path} holds one image a frame, and it cannot be told whether both cameras are in it. Say so with --stacked side-by-side or --stacked \
-         top-bottom, or give the images of the right camera: a stereo mapper needs two"
+        "{path} holds one image a frame, and it cannot be told whether both cameras are in it. Say so with --side-by-side or \
+         --top-bottom, or give the images of the right camera: a stereo mapper needs two"
     )]
     OneCamera {
         /// Folder looked at.
@@ -120,7 +120,7 @@ pub enum InputError {
         height: usize,
     },
     /// An image that cannot be decoded.
-    #[error("{path} cannot be read: {reason}. Fetch or convert this image anew, or end before it with --frames")]
+    #[error("{path} cannot be read: {reason}. Fetch or convert this image anew, or leave such frames out with --skip-bad-frames")]
     Image {
         /// The image.
         path: PathBuf,
@@ -156,6 +156,22 @@ pub enum InputError {
         /// What is wrong.
         reason: String,
     },
+    /// A stream that broke.
+    #[error(
+        "image {image} of the stream cannot be used: {reason}. Let the program that writes it end after an image; with ffmpeg: -f image2pipe -c:v pgm"
+    )]
+    Stream {
+        /// Images before it.
+        image: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A frame beyond the last.
+    #[error("the source ends after {frames} frames. Ask for an earlier one")]
+    PastEnd {
+        /// Frames in all.
+        frames: usize,
+    },
     /// The synthetic street refuses its configuration.
     #[error("the synthetic street cannot be built: {reason}. Change its keys with --set street.<key>=<value>")]
     Street {
@@ -190,6 +206,11 @@ pub fn read_failed(path: &Path) -> impl FnOnce(std::io::Error) -> InputError + '
 }
 
 impl InputError {
+    /// Whether no later frame can be read either.
+    pub fn ends_source(&self) -> bool {
+        matches!(self, Self::PastEnd { .. } | Self::Stream { .. })
+    }
+
     /// An image of the sequence that cannot be used.
     pub fn image(error: FormatError) -> Self {
         match error {

@@ -7,6 +7,7 @@ mod lidar;
 mod masks;
 mod overlay;
 mod scaled;
+mod stop;
 mod truth;
 
 pub use depth::{DepthRefusals, GivenDepth, Quantity, to_disparity};
@@ -16,6 +17,7 @@ pub use lidar::LidarScan;
 pub use masks::{FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals, bounding_boxes, union};
 pub use overlay::{Overlay, OverlaySource};
 pub use scaled::Scaled;
+pub use stop::StopRequest;
 pub use truth::{ObjectsTruth, TrueObject};
 
 use crate::formats::Image;
@@ -66,18 +68,29 @@ pub enum AvailableMasks {
     Exact,
 }
 
+/// What is known of a stream while it is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StreamState {
+    /// Frames that came while the mapper was busy, and were dropped.
+    pub dropped: u64,
+}
+
 /// A list of stereo pairs with one rig.
 pub trait FrameSource: Send + Sync {
     /// Short name, fit for a folder: `kitti-odometry-06`.
     fn name(&self) -> &str;
 
-    /// Frames in all.
+    /// Frames in all; 0 of a stream, whose end is unknown.
     fn len(&self) -> usize;
 
-    /// Whether there is no frame.
+    /// Whether it is known that there is no frame.
     fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.len() == 0 && self.stream().is_none()
     }
+
+    /// What is known of a stream: frames come once, in order, and their number shows only when asking for one beyond the last is answered by
+    /// [`InputError::PastEnd`]. `None` for a recording. Without a default, so that no source laid over a stream hides it.
+    fn stream(&self) -> Option<StreamState>;
 
     /// Width and height of every image as it is mapped, px.
     fn size(&self) -> (usize, usize);

@@ -1,6 +1,6 @@
 //! A source of frames with depth or masks laid over it.
 
-use super::{AvailableMasks, FrameSource, InputError, LidarScan, StereoImages};
+use super::{AvailableMasks, FrameSource, InputError, LidarScan, StereoImages, StreamState};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
 
@@ -46,6 +46,10 @@ impl<L: OverlaySource> FrameSource for Overlay<L> {
 
     fn len(&self) -> usize {
         self.dataset.len()
+    }
+
+    fn stream(&self) -> Option<StreamState> {
+        self.dataset.stream()
     }
 
     fn size(&self) -> (usize, usize) {

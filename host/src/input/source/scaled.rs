@@ -1,6 +1,6 @@
 //! A data set at a smaller size: every pixel is the area average of the pixels it covers, and the rig shrinks with it.
 
-use super::{AvailableMasks, ExactFrame, FrameSource, GivenDepth, InputError, LidarScan, StereoImages};
+use super::{AvailableMasks, ExactFrame, FrameSource, GivenDepth, InputError, LidarScan, StereoImages, StreamState};
 use crate::formats::Image;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
@@ -108,6 +108,10 @@ impl FrameSource for Scaled {
 
     fn len(&self) -> usize {
         self.inner.len()
+    }
+
+    fn stream(&self) -> Option<StreamState> {
+        self.inner.stream()
     }
 
     fn size(&self) -> (usize, usize) {

@@ -13,6 +13,7 @@ pub fn section(run: &RunRecord) -> Markup {
             (counted(header.threads, "thread")) ", dynvox " (env!("CARGO_PKG_VERSION")) ". Digest of the last frame: "
             code { (format!("{:016x}", run.digest())) }
         }
+        @if let Some(incomplete) = &run.incomplete { p { b { "Incomplete: " (incomplete.reason) } } }
         @for warning in &header.warnings { p { b { "Warning: " (warning) } } }
         @if !header.notes.is_empty() {
             ul.soft.small { @for note in &header.notes { li { (note) } } }

@@ -85,9 +85,9 @@ fn fingerprint(plan: &Plan) -> BTreeMap<String, String> {
         ("name", dataset.name().to_owned()),
         ("rig", format!("{:?}", dataset.rig())),
         ("image size", format!("{width} x {height} px")),
-        ("number of frames", plan.indices.len().to_string()),
-        ("digest of the frames' numbers", digest(&mut plan.indices.iter().map(|&index| index as f64))),
-        ("digest of the frames' times", digest(&mut plan.indices.iter().map(|&index| dataset.time_s(index)))),
+        ("number of frames", plan.frames.listed().len().to_string()),
+        ("digest of the frames' numbers", digest(&mut plan.frames.listed().iter().map(|&index| index as f64))),
+        ("digest of the frames' times", digest(&mut plan.frames.listed().iter().map(|&index| dataset.time_s(index)))),
         ("digest of the given poses", digest(&mut poses.collect::<Vec<_>>().into_iter())),
     ];
     fingerprint.extend(rows.map(|(name, value)| (format!("the data set's {name}"), value)));

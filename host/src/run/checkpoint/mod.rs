@@ -34,7 +34,7 @@ use std::path::PathBuf;
 
 const MAGIC: [u8; 8] = *b"DVXDRIVE";
 /// Version of the layout and of the host's state. Another one is refused: there is no conversion.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Magic, version, length.
 const HEAD: usize = 20;
 

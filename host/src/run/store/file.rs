@@ -23,6 +23,8 @@ const MAGIC: [u8; 8] = *b"dynvoxB2";
 const PREAMBLE: usize = 16;
 /// Bytes read at once while following a tile's records backwards.
 const WINDOW: usize = 1 << 16;
+/// Why storing ends at the limit that was asked for.
+const LIMIT_REACHED: &str = "it has reached its size limit";
 
 /// Why a store cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -241,6 +243,11 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         self.failure.as_ref()
     }
 
+    /// Whether the disk refused, and not the limit that was asked for.
+    pub fn disk_failed(&self) -> bool {
+        self.failure.as_ref().is_some_and(|error| error.to_string() != LIMIT_REACHED)
+    }
+
     /// Blocks that were stored and could not be read back.
     pub fn unreadable(&self) -> u64 {
         self.unreadable
@@ -351,7 +358,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
 
     fn append(&mut self) -> io::Result<()> {
         if self.end + self.record.len() as u64 > self.most {
-            return Err(io::Error::new(io::ErrorKind::QuotaExceeded, "it has reached its size limit"));
+            return Err(io::Error::other(LIMIT_REACHED));
         }
         self.file.seek(SeekFrom::Start(self.end))?;
         self.file.write_all(&self.record)

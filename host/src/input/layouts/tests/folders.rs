@@ -66,7 +66,7 @@ fn images_of_one_camera_are_refused_without_an_option_that_they_hold_both() {
     let root = TempDir::new().unwrap();
     fs::write(root.path().join("calib.txt"), CALIB).unwrap();
     (0..2).for_each(|at| save(&pair(at)[0], root.path().join(format!("{at}.png"))));
-    assert!(refusal(root.path(), None).contains("--stacked side-by-side"));
+    assert!(refusal(root.path(), None).contains("--side-by-side"));
     let options = OpenOptions { stacking: Some(Stacking::SideBySide), ..OpenOptions::default() };
     assert_eq!(open(root.path(), &options).unwrap().size(), (20, 32));
 }

@@ -1,0 +1,55 @@
+//! The files of a run folder, after the map and the objects. A file that the disk refuses is missing, and the others are written.
+
+use crate::formats;
+use crate::report::{self, Summary};
+use crate::run::{FolderError, Incomplete, RunFolder, RunRecord};
+use std::fs::File;
+use std::io::{BufWriter, Result, Write};
+
+/// Writes one file.
+type Writer<'a> = Box<dyn Fn(&mut BufWriter<File>) -> Result<()> + 'a>;
+
+/// Writes all files, the summary last: it names those that are missing.
+///
+/// # Errors
+/// Not even the summary can be written.
+pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Summary, FolderError> {
+    folder.release_reserve();
+    let mut incomplete = run.incomplete.take();
+    for (name, write) in files(run) {
+        if let Err(error) = folder.write(name, &write) {
+            Incomplete::add_missing(&mut incomplete, name, &error.to_string());
+        }
+    }
+    run.incomplete = incomplete;
+    if let Err(error) = folder.write("report.html", |out| report::html::write(out, run)) {
+        Incomplete::add_missing(&mut run.incomplete, "report.html", &error.to_string());
+    }
+    let summary = Summary::of(run);
+    folder.write("summary.json", |out| Ok(serde_json::to_writer_pretty(out, &summary)?))?;
+    Ok(summary)
+}
+
+/// The files that are tables and text, by name.
+fn files(run: &RunRecord) -> Vec<(&'static str, Writer<'_>)> {
+    let sections = &run.sections;
+    let poses = &sections.trajectory.poses;
+    let stamps_ns = || run.frames.iter().map(|row| row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64)).collect::<Vec<_>>();
+    let mut files: Vec<(&'static str, Writer<'_>)> = vec![
+        ("config.toml", Box::new(|out| out.write_all(run.header.config_toml.as_bytes()))),
+        ("trajectory_kitti.txt", Box::new(|out| formats::write_kitti(out, poses))),
+        ("trajectory_tum.txt", Box::new(move |out| formats::write_tum(out, &stamps_ns(), poses))),
+        ("frames.csv", Box::new(|out| report::write_frames(out, &run.frames))),
+        ("tracks.csv", Box::new(|out| report::write_tracks(out, &sections.tracks.frames))),
+    ];
+    if let Some(text) = report::rig::calibration_toml(run) {
+        files.push(("calibration.toml", Box::new(move |out| out.write_all(text.as_bytes()))));
+    }
+    if !sections.tracks.comparisons.is_empty() {
+        files.push(("tracks_truth.csv", Box::new(|out| report::write_tracks_truth(out, &sections.tracks))));
+    }
+    if let Some(reference) = &sections.reference {
+        files.push(("lidar.csv", Box::new(|out| report::write_reference(out, &reference.frames))));
+    }
+    files
+}

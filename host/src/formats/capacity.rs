@@ -1,0 +1,32 @@
+//! The mapper's bounds as a table of a TOML or JSON file.
+
+use dynvox_core::Capacity;
+use serde::{Deserialize, Serialize};
+
+/// A capacity in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct CapacityTable(#[serde(with = "CapacityDef")] pub Capacity);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Capacity", deny_unknown_fields)]
+struct CapacityDef {
+    image_width: usize,
+    image_height: usize,
+    #[serde(default)]
+    raw_width: usize,
+    #[serde(default)]
+    raw_height: usize,
+    features: usize,
+    matches: usize,
+    blocks: usize,
+    visible_blocks: usize,
+    history_frames: usize,
+    detections: usize,
+    mask_words: usize,
+    tracks: usize,
+    objects: usize,
+    object_blocks: usize,
+    crop_pixels: usize,
+    colour: bool,
+}

@@ -1,0 +1,109 @@
+//! A fixture of one's own: made, verified, one pixel changed and found, blessed.
+#![allow(missing_docs)]
+
+mod binary;
+
+use binary::{dynvox, names, output_text};
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+use tempfile::TempDir;
+
+/// A street, and a fixture of six of its frames.
+fn pinned() -> TempDir {
+    let root = TempDir::new().unwrap();
+    let size = ["--set", "street.width=416", "--set", "street.height=128"];
+    assert!(dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "8"], &size[..]].concat()).status.success());
+    let made = dynvox(
+        root.path(),
+        &[
+            "fixtures",
+            "new",
+            "pinned",
+            "--from",
+            "street",
+            "--frames",
+            "6",
+            "--start",
+            "1",
+            "--memory",
+            "24MiB",
+            "--set",
+            "volume.voxel_size_m=0.1",
+        ],
+    );
+    assert!(made.status.success(), "{}", output_text(&made));
+    assert!(told(&made).contains("pinned: 6 frames, replayed in "), "{}", told(&made));
+    root
+}
+
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn change_a_pixel(path: &Path) {
+    let mut picture = image::open(path).unwrap().into_luma8();
+    picture.get_pixel_mut(200, 60).0[0] ^= 0x40;
+    picture.save(path).unwrap();
+}
+
+#[test]
+fn a_fixture_is_made_verified_found_changed_and_blessed() {
+    let root = pinned();
+    let root = root.path();
+    assert_eq!(
+        names(&root.join("pinned")),
+        ["blessings.txt", "calib.txt", "digests.txt", "fixture.toml", "instances", "left", "right", "settings.toml"]
+    );
+    assert_eq!((names(&root.join("pinned/left")).len(), names(root)), (6, vec!["pinned".to_owned(), "street".to_owned()]));
+    let verified = dynvox(root, &["fixtures", "verify", "pinned", "--junit", "report.xml"]);
+    assert!(verified.status.success() && told(&verified).contains("pinned: 6 frames, all digests equal"), "{}", output_text(&verified));
+    assert!(fs::read_to_string(root.join("report.xml")).unwrap().contains("tests=\"6\" failures=\"0\""));
+
+    change_a_pixel(&root.join("pinned/right/000003.png"));
+    let golden = fs::read(root.join("pinned/digests.txt")).unwrap();
+    let verified = dynvox(root, &["fixtures", "verify", "pinned", "--json", "--junit", "report.xml"]);
+    assert_eq!(verified.status.code(), Some(1));
+    assert!(output_text(&verified).contains("dynvox fixtures bless pinned --reason"), "{}", output_text(&verified));
+    let verdicts: serde_json::Value = serde_json::from_slice(&verified.stdout).unwrap();
+    let differences = &verdicts[0]["differences"];
+    assert_eq!((&differences[0]["frame"], &differences[0]["columns"][0]), (&3.into(), &"input".into()), "{verdicts}");
+    let report = fs::read_to_string(root.join("report.xml")).unwrap();
+    assert!(report.contains("name=\"frame 3\"><failure message=\"digests differ: input"), "{report}");
+    let dry = dynvox(root, &["fixtures", "bless", "pinned", "--dry-run"]);
+    assert!(dry.status.success() && told(&dry).contains("first divergence: frame 3, input"), "{}", told(&dry));
+    assert!(fs::read(root.join("pinned/digests.txt")).unwrap() == golden, "nothing is written");
+    let blessed = dynvox(root, &["fixtures", "bless", "pinned", "--reason", "another sensor"]);
+    assert!(blessed.status.success(), "{}", output_text(&blessed));
+    assert!(dynvox(root, &["fixtures", "verify", "pinned"]).status.success());
+    let log = fs::read_to_string(root.join("pinned/blessings.txt")).unwrap();
+    assert!(
+        log.lines().next().unwrap().ends_with("Made of kitti-odometry-00, frames 1 to 6") && log.ends_with(" another sensor\n"),
+        "{log}"
+    );
+}
+
+#[test]
+fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
+    let root = pinned();
+    let root = root.path();
+    let settings = root.join("pinned/settings.toml");
+    let text = fs::read_to_string(&settings).unwrap();
+    let verify = |sentence: &str| {
+        let verified = dynvox(root, &["fixtures", "verify", "pinned"]);
+        let all = output_text(&verified) + &told(&verified);
+        assert!(!verified.status.success() && all.contains(sentence), "{sentence}: {all}");
+    };
+    fs::write(&settings, text.replace("voxel_size_m = 0.1", "voxel_size_m = 0.11")).unwrap();
+    verify("first divergence: frame 0, background");
+    fs::write(&settings, text.replace("voxel_size_m", "voxel_sise_m")).unwrap();
+    verify("voxel_sise_m = 0.1: there is no such setting");
+    fs::write(&settings, &text).unwrap();
+    let bounds = fs::read_to_string(root.join("pinned/fixture.toml")).unwrap();
+    fs::write(root.join("pinned/fixture.toml"), bounds.replace("image_height = 128", "image_height = 96")).unwrap();
+    verify("its bounds do not hold images of 416 x 128 px");
+    let again = dynvox(root, &["fixtures", "new", "pinned", "--from", "street"]);
+    assert!(output_text(&again).contains("pinned exists"), "{}", output_text(&again));
+    let refused = dynvox(root, &["fixtures", "new", "other", "--from", "street", "--memory", "1MiB"]);
+    assert!(output_text(&refused).contains("the least that works is") && !root.join("other").exists(), "{}", output_text(&refused));
+}
