@@ -33,11 +33,11 @@ fn pinned() -> TempDir {
         ],
     );
     assert!(made.status.success(), "{}", output_text(&made));
-    assert!(told(&made).contains("pinned: 6 frames, replayed in "), "{}", told(&made));
+    assert!(printed(&made).contains("pinned: 6 frames, replayed in "), "{}", printed(&made));
     root
 }
 
-fn told(output: &Output) -> String {
+fn printed(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
@@ -57,7 +57,7 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
     );
     assert_eq!((names(&root.join("pinned/left")).len(), names(root)), (6, vec!["pinned".to_owned(), "street".to_owned()]));
     let verified = dynvox(root, &["fixtures", "verify", "pinned", "--junit", "report.xml"]);
-    assert!(verified.status.success() && told(&verified).contains("pinned: 6 frames, all digests equal"), "{}", output_text(&verified));
+    assert!(verified.status.success() && printed(&verified).contains("pinned: 6 frames, all digests equal"), "{}", output_text(&verified));
     assert!(fs::read_to_string(root.join("report.xml")).unwrap().contains("tests=\"6\" failures=\"0\""));
 
     change_a_pixel(&root.join("pinned/right/000003.png"));
@@ -71,7 +71,7 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
     let report = fs::read_to_string(root.join("report.xml")).unwrap();
     assert!(report.contains("name=\"frame 3\"><failure message=\"digests differ: input"), "{report}");
     let dry = dynvox(root, &["fixtures", "bless", "pinned", "--dry-run"]);
-    assert!(dry.status.success() && told(&dry).contains("first divergence: frame 3, input"), "{}", told(&dry));
+    assert!(dry.status.success() && printed(&dry).contains("first divergence: frame 3, input"), "{}", printed(&dry));
     assert!(fs::read(root.join("pinned/digests.txt")).unwrap() == golden, "nothing is written");
     let blessed = dynvox(root, &["fixtures", "bless", "pinned", "--reason", "another sensor"]);
     assert!(blessed.status.success(), "{}", output_text(&blessed));
@@ -91,7 +91,7 @@ fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
     let text = fs::read_to_string(&settings).unwrap();
     let verify = |sentence: &str| {
         let verified = dynvox(root, &["fixtures", "verify", "pinned"]);
-        let all = output_text(&verified) + &told(&verified);
+        let all = output_text(&verified) + &printed(&verified);
         assert!(!verified.status.success() && all.contains(sentence), "{sentence}: {all}");
     };
     fs::write(&settings, text.replace("voxel_size_m = 0.1", "voxel_size_m = 0.11")).unwrap();

@@ -1,6 +1,7 @@
-//! The C example, built by the system's C compiler, gives the digests on file.
-#![allow(missing_docs, clippy::expect_used)]
+//! The C examples, built by the system's C compiler, give the digests on file.
+#![allow(missing_docs, unsafe_code, clippy::expect_used)]
 
+use dynvox_core::{BudgetOptions, Capacity};
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -19,31 +20,111 @@ fn library() -> PathBuf {
     libraries.filter(named).max_by_key(|path| path.metadata().and_then(|about| about.modified()).ok()).expect("the library is there")
 }
 
-#[test]
-fn the_c_example_maps_the_fixture_to_the_digests_on_file() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let (fixture, capi) = (root.join("fixtures/street-320x96"), root.join("core/capi"));
-    let folder = tempfile::TempDir::new().expect("a folder");
-    let [clip, program] = ["clip.bin", "map_fixture"].map(|name| folder.path().join(name));
-    let bytes = dynvox::fixtures::pack(&fixture).expect("the fixture can be packed");
-    let replayed = dynvox_clip::config(&dynvox_clip::Clip::new(&bytes).expect("what was packed is a clip")).volume;
-    fs::write(&clip, &bytes).expect("the clip can be written");
+/// Builds an example with the system's compiler.
+fn build(name: &str, folder: &Path) -> PathBuf {
+    let capi = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/capi");
+    let program = folder.join(name);
     let built = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()))
         .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
         .arg(capi.join("include"))
-        .arg(capi.join("examples/map_fixture.c"))
+        .arg(capi.join("examples").join(name).with_extension("c"))
         .arg(library())
         .args(["-lm", "-lpthread", "-ldl", "-o"])
         .arg(&program)
         .output()
         .expect("there is a C compiler: install cc, or name one in CC");
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-    let given = [replayed.voxel_size_m.to_string(), replayed.prune_lag.to_string()];
-    let ran = Command::new(&program).arg(&clip).args(given).output().expect("the program can be run");
+    program
+}
+
+/// Numbers and digests of the frames that the C example gives for a fixture.
+fn mapped_by_c(fixture: &Path, bytes: usize, settings: &[String]) -> String {
+    let folder = tempfile::TempDir::new().expect("a folder");
+    let clip = folder.path().join("clip.bin");
+    fs::write(&clip, dynvox::fixtures::pack(fixture).expect("the fixture can be packed")).expect("the clip can be written");
+    let program = build("map_fixture", folder.path());
+    let ran = Command::new(&program).arg(&clip).arg(bytes.to_string()).args(settings).output().expect("the program can be run");
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    String::from_utf8_lossy(&ran.stdout).into_owned()
+}
+
+/// The same as they are on file.
+fn on_file(fixture: &Path) -> String {
     let digests = fs::read_to_string(fixture.join("digests.txt")).expect("the digests are there");
     let lines = digests.lines().filter(|line| !line.starts_with('#'));
-    let expected: String = lines.map(|line| line.split(' ').take(2).collect::<Vec<_>>().join(" ") + "\n").collect();
-    assert_eq!(String::from_utf8_lossy(&ran.stdout), expected);
-    assert_eq!(expected.lines().count(), 24);
+    lines.map(|line| line.split(' ').take(2).collect::<Vec<_>>().join(" ") + "\n").collect()
+}
+
+#[test]
+fn the_c_example_maps_the_fixture_to_the_digests_on_file() {
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/street-320x96");
+    let bytes = dynvox::fixtures::pack(&fixture).expect("the fixture can be packed");
+    let volume = dynvox_clip::config(&dynvox_clip::Clip::new(&bytes).expect("what was packed is a clip")).volume;
+    let settings = [format!("volume.voxel_size_m={}", volume.voxel_size_m), format!("volume.prune_lag={}", volume.prune_lag)];
+    assert_eq!(mapped_by_c(&fixture, 0, &settings), on_file(&fixture));
+    assert_eq!(on_file(&fixture).lines().count(), 24);
+}
+
+#[test]
+fn a_fixture_with_bounds_and_settings_of_its_own_has_the_same_digests_in_c() {
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/street-320x96");
+    let root = tempfile::TempDir::new().expect("a folder");
+    let fixture = root.path().join("own");
+    for name in ["left", "right", "instances"] {
+        fs::create_dir_all(fixture.join(name)).expect("a folder");
+        for entry in fs::read_dir(from.join(name)).expect("the fixture is there").filter_map(Result::ok) {
+            fs::copy(entry.path(), fixture.join(name).join(entry.file_name())).expect("a copy");
+        }
+    }
+    fs::copy(from.join("calib.txt"), fixture.join("calib.txt")).expect("a copy");
+    let budget = 24 << 20;
+    let options = BudgetOptions { voxel_size_m: Some(0.1), ..BudgetOptions::default() };
+    let capacity = Capacity::for_budget(budget, 320, 96, &options).expect("enough");
+    fs::write(fixture.join("fixture.toml"), description(&capacity)).expect("a file");
+    fs::write(fixture.join("settings.toml"), "[volume]\nvoxel_size_m = 0.1\nprune_lag = 6\n\n[tracking.motion]\nsamples = 77\n")
+        .expect("a file");
+    dynvox::fixtures::bless(&fixture, "Made of the street", &dynvox_core::Serial).expect("a blessing");
+    assert_ne!(on_file(&fixture), on_file(&from));
+    // A buffer of C holds the mapper's own fields, too.
+    let mut tiny = 0;
+    let head = {
+        let mut of_profile = std::mem::MaybeUninit::uninit();
+        // SAFETY: both pointers are to values of the test's own.
+        unsafe {
+            dynvox_capi::dynvox_capacity_of_profile(dynvox_capi::DYNVOX_PROFILE_TINY, of_profile.as_mut_ptr());
+            dynvox_capi::dynvox_bytes(of_profile.as_ptr(), &raw mut tiny);
+        }
+        tiny - Capacity::TINY.bytes()
+    };
+    let settings = ["volume.voxel_size_m=0.1", "volume.prune_lag=6", "tracking.motion.samples=77"].map(str::to_owned);
+    assert_eq!(mapped_by_c(&fixture, budget + head, &settings), on_file(&fixture));
+}
+
+/// `fixture.toml` with bounds.
+fn description(of: &Capacity) -> String {
+    let numbers = [
+        ("image_width", of.image_width),
+        ("image_height", of.image_height),
+        ("features", of.features),
+        ("matches", of.matches),
+        ("blocks", of.blocks),
+        ("visible_blocks", of.visible_blocks),
+        ("history_frames", of.history_frames),
+        ("detections", of.detections),
+        ("mask_words", of.mask_words),
+        ("tracks", of.tracks),
+        ("objects", of.objects),
+        ("object_blocks", of.object_blocks),
+        ("crop_pixels", of.crop_pixels),
+    ];
+    let lines: String = numbers.iter().map(|(name, number)| format!("{name} = {number}\n")).collect();
+    format!("kind = \"mapper\"\n\n[capacity]\n{lines}colour = {}\n", of.colour)
+}
+
+#[test]
+fn the_short_example_maps_a_pair() {
+    let folder = tempfile::TempDir::new().expect("a folder");
+    let ran = Command::new(build("map_pair", folder.path())).output().expect("the program can be run");
+    let text = String::from_utf8_lossy(&ran.stdout).into_owned();
+    assert!(ran.status.success() && text.starts_with("frame 2: "), "{text}{}", String::from_utf8_lossy(&ran.stderr));
 }

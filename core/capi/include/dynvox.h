@@ -1,12 +1,13 @@
 // dynvox for C: stereo dense mapping in one buffer of the caller's.
 //
-//   size_t bytes;
-//   dynvox_bytes(DYNVOX_PROFILE_TINY, &bytes);
-//   uint8_t *buffer = aligned_alloc(dynvox_alignment(), bytes);     // or a static array, aligned
+//   static _Alignas(64) uint8_t buffer[48u << 20];
+//   DynvoxCapacity capacity;                                        // what the buffer holds for images of a size
+//   dynvox_capacity_for_budget(sizeof buffer, 752, 480, 0.05f, &capacity, NULL);
 //   DynvoxConfig config;
 //   dynvox_config_default(&rig, &config);
+//   dynvox_config_set(&config, "volume.voxel_size_m", "0.05");
 //   DynvoxMapper *mapper;
-//   if (dynvox_create(DYNVOX_PROFILE_TINY, &config, buffer, bytes, &mapper) != DYNVOX_STATUS_OK) { ... }
+//   if (dynvox_create(&capacity, &config, buffer, sizeof buffer, &mapper) != DYNVOX_STATUS_OK) { ... }
 //   while (next(&frame)) dynvox_step(mapper, &frame, NULL, &report);
 //   dynvox_triangles(mapper, print, NULL, NULL);
 //   dynvox_destroy(mapper);
@@ -30,6 +31,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+// Bytes of settings that a configuration holds.
+#define DYNVOX_SETTINGS_BYTES 2048
+
 // The result of a call. A call that does not return DYNVOX_STATUS_OK has changed nothing.
 typedef enum {
   // Done.
@@ -46,7 +50,7 @@ typedef enum {
   DYNVOX_STATUS_BUSY,
   // A frame's memory lies within the mapper's buffer.
   DYNVOX_STATUS_OVERLAP,
-  // An unknown profile, class or track.
+  // An unknown profile, class, track or setting.
   DYNVOX_STATUS_UNKNOWN,
   // The configuration cannot be used: dynvox_config_problem says why. A calibration that is not finite is one reason.
   DYNVOX_STATUS_CONFIG,
@@ -60,6 +64,16 @@ typedef enum {
   DYNVOX_STATUS_TOO_MANY,
   // No frame yet.
   DYNVOX_STATUS_NO_FRAME,
+  // A text is not a value of its setting.
+  DYNVOX_STATUS_VALUE,
+  // A bound is not one a mapper can work with.
+  DYNVOX_STATUS_CAPACITY,
+  // A snapshot is damaged, or of another version, capacity or configuration.
+  DYNVOX_STATUS_SNAPSHOT,
+  // A callback refused.
+  DYNVOX_STATUS_CALLBACK,
+  // A frame's time is not after that of the frame before.
+  DYNVOX_STATUS_TIME,
 } DynvoxStatus;
 
 // How much a step's events matter.
@@ -71,6 +85,16 @@ typedef enum {
   // The map lacks what it should hold, or the pose is a guess.
   DYNVOX_SEVERITY_MAP_AFFECTED,
 } DynvoxSeverity;
+
+// Whether a track moves.
+typedef enum {
+  // Not known yet.
+  DYNVOX_MOTION_STATE_UNCERTAIN = 0,
+  // It stands.
+  DYNVOX_MOTION_STATE_STATIC,
+  // It moves.
+  DYNVOX_MOTION_STATE_DYNAMIC,
+} DynvoxMotionState;
 
 // A mapper; only ever behind a pointer.
 typedef struct DynvoxMapper DynvoxMapper;
@@ -87,28 +111,50 @@ typedef struct {
   double baseline_m;
 } DynvoxRig;
 
-// The settings that are changed most often. dynvox_config_default fills it.
+// Everything a mapper can be told, beside its bounds: the defaults for a rig, and what dynvox_config_set changed of them.
 typedef struct {
   // The cameras.
   DynvoxRig rig;
-  // Distance between voxels, m.
-  float voxel_size_m;
-  // Distance from a surface up to which voxels are kept, m.
-  float truncation_m;
-  // Nearest depth fused, m.
-  float near_m;
-  // Farthest depth fused, m.
-  float far_m;
-  // Voxels seen at most this often are reset when they leave the window; 0 is off.
-  uint8_t prune_weight;
-  // Length of the window, frames.
-  uint32_t prune_lag;
-  // Whether detections are tracked and kept out of the static map.
-  bool dynamic;
+  // Bytes of `settings` in use.
+  size_t settings_len;
+  // Lines `key=value`, in the order they were set. Written by dynvox_config_set.
+  uint8_t settings[DYNVOX_SETTINGS_BYTES];
 } DynvoxConfig;
 
-// Size of a mapper. Numbers as in dynvox's own table of profiles.
+// A capacity by name. Numbers as in dynvox's own table of profiles.
 typedef uint32_t DynvoxProfile;
+
+// Every bound of a mapper. Bytes follow from them alone. dynvox_capacity_of_profile and dynvox_capacity_for_budget fill it.
+typedef struct {
+  // Widest image, px.
+  size_t image_width;
+  // Highest image, px.
+  size_t image_height;
+  // Features kept for each image.
+  size_t features;
+  // Matches kept for each frame.
+  size_t matches;
+  // Voxel blocks of the static map.
+  size_t blocks;
+  // Blocks visible in one frame.
+  size_t visible_blocks;
+  // Frames the pruning window can span.
+  size_t history_frames;
+  // Detections in one frame, at most 64.
+  size_t detections;
+  // Words of 64 pixels for the masks of one frame.
+  size_t mask_words;
+  // Tracks.
+  size_t tracks;
+  // Objects reconstructed at once.
+  size_t objects;
+  // Voxel blocks of one object.
+  size_t object_blocks;
+  // Pixels of crops that wait for their object's motion.
+  size_t crop_pixels;
+  // Whether voxels have colour: 0 or 1.
+  uint8_t colour;
+} DynvoxCapacity;
 
 // An image of one byte a pixel, three for a colour image: red, green, blue.
 typedef struct {
@@ -120,7 +166,7 @@ typedef struct {
 
 // Something a detector saw in the left image.
 typedef struct {
-  // 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle, 10 animal.
+  // 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle, 10 animal, 11 moving object.
   uint8_t class_code;
   // How sure the detector is, 0 to 1.
   float score;
@@ -162,6 +208,12 @@ typedef struct {
   size_t detection_count;
   // Where the camera is, for those who know; null lets the mapper find out.
   const DynvoxPose *t_world_camera;
+  // When the pair was taken, ns since any moment that stays the same, rising from frame to frame; null where nothing tells: then
+  // "tracking.frame_interval_s" has passed since the frame before.
+  const uint64_t *time_ns;
+  // Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height` values without padding; null lets the mapper
+  // match the pair.
+  const uint16_t *disparity_q8;
 } DynvoxFrame;
 
 // An evicted block of 8 x 8 x 8 voxels; x runs fastest, then y, then z. Valid during the call.
@@ -270,6 +322,56 @@ typedef struct {
 // Takes triangles one by one. Must not call the same mapper.
 typedef void (*DynvoxTriangleSink)(void *context, const DynvoxTriangle *triangle);
 
+// A track as it stands after a frame.
+typedef struct {
+  // Its number, from 1, never used again.
+  uint32_t id;
+  // Its class, as in DynvoxDetection.
+  uint8_t class_code;
+  // Whether it was detected in this frame: 0 or 1.
+  uint8_t detected;
+  // Whether its motion was measured in this frame; if not it is extrapolated: 0 or 1.
+  uint8_t measured;
+  // Whether `t_world_object` says where it is: 0 or 1.
+  uint8_t has_pose;
+  // Whether it moves.
+  DynvoxMotionState state;
+  // Score of its last detection.
+  float score;
+  // First frame it was detected in.
+  uint32_t first_frame;
+  // Last frame it was detected in.
+  uint32_t last_frame;
+  // First column of its box, px.
+  int32_t left;
+  // First row of its box, px.
+  int32_t top;
+  // Columns of its box, px.
+  int32_t width;
+  // Rows of its box, px.
+  int32_t height;
+  // Speed over ground, m/s; negative while no motion was ever measured.
+  float speed_m_s;
+  // Its error, one sigma, m/s.
+  float speed_sigma_m_s;
+  // Centre of its matches in the world, m.
+  double center_world_m[3];
+  // Its frame to the world.
+  DynvoxPose t_world_object;
+  // Matches assigned to it in this frame.
+  uint32_t matches;
+  // Inliers of its motion among them.
+  uint32_t inliers;
+  // Blocks of its volume; 0 where it is not reconstructed.
+  uint32_t blocks;
+} DynvoxTrack;
+
+// Takes the next bytes of a snapshot; false when it cannot. Must not call the same mapper.
+typedef bool (*DynvoxWrite)(void *context, const uint8_t *bytes, size_t len);
+
+// Fills `bytes` with the next `len` bytes of a snapshot; false when there are not as many.
+typedef bool (*DynvoxRead)(void *context, uint8_t *bytes, size_t len);
+
 // Below 8 MiB, images up to 320 x 96, no colour.
 #define DYNVOX_PROFILE_TINY 0
 
@@ -295,6 +397,16 @@ const char *dynvox_status_text(uint32_t status);
 // `rig` is null or points to a rig, `config` is null or points to a configuration.
 DynvoxStatus dynvox_config_default(const DynvoxRig *rig, DynvoxConfig *config);
 
+// Sets one setting by its dotted key: dynvox_config_set(&config, "volume.voxel_size_m", "0.05"). Keys and values are those of a run's
+// config.toml; choices stand without quotes. The time between two frames is "tracking.frame_interval_s". Whether a value is in its range,
+// dynvox_config_problem says.
+//
+// # Safety
+// `config` is null or points to a configuration from dynvox_config_default, `key` and `value` are null or text that ends in a zero byte.
+DynvoxStatus dynvox_config_set(DynvoxConfig *config,
+                               const char *key,
+                               const char *value);
+
 // Writes the first problem of a configuration as text that ends in a zero byte, truncated to `len` bytes; the empty text without a
 // problem.
 //
@@ -304,22 +416,41 @@ DynvoxStatus dynvox_config_problem(const DynvoxConfig *config,
                                    char *text,
                                    size_t len);
 
+// Writes the bounds of a profile.
+//
+// # Safety
+// `capacity` is null or points to a capacity.
+DynvoxStatus dynvox_capacity_of_profile(DynvoxProfile profile, DynvoxCapacity *capacity);
+
+// Divides a buffer of `bytes` bytes between the stages, for images of a size: writes the largest capacity for which dynvox_bytes is at most
+// `bytes`. `voxel_size_m` is that of the configuration. Of too few bytes DYNVOX_STATUS_TOO_SMALL, and the least that works is written to
+// `least`, which may be null.
+//
+// # Safety
+// `capacity` is null or points to a capacity, `least` is null or points to a number.
+DynvoxStatus dynvox_capacity_for_budget(size_t bytes,
+                                        size_t width,
+                                        size_t height,
+                                        float voxel_size_m,
+                                        DynvoxCapacity *capacity,
+                                        size_t *least);
+
 // Alignment of a mapper's buffer, bytes.
 size_t dynvox_alignment(void);
 
-// Writes how many bytes of buffer a mapper of that profile takes.
+// Writes how many bytes of buffer a mapper of that capacity takes.
 //
 // # Safety
-// `bytes` is null or points to a number.
-DynvoxStatus dynvox_bytes(DynvoxProfile profile, size_t *bytes);
+// `capacity` is null or points to a capacity, `bytes` is null or points to a number.
+DynvoxStatus dynvox_bytes(const DynvoxCapacity *capacity, size_t *bytes);
 
 // Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nothing else may read,
 // write, move or free it. What it holds before does not matter. Takes less than 32 KiB of stack, as a step does.
 //
 // # Safety
-// `config` is null or points to a configuration, `buffer` is null or points to `len` bytes used by nothing else, `mapper` is null or points to
-// a pointer.
-DynvoxStatus dynvox_create(DynvoxProfile profile,
+// `capacity` is null or points to a capacity, `config` is null or points to a configuration, `buffer` is null or points to `len` bytes used by
+// nothing else, `mapper` is null or points to a pointer.
+DynvoxStatus dynvox_create(const DynvoxCapacity *capacity,
                            const DynvoxConfig *config,
                            uint8_t *buffer,
                            size_t len,
@@ -392,6 +523,50 @@ DynvoxStatus dynvox_finish(DynvoxMapper *mapper);
 // # Safety
 // `pose` is null or points to a pose, `matrix` is null or points to twelve numbers.
 DynvoxStatus dynvox_pose_matrix(const DynvoxPose *pose, double *matrix);
+
+// Writes the tracks of the last frame, at most `capacity` of them, and to `count` how many there are.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `tracks` is null or points to
+// `capacity` tracks; `count` is null or points to a number.
+DynvoxStatus dynvox_tracks(DynvoxMapper *mapper,
+                           DynvoxTrack *tracks,
+                           size_t capacity,
+                           size_t *count);
+
+// Hands every triangle of a reconstructed object to `sink`, in the object's own frame (`t_world_object` of its track brings it to the world), and
+// writes how many there were to `count`, which may be null. DYNVOX_STATUS_UNKNOWN where the track is not reconstructed now.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or points to
+// a number.
+DynvoxStatus dynvox_object_triangles(DynvoxMapper *mapper,
+                                     uint32_t track_id,
+                                     DynvoxTriangleSink sink,
+                                     void *context,
+                                     uint64_t *count);
+
+// Writes the whole state of a mapper, but for blocks that a store holds. The mapper continues as before. DYNVOX_STATUS_CALLBACK when
+// `write` refused.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
+DynvoxStatus dynvox_save(DynvoxMapper *mapper,
+                         DynvoxWrite write,
+                         void *context);
+
+// As dynvox_create, and brings the mapper to where dynvox_save was called: capacity and configuration must be those of the saved one. No
+// mapper is made from a damaged snapshot (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
+//
+// # Safety
+// As dynvox_create.
+DynvoxStatus dynvox_restore(const DynvoxCapacity *capacity,
+                            const DynvoxConfig *config,
+                            uint8_t *buffer,
+                            size_t len,
+                            DynvoxRead read,
+                            void *context,
+                            DynvoxMapper **mapper);
 
 #ifdef __cplusplus
 }  // extern "C"

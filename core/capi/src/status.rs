@@ -43,6 +43,8 @@ pub enum DynvoxStatus {
     Snapshot,
     /// A callback refused.
     Callback,
+    /// A frame's time is not after that of the frame before.
+    Time,
 }
 
 impl DynvoxStatus {
@@ -68,6 +70,7 @@ impl DynvoxStatus {
             }
             Self::Snapshot => c"the snapshot is damaged, or of another version, capacity or configuration",
             Self::Callback => c"a callback refused",
+            Self::Time => c"a frame's time is not after that of the frame before: leave the frame out",
         }
     }
 }
@@ -89,6 +92,7 @@ impl From<StepError> for DynvoxStatus {
             StepError::SizesDiffer | StepError::RawSizeDiffers { .. } | StepError::TooLarge { .. } | StepError::TooSmall { .. } => {
                 Self::Size
             }
+            StepError::TimeNotLater => Self::Time,
             StepError::PoseNotFinite | StepError::PoseNotRotation => Self::Pose,
             _ => Self::Unknown,
         }
@@ -108,7 +112,7 @@ impl From<RaycastError> for DynvoxStatus {
 /// A sentence for a status, in static memory; "no such status" for another number.
 #[unsafe(no_mangle)]
 pub extern "C" fn dynvox_status_text(status: u32) -> *const c_char {
-    const ALL: [DynvoxStatus; 18] = {
+    const ALL: [DynvoxStatus; 19] = {
         use DynvoxStatus::*;
         [
             Ok,
@@ -129,6 +133,7 @@ pub extern "C" fn dynvox_status_text(status: u32) -> *const c_char {
             Capacity,
             Snapshot,
             Callback,
+            Time,
         ]
     };
     ALL.get(status as usize).map_or(c"no such status", |status| status.text()).as_ptr()

@@ -82,7 +82,7 @@ pub struct DynvoxFrame {
     /// When the pair was taken, ns since any moment that stays the same, rising from frame to frame; null where nothing tells: then
     /// "tracking.frame_interval_s" has passed since the frame before.
     pub time_ns: *const u64,
-    /// Disparity of the left pixels in 1/256 px, 0 where there is none, `width` times `height` values without padding; null lets the mapper
+    /// Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height` values without padding; null lets the mapper
     /// match the pair.
     pub disparity_q8: *const u16,
 }

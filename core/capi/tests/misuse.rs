@@ -254,9 +254,11 @@ fn a_restored_mapper_continues_as_the_saved_one_and_a_damaged_snapshot_makes_non
     let (mut buffer, mut other) = (Buffer::new(), Buffer::new());
     let (pixels, config, capacity) = (pixels(), config(), capacity());
     let mapper = create(&mut buffer, &config).unwrap();
-    let (mut frame, time_ns) = (frame(&pixels), 5u64);
-    frame.time_ns = &raw const time_ns;
+    let (mut frame, times_ns) = (frame(&pixels), [5u64, 6]);
+    frame.time_ns = &raw const times_ns[0];
     assert_eq!(step(mapper, &frame), DynvoxStatus::Ok);
+    assert_eq!(step(mapper, &frame), DynvoxStatus::Time);
+    frame.time_ns = &raw const times_ns[1];
     let mut bytes = Vec::new();
     assert_eq!(unsafe { dynvox_save(mapper, Some(write), (&raw mut bytes).cast()) }, DynvoxStatus::Ok);
     let mut restore = |bytes: &[u8]| {

@@ -169,7 +169,7 @@ impl RunFolder {
         let _ = std::fs::remove_file(self.file(RESERVE_FILE));
     }
 
-    /// Lets the folder stay where it is, whatever comes.
+    /// Lets the folder stay where it is when this is dropped.
     pub fn keep(&mut self) {
         self.keep = true;
     }

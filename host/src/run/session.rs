@@ -149,7 +149,7 @@ impl<'p, 's> Session<'p, 's> {
         }
     }
 
-    /// Maps frames as they are read, until there is none or the run is asked to end.
+    /// Maps frames as they are read, until they end or the run is asked to.
     fn take(&mut self, read: &Receiver<ReadFrame>, progress: &Progress) -> Result<(), RunError> {
         let plan = self.plan;
         let open = plan.frames.count().is_none();

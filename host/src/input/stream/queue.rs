@@ -23,7 +23,7 @@ pub enum WhenLate {
 pub struct Arrived {
     /// Its number among all that came.
     pub number: u64,
-    /// The pair, or why there is none.
+    /// The pair, or why it is missing.
     pub pair: Result<Pair, InputError>,
 }
 
