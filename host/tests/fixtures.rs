@@ -97,7 +97,7 @@ fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
     fs::write(&settings, text.replace("voxel_size_m = 0.1", "voxel_size_m = 0.11")).unwrap();
     verify("first divergence: frame 0, background");
     fs::write(&settings, text.replace("voxel_size_m", "voxel_sise_m")).unwrap();
-    verify("voxel_sise_m = 0.1: there is no such setting");
+    verify("objects.voxel_sise_m = 0.05: there is no such setting");
     fs::write(&settings, &text).unwrap();
     let bounds = fs::read_to_string(root.join("pinned/fixture.toml")).unwrap();
     fs::write(root.join("pinned/fixture.toml"), bounds.replace("image_height = 128", "image_height = 96")).unwrap();

@@ -229,10 +229,10 @@ fn another_run_or_a_changed_data_set_is_refused_by_name() {
     assert_refused_with(&root, "settings.toml", b"[volume]\nvoxel_size_m = 0.09\n", "volume.voxel_size_m was 0.08 and is 0.09");
     let calibration = fs::read_to_string(path("rig/calib.txt")).unwrap().replace("baseline_m 0.5", "baseline_m 0.6");
     assert_refused_with(&root, "rig/calib.txt", calibration.as_bytes(), "the data set's rig was ");
-    let mut pixels = image::open(path("rig/right/003.png")).unwrap().into_luma8();
+    let mut pixels = image::open(path("rig/right/004.png")).unwrap().into_luma8();
     pixels.get_pixel_mut(80, 40).0[0] ^= 1;
     pixels.save(path("other.png")).unwrap();
-    assert_refused_with(&root, "rig/right/003.png", &fs::read(path("other.png")).unwrap(), "frame 3 of the data set has changed");
+    assert_refused_with(&root, "rig/right/004.png", &fs::read(path("other.png")).unwrap(), "frame 4 of the data set has changed");
     let [last, away] = ["rig/left/007.png", "away.png"].map(path);
     fs::rename(&last, &away).unwrap();
     fs::rename(path("rig/right/007.png"), path("away-right.png")).unwrap();
