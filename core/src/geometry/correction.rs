@@ -21,7 +21,7 @@ pub struct DisparityCorrection {
 
 /// A [`DisparityCorrection`] for a rig, in single precision: the same bits for matches and images.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ColumnCorrection {
+pub(crate) struct ColumnCorrection {
     offset_px: f32,
     slope_px: f32,
     quartic_px: f32,
@@ -31,7 +31,7 @@ pub struct ColumnCorrection {
 
 impl DisparityCorrection {
     /// Prepares it for a rig. A principal point in column 0 has no sides: only the offset is left.
-    pub fn for_rig(&self, rig: &StereoRig) -> ColumnCorrection {
+    pub(crate) fn for_rig(&self, rig: &StereoRig) -> ColumnCorrection {
         let center = rig.center_u_px;
         ColumnCorrection {
             offset_px: self.offset_px as f32,
@@ -51,7 +51,7 @@ impl DisparityCorrection {
 impl ColumnCorrection {
     /// What must be added to a disparity whose point the right camera sees in column `u_right_px`.
     #[inline]
-    pub fn at(&self, u_right_px: f32) -> f32 {
+    pub(crate) fn at(&self, u_right_px: f32) -> f32 {
         let share = (u_right_px - self.center_u_px) * self.per_px;
         let square = share * share;
         self.offset_px + self.slope_px * share + self.quartic_px * (square * square)
@@ -59,20 +59,20 @@ impl ColumnCorrection {
 
     /// Where the right camera of the corrected rig sees what is seen in column `u_right_px`.
     #[inline]
-    pub fn corrected(&self, u_right_px: f32) -> f32 {
+    pub(crate) fn corrected(&self, u_right_px: f32) -> f32 {
         u_right_px - self.at(u_right_px)
     }
 
     /// The column of the picture as it is, for one of the corrected rig: the inverse of
     /// [`ColumnCorrection::corrected`] but for a hundredth of the correction.
     #[inline]
-    pub fn uncorrected(&self, u_right_px: f32) -> f32 {
+    pub(crate) fn uncorrected(&self, u_right_px: f32) -> f32 {
         u_right_px + self.at(u_right_px)
     }
 
     /// Corrects a row of disparities, 1/256 px, 0 none. What would be less than 1/256 px after it
     /// becomes none.
-    pub fn correct_row(&self, disparity_q8: &mut [u16]) {
+    pub(crate) fn correct_row(&self, disparity_q8: &mut [u16]) {
         const ONE_PX: f32 = DISPARITY_ONE_PX as f32;
         let mut u = 0.0;
         for disparity in disparity_q8 {

@@ -6,7 +6,9 @@ mod rig;
 pub mod scalar;
 mod transform;
 
-pub use correction::{ColumnCorrection, DisparityCorrection};
+pub(crate) use correction::ColumnCorrection;
+pub use correction::DisparityCorrection;
 pub use depth::depth_from_disparity;
-pub use rig::{DEPTH_MIN_M, DISPARITY_MIN_PX, RigProblem, StereoObservation, StereoRig};
+pub(crate) use rig::StereoObservation;
+pub use rig::{DEPTH_MIN_M, DISPARITY_MIN_PX, RigProblem, StereoRig};
 pub use transform::Transform;

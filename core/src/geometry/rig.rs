@@ -11,7 +11,7 @@ pub const DISPARITY_MIN_PX: f64 = 0.1;
 /// Where both cameras see a point, px from the principal point. Rectified cameras see it in the
 /// same row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StereoObservation {
+pub(crate) struct StereoObservation {
     /// Column in the left image.
     pub u_left_px: f64,
     /// Row in both images.
@@ -22,7 +22,7 @@ pub struct StereoObservation {
 
 impl StereoObservation {
     /// Left column minus right column.
-    pub fn disparity_px(&self) -> f64 {
+    pub(crate) fn disparity_px(&self) -> f64 {
         self.u_left_px - self.u_right_px
     }
 }
@@ -102,24 +102,24 @@ impl StereoRig {
     }
 
     /// A pixel by its distance from the principal point, px.
-    pub fn from_center(&self, [u, v]: [f32; 2]) -> [f64; 2] {
+    pub(crate) fn from_center(&self, [u, v]: [f32; 2]) -> [f64; 2] {
         [f64::from(u) - self.center_u_px, f64::from(v) - self.center_v_px]
     }
 
     /// What a pixel of the left and a pixel of the right image show; its row is the mean of both.
-    pub fn observation(&self, left: [f32; 2], right: [f32; 2]) -> StereoObservation {
+    pub(crate) fn observation(&self, left: [f32; 2], right: [f32; 2]) -> StereoObservation {
         let ([u_left_px, v_left], [u_right_px, v_right]) = (self.from_center(left), self.from_center(right));
         StereoObservation { u_left_px, v_px: 0.5 * (v_left + v_right), u_right_px }
     }
 
     /// The ray of a pixel of the left image, at depth 1.
-    pub fn ray(&self, u_px: f64, v_px: f64) -> [f64; 3] {
+    pub(crate) fn ray(&self, u_px: f64, v_px: f64) -> [f64; 3] {
         [(u_px - self.center_u_px) / self.focal_px, (v_px - self.center_v_px) / self.focal_px, 1.0]
     }
 
     /// Where both cameras see a point of the left camera's frame, m; `None` nearer than
     /// [`DEPTH_MIN_M`], behind the camera, or where the depth is not a number.
-    pub fn project(&self, [x, y, z]: [f64; 3]) -> Option<StereoObservation> {
+    pub(crate) fn project(&self, [x, y, z]: [f64; 3]) -> Option<StereoObservation> {
         (z > DEPTH_MIN_M).then(|| {
             let u_left_px = self.focal_px * x / z;
             StereoObservation {
@@ -131,14 +131,14 @@ impl StereoRig {
     }
 
     /// Change of [`StereoRig::project`] by the point, px/m: rows left column, row, right column.
-    pub fn project_jacobian(&self, [x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
+    pub(crate) fn project_jacobian(&self, [x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
         let per_m = self.focal_px / z;
         [[per_m, 0.0, -per_m * (x / z)], [0.0, per_m, -per_m * y / z], [per_m, 0.0, -per_m * ((x - self.baseline_m) / z)]]
     }
 
     /// The point both cameras see, in the left camera's frame, m; `None` where the disparity is
     /// below [`DISPARITY_MIN_PX`] or something is not finite.
-    pub fn triangulate(&self, seen: &StereoObservation) -> Option<[f64; 3]> {
+    pub(crate) fn triangulate(&self, seen: &StereoObservation) -> Option<[f64; 3]> {
         let disparity = seen.disparity_px();
         // False for NaN as well.
         if !((DISPARITY_MIN_PX..f64::INFINITY).contains(&disparity) && seen.v_px.is_finite()) {
@@ -150,7 +150,7 @@ impl StereoRig {
 
     /// Change of [`StereoRig::triangulate`] by the observation, m/px: columns left column, row,
     /// right column. Of use only where the observation triangulates.
-    pub fn triangulate_jacobian(&self, seen: &StereoObservation) -> [[f64; 3]; 3] {
+    pub(crate) fn triangulate_jacobian(&self, seen: &StereoObservation) -> [[f64; 3]; 3] {
         let disparity = seen.disparity_px();
         let per_px = self.baseline_m / disparity;
         let [x, y, z] = [seen.u_left_px, seen.v_px, self.focal_px].map(|part| part * per_px / disparity);

@@ -69,7 +69,7 @@ impl Transform {
     /// The motion after a small step: a rotation vector, rad, and a translation, m, applied after it (a retraction of SE(3) to second order,
     /// whose derivative at 0 is that of the exponential).
     #[must_use]
-    pub fn retract(&self, [a, b, c, x, y, z]: [f64; 6]) -> Self {
+    pub(crate) fn retract(&self, [a, b, c, x, y, z]: [f64; 6]) -> Self {
         (Self::new([a, b, c], [x, y, z]) * *self).normalized()
     }
 

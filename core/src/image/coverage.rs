@@ -5,31 +5,25 @@ const WORD: usize = 64;
 
 /// One bit a pixel, set where the pixel is not to be used. Rows begin at words.
 #[derive(Clone, Copy, Debug)]
-pub struct InvalidPixels<'a> {
+pub(crate) struct InvalidPixels<'a> {
     words: &'a [u64],
     width: usize,
-    height: usize,
 }
 
 impl<'a> InvalidPixels<'a> {
     /// Words a row of `width` pixels takes.
-    pub const fn words_a_row(width: usize) -> usize {
+    pub(crate) const fn words_a_row(width: usize) -> usize {
         width.div_ceil(WORD)
     }
 
     /// Views `words` as bits of `width` x `height` pixels; `None` when there are too few.
-    pub fn new(words: &'a [u64], width: usize, height: usize) -> Option<Self> {
+    pub(crate) fn new(words: &'a [u64], width: usize, height: usize) -> Option<Self> {
         let words = words.get(..Self::words_a_row(width).checked_mul(height)?)?;
-        Some(Self { words, width, height })
-    }
-
-    /// Width and height of the image, px.
-    pub fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
+        Some(Self { words, width })
     }
 
     /// Whether pixel (u, v) is not to be used; those beyond the image are not.
-    pub fn contains(&self, u: usize, v: usize) -> bool {
+    pub(crate) fn contains(&self, u: usize, v: usize) -> bool {
         if u >= self.width {
             return true;
         }
@@ -38,7 +32,7 @@ impl<'a> InvalidPixels<'a> {
     }
 
     /// The columns of row `v` that are not to be used, from left to right.
-    pub fn in_row(&self, v: usize) -> impl Iterator<Item = usize> + use<'a> {
+    pub(crate) fn in_row(&self, v: usize) -> impl Iterator<Item = usize> + use<'a> {
         let row = Self::words_a_row(self.width);
         let words = self.words.get(v * row..(v + 1) * row).unwrap_or(&[]);
         words.iter().enumerate().flat_map(|(at, &word)| Bits(word).map(move |bit| at * WORD + bit))
@@ -60,7 +54,7 @@ impl Iterator for Bits {
 
 /// The pixels of a pair that are not to be used.
 #[derive(Clone, Copy, Debug)]
-pub struct InvalidPair<'a> {
+pub(crate) struct InvalidPair<'a> {
     /// Of the left image.
     pub left: InvalidPixels<'a>,
     /// Of the right image.

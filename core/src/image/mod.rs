@@ -3,7 +3,7 @@
 mod coverage;
 mod view;
 
-pub use coverage::{InvalidPair, InvalidPixels};
+pub(crate) use coverage::{InvalidPair, InvalidPixels};
 pub use view::{View, ViewMut};
 
 /// One pixel of disparity in the core's unit: 1/256 px in `u16`, as in KITTI's 16-bit PNGs. 0 means none.

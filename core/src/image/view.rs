@@ -59,7 +59,7 @@ impl<'a, T> View<'a, T> {
     /// let part = View::new(&pixels, 4, 3).unwrap().part(1, 1, 2, 2).unwrap();
     /// assert_eq!((part.row(0), part.row(1)), (&[5, 6][..], &[9, 10][..]));
     /// ```
-    pub fn part(&self, left: usize, top: usize, width: usize, height: usize) -> Option<Self> {
+    pub(crate) fn part(&self, left: usize, top: usize, width: usize, height: usize) -> Option<Self> {
         let within = left.checked_add(width)? <= self.width && top.checked_add(height)? <= self.height;
         let first = top.checked_mul(self.stride)?.checked_add(left)?;
         if within { Self::with_stride(self.data.get(first..)?, width, height, self.stride) } else { None }
@@ -76,7 +76,7 @@ impl<'a, T> View<'a, T> {
     }
 
     /// Row `v`; empty beyond the image.
-    pub fn row(&self, v: usize) -> &'a [T] {
+    pub(crate) fn row(&self, v: usize) -> &'a [T] {
         if v >= self.height {
             return &[];
         }
@@ -132,22 +132,17 @@ impl<'a, T> ViewMut<'a, T> {
     }
 
     /// Width, px.
-    pub fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.width
     }
 
-    /// Height, px.
-    pub fn height(&self) -> usize {
-        self.height
-    }
-
     /// The pixels, row by row.
-    pub fn pixels_mut(&mut self) -> &mut [T] {
+    pub(crate) fn pixels_mut(&mut self) -> &mut [T] {
         self.data
     }
 
     /// The same image, read-only.
-    pub fn as_view(&self) -> View<'_, T> {
+    pub(crate) fn as_view(&self) -> View<'_, T> {
         View { data: self.data, width: self.width, height: self.height, stride: self.width }
     }
 }

@@ -76,7 +76,7 @@ impl Config {
     }
 
     /// The cameras with the baseline that is to be used.
-    pub fn scaled_rig(&self) -> StereoRig {
+    pub(crate) fn scaled_rig(&self) -> StereoRig {
         StereoRig { baseline_m: self.rig.baseline_m * self.rig_settings.baseline_scale, ..self.rig }
     }
 

@@ -29,11 +29,6 @@ pub enum Digested {
     Object(u32),
 }
 
-impl Digested {
-    /// Names of the columns, in the order data flows; the last holds all objects.
-    pub const COLUMNS: [&'static str; 7] = ["input", "disparity", "matches", "egomotion", "tracks", "background", "objects"];
-}
-
 impl fmt::Display for Digested {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -74,7 +69,7 @@ impl ObjectDigests {
     }
 
     /// One by one, by id.
-    pub fn iter(&self) -> impl Iterator<Item = &ObjectDigest> + Clone {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &ObjectDigest> + Clone {
         self.0.iter().filter(|object| object.id != 0)
     }
 }
@@ -150,7 +145,8 @@ impl StageDigests {
     }
 }
 
-/// The digests in the order of [`Digested::COLUMNS`], with a space between two; 16 zeros for a stage that did not run.
+/// The digests in the order data flows, with a space between two, those of all objects last; 16 zeros
+/// for a stage that did not run.
 impl fmt::Display for StageDigests {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for stage in [self.input, self.disparity, self.matches, self.egomotion, self.tracks, self.background] {
@@ -190,6 +186,6 @@ mod tests {
         assert_eq!(one.whole(0), StageDigests { input: 0, ..one }.whole(0));
         assert_eq!(format!("{}", one.objects), "2:0000000000000007;9:0000000000000001");
         assert_eq!(format!("{}", ObjectDigests::default()), "-");
-        assert_eq!(format!("{one}").split(' ').count(), Digested::COLUMNS.len());
+        assert_eq!(format!("{one}").split(' ').count(), 7);
     }
 }

@@ -63,7 +63,7 @@ impl PixelBox {
 
     /// The box scaled about its centre: the new width is `width * permille / 1000` cut to whole pixels, half the excess on either side, the
     /// odd pixel right and below (as in the published code).
-    pub fn scaled(&self, permille: u32) -> Self {
+    pub(crate) fn scaled(&self, permille: u32) -> Self {
         let of = |side: i32| (i64::from(side) * i64::from(permille) / 1000) as i32;
         let (width, height) = (of(self.width), of(self.height));
         let half = |excess: i32| excess.div_euclid(2);

@@ -5,7 +5,7 @@ use super::{MaskHandle, MaskStore, PixelBox};
 /// A mask scaled about the centre of its box: a bilinear resize of a 0/1 image, in integers; a pixel belongs to it if its value is 1. Not
 /// a dilation: a corner cut out of the mask is cut out of the scaled one, larger.
 #[derive(Clone, Copy, Debug)]
-pub struct ScaledMask<'m, 's> {
+pub(crate) struct ScaledMask<'m, 's> {
     store: &'m MaskStore<'s>,
     mask: MaskHandle,
     /// The scaled box.
@@ -14,17 +14,17 @@ pub struct ScaledMask<'m, 's> {
 
 impl<'m, 's> ScaledMask<'m, 's> {
     /// A mask of `store` scaled by `permille` / 1000.
-    pub fn new(store: &'m MaskStore<'s>, mask: MaskHandle, permille: u32) -> Self {
+    pub(crate) fn new(store: &'m MaskStore<'s>, mask: MaskHandle, permille: u32) -> Self {
         Self { store, mask, pixels: mask.pixels.scaled(permille) }
     }
 
     /// The same elsewhere in the image.
-    pub fn moved(self, shift: [i32; 2]) -> Self {
+    pub(crate) fn moved(self, shift: [i32; 2]) -> Self {
         Self { pixels: self.pixels.moved(shift), ..self }
     }
 
     /// Whether a pixel of the image belongs to the scaled mask.
-    pub fn contains(&self, u: i32, v: i32) -> bool {
+    pub(crate) fn contains(&self, u: i32, v: i32) -> bool {
         if !self.pixels.contains(u, v) {
             return false;
         }
@@ -36,7 +36,7 @@ impl<'m, 's> ScaledMask<'m, 's> {
     }
 
     /// Visits the pixels of row `v` of the image that belong to the scaled mask and lie in columns `0..width`.
-    pub fn row(&self, v: i32, width: i32, mut visit: impl FnMut(usize)) {
+    pub(crate) fn row(&self, v: i32, width: i32, mut visit: impl FnMut(usize)) {
         let (from, scaled) = (&self.mask.pixels, &self.pixels);
         if v < scaled.top || v - scaled.top >= scaled.height {
             return;

@@ -11,7 +11,7 @@ const WORD: i32 = 64;
 /// Names a mask of a [`MaskStore`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct MaskHandle {
+pub(crate) struct MaskHandle {
     /// The box its pixels lie in.
     pub pixels: PixelBox,
     /// First word.
@@ -22,7 +22,7 @@ pub struct MaskHandle {
 
 impl MaskHandle {
     /// A box all of whose pixels count, without a word stored.
-    pub fn full(pixels: PixelBox) -> Self {
+    pub(crate) fn full(pixels: PixelBox) -> Self {
         Self { pixels, start: 0, stride: 0 }
     }
 
@@ -47,14 +47,14 @@ impl MaskHandle {
 
 /// A bounded buffer of masks, filled front to back and emptied as a whole.
 #[derive(Debug)]
-pub struct MaskStore<'s> {
+pub(crate) struct MaskStore<'s> {
     words: &'s mut [u64],
     used: usize,
 }
 
 impl<'s> MaskStore<'s> {
     /// A store in `words`.
-    pub fn new(words: &'s mut [u64]) -> Self {
+    pub(crate) fn new(words: &'s mut [u64]) -> Self {
         Self { words, used: 0 }
     }
 
@@ -66,17 +66,12 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Forgets all masks.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.used = 0;
     }
 
-    /// Words in use.
-    pub fn used(&self) -> usize {
-        self.used
-    }
-
     /// Space for a mask in a box within the image, all its bits 0; `None` when the store is full.
-    pub fn alloc(&mut self, pixels: PixelBox) -> Option<MaskHandle> {
+    pub(crate) fn alloc(&mut self, pixels: PixelBox) -> Option<MaskHandle> {
         let mut mask = MaskHandle { pixels, start: self.used as u32, stride: 0 };
         mask.stride = ((pixels.left + pixels.width - mask.origin() + WORD - 1) / WORD) as u32;
         let end = self.used.checked_add(mask.stride as usize * usize::try_from(pixels.height).ok()?)?;
@@ -86,12 +81,12 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Gives back the space allocated last.
-    pub fn free_last(&mut self, mask: MaskHandle) {
+    pub(crate) fn free_last(&mut self, mask: MaskHandle) {
         self.used = mask.start as usize;
     }
 
     /// Copies a mask from another store; the box alone is kept where this one is full. Whether it was kept whole.
-    pub fn copy(&mut self, mask: MaskHandle, from: &MaskStore<'_>) -> (MaskHandle, bool) {
+    pub(crate) fn copy(&mut self, mask: MaskHandle, from: &MaskStore<'_>) -> (MaskHandle, bool) {
         if mask.stride == 0 {
             return (mask, true);
         }
@@ -122,7 +117,7 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Whether a pixel of the image belongs to the mask.
-    pub fn contains(&self, mask: &MaskHandle, u: i32, v: i32) -> bool {
+    pub(crate) fn contains(&self, mask: &MaskHandle, u: i32, v: i32) -> bool {
         if !mask.pixels.contains(u, v) {
             return false;
         }
@@ -134,7 +129,7 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Sets the pixels of a mask for which `is_set` holds.
-    pub fn fill(&mut self, mask: &MaskHandle, is_set: impl Fn(i32, i32) -> bool) {
+    pub(crate) fn fill(&mut self, mask: &MaskHandle, is_set: impl Fn(i32, i32) -> bool) {
         let PixelBox { left, top, width, height } = mask.pixels;
         let origin = mask.origin();
         for v in top..top + height {
@@ -149,7 +144,7 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Adds a row of a caller's mask, whose first pixel is at column `left`; pixels outside the box are left out.
-    pub fn set_row(&mut self, mask: &MaskHandle, v: i32, left: i32, pixels: &[u8]) {
+    pub(crate) fn set_row(&mut self, mask: &MaskHandle, v: i32, left: i32, pixels: &[u8]) {
         let (origin, columns) = (mask.origin(), mask.pixels);
         let words = self.row_mut(mask, v);
         for (u, _) in (left..).zip(pixels).filter(|&(u, &pixel)| pixel != 0 && columns.contains(u, columns.top)) {
@@ -174,7 +169,7 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Pixels in the mask.
-    pub fn area(&self, mask: &MaskHandle) -> i64 {
+    pub(crate) fn area(&self, mask: &MaskHandle) -> i64 {
         if mask.stride == 0 {
             return mask.pixels.area();
         }
@@ -184,7 +179,7 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Intersection over union of a mask of this store with one of another, the other one moved by `shift` px.
-    pub fn overlap(&self, mask: &MaskHandle, other: &MaskStore<'_>, other_mask: &MaskHandle, shift: [i32; 2]) -> f32 {
+    pub(crate) fn overlap(&self, mask: &MaskHandle, other: &MaskStore<'_>, other_mask: &MaskHandle, shift: [i32; 2]) -> f32 {
         let common = mask.pixels.intersection(&other_mask.pixels.moved(shift));
         let mut both = 0;
         for v in common.top..common.top + common.height {
@@ -199,7 +194,7 @@ impl<'s> MaskStore<'s> {
     }
 
     /// Removes from a mask the pixels that another mask of the same store has.
-    pub fn subtract(&mut self, mask: &MaskHandle, other: &MaskHandle) {
+    pub(crate) fn subtract(&mut self, mask: &MaskHandle, other: &MaskHandle) {
         let common = mask.pixels.intersection(&other.pixels);
         let origin = mask.origin();
         for v in common.top..common.top + common.height {

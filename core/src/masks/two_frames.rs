@@ -2,41 +2,41 @@
 
 /// Two values that change roles from frame to frame.
 #[derive(Debug)]
-pub struct TwoFrames<T> {
+pub(crate) struct TwoFrames<T> {
     values: [T; 2],
     second_is_current: bool,
 }
 
 impl<T> TwoFrames<T> {
     /// The first value is the current one.
-    pub const fn new(values: [T; 2]) -> Self {
+    pub(crate) const fn new(values: [T; 2]) -> Self {
         Self { values, second_is_current: false }
     }
 
     /// Begins a frame: the current value becomes the previous one, and the other way round.
-    pub fn advance(&mut self) {
+    pub(crate) fn advance(&mut self) {
         self.second_is_current = !self.second_is_current;
     }
 
     /// That of the current frame.
-    pub fn current(&self) -> &T {
+    pub(crate) fn current(&self) -> &T {
         let [first, second] = &self.values;
         if self.second_is_current { second } else { first }
     }
 
     /// That of the frame before.
-    pub fn previous(&self) -> &T {
+    pub(crate) fn previous(&self) -> &T {
         let [first, second] = &self.values;
         if self.second_is_current { first } else { second }
     }
 
     /// That of the current frame.
-    pub fn current_mut(&mut self) -> &mut T {
+    pub(crate) fn current_mut(&mut self) -> &mut T {
         self.split_mut().0
     }
 
     /// The current one, to change, and the previous one.
-    pub fn split_mut(&mut self) -> (&mut T, &T) {
+    pub(crate) fn split_mut(&mut self) -> (&mut T, &T) {
         let [first, second] = &mut self.values;
         if self.second_is_current { (second, first) } else { (first, second) }
     }

@@ -66,7 +66,7 @@ impl Footprint {
     }
 
     /// Sets the use of a region, as `items` of `T` now and `peak_items` at most.
-    pub fn set_use<T>(&mut self, name: &str, items: usize, peak_items: usize) {
+    pub(crate) fn set_use<T>(&mut self, name: &str, items: usize, peak_items: usize) {
         if let Some(region) = self.regions.iter_mut().find(|region| region.name == name) {
             region.used = items * size_of::<T>();
             region.peak = peak_items * size_of::<T>();

@@ -10,5 +10,6 @@ mod slab;
 
 pub use capacity::Capacity;
 pub use footprint::{Footprint, Region};
-pub use one_shot::OneShot;
-pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, region_bytes};
+pub(crate) use one_shot::OneShot;
+pub(crate) use slab::region_bytes;
+pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError};

@@ -16,7 +16,7 @@ use core::{
 
 /// The allocator: a region of the slab and whether it has been handed out.
 #[derive(Debug)]
-pub struct OneShot<'s> {
+pub(crate) struct OneShot<'s> {
     start: NonNull<u8>,
     len: usize,
     taken: AtomicBool,
@@ -30,7 +30,7 @@ unsafe impl Sync for OneShot<'_> {}
 
 impl<'s> OneShot<'s> {
     /// Takes over a region of the slab.
-    pub fn new(region: &'s mut [u8]) -> Self {
+    pub(crate) fn new(region: &'s mut [u8]) -> Self {
         Self {
             len: region.len(),
             start: NonNull::from(region).cast(),

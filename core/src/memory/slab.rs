@@ -90,7 +90,7 @@ impl core::error::Error for SlabError {}
 /// ```
 /// assert_eq!(dynvox_core::memory::region_bytes::<u16>(33), 128);
 /// ```
-pub const fn region_bytes<T>(count: usize) -> usize {
+pub(crate) const fn region_bytes<T>(count: usize) -> usize {
     (count * size_of::<T>()).next_multiple_of(SLAB_ALIGN)
 }
 
@@ -136,7 +136,7 @@ impl<'s> Carver<'s> {
     }
 
     /// Records regions without memory: every region is empty.
-    pub fn without_slab() -> Self {
+    pub(crate) fn without_slab() -> Self {
         Self { rest: None, footprint: Footprint::default(), name: None, failure: None }
     }
 
@@ -149,7 +149,7 @@ impl<'s> Carver<'s> {
 
     /// As [`Carver::alloc`], without clearing: for big regions whose items are cleared as they come into use, so that a slab
     /// much larger than the map costs neither time nor resident memory.
-    pub fn alloc_as_found<T: Pod>(&mut self, name: &'static str, count: usize) -> &'s mut [T] {
+    pub(crate) fn alloc_as_found<T: Pod>(&mut self, name: &'static str, count: usize) -> &'s mut [T] {
         let region = self.take(name, region_bytes::<T>(count));
         let items = region.get_mut(..count * size_of::<T>()).unwrap_or_default();
         let cast = bytemuck::try_cast_slice_mut(items);
@@ -159,7 +159,7 @@ impl<'s> Carver<'s> {
 
     /// Moves `value`, which is not plain data, into `bytes` of the slab: a stated number, which must not depend on the width of
     /// pointers. The value is never dropped.
-    pub fn alloc_value<T: 's>(&mut self, name: &'static str, bytes: usize, value: T) -> Option<&'s mut T> {
+    pub(crate) fn alloc_value<T: 's>(&mut self, name: &'static str, bytes: usize, value: T) -> Option<&'s mut T> {
         let made = Box::try_new_in(value, OneShot::new(self.alloc_as_found(name, bytes)));
         self.require_fit(made.is_ok());
         made.ok().map(Box::leak)
@@ -193,7 +193,7 @@ impl<'s> Carver<'s> {
     /// carver.group("volumes", |carver| (carver.alloc::<u8>("a", 64).len(), carver.alloc::<u8>("b", 64).len()));
     /// assert_eq!(carver.footprint().region("volumes").unwrap().bytes, 128);
     /// ```
-    pub fn group<R>(&mut self, name: &'static str, alloc: impl FnOnce(&mut Self) -> R) -> R {
+    pub(crate) fn group<R>(&mut self, name: &'static str, alloc: impl FnOnce(&mut Self) -> R) -> R {
         self.name = Some(name);
         let made = alloc(self);
         self.name = None;
@@ -216,7 +216,7 @@ impl<'s> Carver<'s> {
     }
 
     /// The recorded regions.
-    pub fn into_footprint(self) -> Footprint {
+    pub(crate) fn into_footprint(self) -> Footprint {
         self.footprint
     }
 

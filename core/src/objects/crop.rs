@@ -19,7 +19,7 @@ use crate::{
 use bytemuck::{Pod, Zeroable};
 
 /// Most crops kept for later.
-pub const CROPS_MAX: usize = 128;
+pub(crate) const CROPS_MAX: usize = 128;
 /// Half pixels of disparity the median is searched among: up to 256 px.
 const BINS: usize = 512;
 /// Disparity units in a half pixel.

@@ -13,10 +13,11 @@ mod tests;
 mod visit;
 
 pub use config::ObjectsConfig;
-pub use crop::{CROPS_MAX, Picture};
+pub(crate) use crop::CROPS_MAX;
+pub use crop::Picture;
 pub use object::{MAX_OBJECTS, NoSink, Object, ObjectSink, ObjectSummary, RetiredObject, Retirement};
 pub use posed::PosedObject;
-pub use reconstruct::ObjectFrame;
+pub(crate) use reconstruct::ObjectFrame;
 pub use report::{InstancesReport, ObjectsReport};
 
 use crate::{
@@ -37,12 +38,12 @@ pub struct Objects<'s> {
 
 impl<'s> Objects<'s> {
     /// Bytes of the slab.
-    pub const fn bytes(capacity: &Capacity) -> usize {
+    pub(crate) const fn bytes(capacity: &Capacity) -> usize {
         Crops::bytes(capacity) + ObjectVolumes::bytes(capacity)
     }
 
     /// Allocates its regions.
-    pub fn new_in(capacity: &Capacity, config: &ObjectsConfig, carver: &mut Carver<'s>) -> Self {
+    pub(crate) fn new_in(capacity: &Capacity, config: &ObjectsConfig, carver: &mut Carver<'s>) -> Self {
         Self {
             config: *config,
             crops: Crops::new_in(capacity, carver),
@@ -57,12 +58,12 @@ impl<'s> Objects<'s> {
     }
 
     /// Numbers of the objects' tracks, and their digests.
-    pub fn digests(&mut self) -> impl Iterator<Item = (u32, u64)> {
+    pub(crate) fn digests(&mut self) -> impl Iterator<Item = (u32, u64)> {
         self.volumes.objects.iter_mut().filter_map(|object| object.digest())
     }
 
     /// Adds what is in use to a footprint.
-    pub fn note_use(&self, footprint: &mut Footprint) {
+    pub(crate) fn note_use(&self, footprint: &mut Footprint) {
         footprint.set_use::<Crop>("objects.crop", self.crops.len(), CROPS_MAX);
     }
 }

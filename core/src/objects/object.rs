@@ -104,12 +104,12 @@ impl<'s> Object<'s> {
     }
 
     /// What is known of it; `None` while the volume is free.
-    pub fn summary(&self) -> Option<&ObjectSummary> {
+    pub(crate) fn summary(&self) -> Option<&ObjectSummary> {
         self.summary.as_ref()
     }
 
     /// Number of its track, and the digest of what is known of it and of its map; `None` while the volume is free.
-    pub fn digest(&mut self) -> Option<(u32, u64)> {
+    pub(crate) fn digest(&mut self) -> Option<(u32, u64)> {
         let id = self.summary.as_ref()?.id;
         Some((id, Hasher::digest(|hasher| self.visit(hasher))))
     }

@@ -15,7 +15,7 @@ use crate::{
 
 /// What objects are fused from in a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct ObjectFrame<'a> {
+pub(crate) struct ObjectFrame<'a> {
     /// The cameras.
     pub rig: &'a StereoRig,
     /// Camera to world.
@@ -29,7 +29,7 @@ pub struct ObjectFrame<'a> {
 impl<'s> Objects<'s> {
     /// Fuses what this frame shows of each object into its volume; nothing where `frame` is `None`, as when the camera's pose is
     /// extrapolated. Objects that retire are handed to `sink`.
-    pub fn reconstruct<E: Executor>(
+    pub(crate) fn reconstruct<E: Executor>(
         &mut self,
         tracked: &Tracked<'_, '_>,
         frame: Option<&ObjectFrame<'_>>,
@@ -178,7 +178,7 @@ impl<'s> Objects<'s> {
     }
 
     /// Ends a sequence: retires every object. Returns how many.
-    pub fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
+    pub(crate) fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
         let config = &self.config;
         self.volumes.objects.iter_mut().map(|object| u32::from(object.retire(config, Retirement::Finished, sink))).sum()
     }

@@ -47,13 +47,13 @@ pub struct InstancesReport {
 
 impl InstancesReport {
     /// Of a frame, from the reports of its stages. `matches_excluded` is the camera's.
-    pub fn of(tracking: &TrackingReport, objects: ObjectsReport, matches_excluded: u32) -> Self {
+    pub(crate) fn of(tracking: &TrackingReport, objects: ObjectsReport, matches_excluded: u32) -> Self {
         let &TrackingReport { detections, tracks, segmentation, pixels_masked } = tracking;
         Self { detections, segmentation, tracks, objects, matches_excluded, pixels_masked }
     }
 
     /// What should have been used and was not: detections, tracks, masks, objects, their blocks and crops.
-    pub fn refused(&self) -> u32 {
+    pub(crate) fn refused(&self) -> u32 {
         let ObjectsReport { refused, blocks_refused, crops_dropped, .. } = self.objects;
         let segmentation = self.segmentation.refused;
         self.detections.refused() + segmentation + self.tracks.refused + self.tracks.masks_lost + refused + blocks_refused + crops_dropped
@@ -62,12 +62,12 @@ impl InstancesReport {
 
 impl<'s> Objects<'s> {
     /// The report of the last frame: that of the volumes.
-    pub fn report(&self) -> ObjectsReport {
+    pub(crate) fn report(&self) -> ObjectsReport {
         self.report
     }
 
     /// The tracks as they stand, with the blocks of their volumes.
-    pub fn tracks<'a>(&'a self, tracker: &'a Tracker<'_>) -> impl Iterator<Item = TrackReport> + 'a {
+    pub(crate) fn tracks<'a>(&'a self, tracker: &'a Tracker<'_>) -> impl Iterator<Item = TrackReport> + 'a {
         tracker.tracks().map(|track| {
             let object = self.volumes.position_of(track.id).and_then(|at| self.volumes.objects.get(at));
             TrackReport { blocks: object.map_or(0, |object| object.volume.pool().len() as u32), ..track }
@@ -75,7 +75,7 @@ impl<'s> Objects<'s> {
     }
 
     /// The objects that have a volume now.
-    pub fn objects(&self) -> impl Iterator<Item = (&ObjectSummary, &Object<'s>)> {
+    pub(crate) fn objects(&self) -> impl Iterator<Item = (&ObjectSummary, &Object<'s>)> {
         self.volumes.objects.iter().filter_map(|object| Some((object.summary()?, &**object)))
     }
 }

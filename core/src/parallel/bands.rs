@@ -3,32 +3,32 @@
 use super::Executor;
 
 /// Bands there are.
-pub const BANDS: usize = 4;
+pub(crate) const BANDS: usize = 4;
 
 /// First items of the bands, and the end.
 #[derive(Clone, Copy, Debug)]
-pub struct Bands([usize; BANDS + 1]);
+pub(crate) struct Bands([usize; BANDS + 1]);
 
 impl Bands {
     /// Cuts `items` items.
-    pub fn of(items: usize) -> Self {
+    pub(crate) fn of(items: usize) -> Self {
         Self([0, items / 4, items / 2, items / 2 + items / 4, items])
     }
 
     /// First item of each band.
-    pub fn first(self) -> [usize; BANDS] {
+    pub(crate) fn first(self) -> [usize; BANDS] {
         let [a, b, c, d, _] = self.0;
         [a, b, c, d]
     }
 
     /// The bands of items of `stride` values each; what is beyond the items is left out.
-    pub fn split<T>(self, values: &[T], stride: usize) -> [&[T]; BANDS] {
+    pub(crate) fn split<T>(self, values: &[T], stride: usize) -> [&[T]; BANDS] {
         let mut rest = values;
         self.lens(stride).map(|len| rest.split_off(..len.min(rest.len())).unwrap_or_default())
     }
 
     /// As [`Bands::split`], to be written.
-    pub fn split_mut<T>(self, values: &mut [T], stride: usize) -> [&mut [T]; BANDS] {
+    pub(crate) fn split_mut<T>(self, values: &mut [T], stride: usize) -> [&mut [T]; BANDS] {
         let mut rest = values;
         self.lens(stride).map(|len| rest.split_off_mut(..len.min(rest.len())).unwrap_or_default())
     }
@@ -47,12 +47,12 @@ pub fn each<E: Executor, J: Send, R: Send>(executor: &E, [a, b, c, d]: [J; BANDS
 }
 
 /// Two arrays as one of pairs.
-pub fn zip2<A, B>([a, b, c, d]: [A; BANDS], [e, f, g, h]: [B; BANDS]) -> [(A, B); BANDS] {
+pub(crate) fn zip2<A, B>([a, b, c, d]: [A; BANDS], [e, f, g, h]: [B; BANDS]) -> [(A, B); BANDS] {
     [(a, e), (b, f), (c, g), (d, h)]
 }
 
 /// Three arrays as one of triples.
-pub fn zip3<A, B, C>([a, b, c, d]: [A; BANDS], [e, f, g, h]: [B; BANDS], [i, j, k, l]: [C; BANDS]) -> [(A, B, C); BANDS] {
+pub(crate) fn zip3<A, B, C>([a, b, c, d]: [A; BANDS], [e, f, g, h]: [B; BANDS], [i, j, k, l]: [C; BANDS]) -> [(A, B, C); BANDS] {
     [(a, e, i), (b, f, j), (c, g, k), (d, h, l)]
 }
 

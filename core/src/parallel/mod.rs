@@ -7,7 +7,8 @@
 mod bands;
 mod stage;
 
-pub use bands::{BANDS, Bands, each, zip2, zip3};
+pub use bands::each;
+pub(crate) use bands::{BANDS, Bands, zip2, zip3};
 pub use stage::Stage;
 
 /// Runs work for the core.

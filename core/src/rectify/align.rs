@@ -109,7 +109,7 @@ impl RawRig {
     ///
     /// # Errors
     /// See [`RectifyProblem`].
-    pub fn align(&self) -> Result<Alignment, RectifyProblem> {
+    pub(crate) fn align(&self) -> Result<Alignment, RectifyProblem> {
         let r_right_left = rotation(&self.r_right_left)?;
         let to_right = -(r_right_left.transpose() * self.t_right_left_m);
         let baseline_m = libm::sqrt(to_right.dot(&to_right));

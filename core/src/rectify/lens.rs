@@ -177,7 +177,7 @@ impl Lens {
     }
 
     /// Pixels per radian on the optical axis: the focal length of the ideal pinhole that shows the middle at the same scale.
-    pub fn middle_focal_px(&self) -> f64 {
+    pub(crate) fn middle_focal_px(&self) -> f64 {
         const STEP: f64 = 1e-4;
         let middle = self.project([0.0, 0.0, 1.0]).unwrap_or(self.center_px);
         let along = |ray: [f64; 3], axis: fn([f64; 2]) -> f64, otherwise: f64| {

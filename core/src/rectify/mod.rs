@@ -5,7 +5,7 @@
 //! one map a camera, once, in `f64` with `libm`, and remaps each pair in integers.
 //!
 //! **Invalid pixels.** A rectified pixel that no raw pixel covers is not black but invalid, and so are those within
-//! [`INVALID_MARGIN_PX`] of it, whose surroundings are not all there: [`Rectifier::invalid`] has one bit a pixel. Stereo finds no disparity
+//! [`INVALID_MARGIN_PX`] of it, whose surroundings are not all there: `Rectifier::invalid` has one bit a pixel. Stereo finds no disparity
 //! there, scene flow no features, and without depth nothing is fused. [`Sizing::Automatic`] leaves none.
 //!
 //! Memory, from `Capacity`, where it has raw pixels: 4 bytes a rectified pixel and camera for the map, 1 for the image, an eighth for the

@@ -186,12 +186,12 @@ impl<'s> Rectifier<'s> {
     }
 
     /// What is rectified, where anything is.
-    pub fn rectification(&self) -> Option<&Rectification> {
+    pub(crate) fn rectification(&self) -> Option<&Rectification> {
         self.rectification.as_ref()
     }
 
     /// The pixels of both rectified images that are not to be used; `None` where all are.
-    pub fn invalid(&self) -> Option<InvalidPair<'_>> {
+    pub(crate) fn invalid(&self) -> Option<InvalidPair<'_>> {
         let Rectification { width, height, .. } = self.rectification?;
         (self.left.invalid_count + self.right.invalid_count > 0).then_some(())?;
         let [width, height] = [width as usize, height as usize];
@@ -223,14 +223,14 @@ impl<'s> Rectifier<'s> {
     }
 
     /// The grey images, left and right, that the last [`Rectifier::rectify`] left in `images`; `None` without a rectification.
-    pub fn grey<'a>(&self, images: &'a RectifiedImages<'_>) -> Option<[View<'a, u8>; 2]> {
+    pub(crate) fn grey<'a>(&self, images: &'a RectifiedImages<'_>) -> Option<[View<'a, u8>; 2]> {
         let Rectification { width, height, .. } = self.rectification.as_ref()?;
         let [width, height] = [*width as usize, *height as usize];
         Some([View::new(&*images.left, width, height)?, View::new(&*images.right, width, height)?])
     }
 
     /// What is reported of each frame; `None` where nothing is rectified.
-    pub fn report(&self, rectified: &Pair<'_>) -> Option<RectifyReport> {
+    pub(crate) fn report(&self, rectified: &Pair<'_>) -> Option<RectifyReport> {
         self.rectification.as_ref()?;
         let mut digest = Digest::default();
         rectified.left.rows().chain(rectified.right.rows()).for_each(|row| digest.bytes(row));

@@ -127,17 +127,17 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// The sparse pass' matches of the last frame: whole pixels, outliers included.
-    pub fn sparse(&self) -> &[Match] {
+    pub(crate) fn sparse(&self) -> &[Match] {
         self.sparse.get(..self.sparse_len).unwrap_or(&[])
     }
 
     /// The dense pass' matches of the last frame that are supported by their neighbours, refined below the pixel.
-    pub fn refined(&self) -> &[Match] {
+    pub(crate) fn refined(&self) -> &[Match] {
         self.refined.get(..self.refined_len).unwrap_or(&[])
     }
 
     /// Positions in [`FlowMatcher::refined`] of the matches selected for egomotion: the best of each cell, cell by cell.
-    pub fn selection(&self) -> &[u32] {
+    pub(crate) fn selection(&self) -> &[u32] {
         self.selection.get(..self.selection_len).unwrap_or(&[])
     }
 
@@ -149,7 +149,7 @@ impl<'s> FlowMatcher<'s> {
     /// Looks for a scene point where it is expected: the patch around its current left position, a whole pixel, is found again below the
     /// pixel in the other three images. `None` without a frame before, where it is expected outside an image or at no number, and where it is
     /// lost: no texture, or nothing alike within 1.75 px.
-    pub fn find(&self, expected: &Match) -> Option<Match> {
+    pub(crate) fn find(&self, expected: &Match) -> Option<Match> {
         let expected = &expected.with_right(|column| self.correction.uncorrected(column));
         let [width, height] = self.last.filter(|_| self.matched)?;
         let inside = |at: [f32; 2]| at[0] >= 0.0 && at[1] >= 0.0 && at[0] < width as f32 && at[1] < height as f32;
@@ -159,7 +159,7 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Takes a disparity error out of the last frame's matches, and of those found later.
-    pub fn correct(&mut self, correction: ColumnCorrection) {
+    pub(crate) fn correct(&mut self, correction: ColumnCorrection) {
         self.correction = correction;
         for matches in [self.sparse.get_mut(..self.sparse_len), self.refined.get_mut(..self.refined_len)] {
             matches.unwrap_or_default().iter_mut().for_each(|m| *m = m.with_right(|column| correction.corrected(column)));
@@ -172,7 +172,7 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Digest of the last frame's matches: sparse, refined and selected.
-    pub fn digest(&self) -> u64 {
+    pub(crate) fn digest(&self) -> u64 {
         let mut digest = Digest::default();
         for matches in [self.sparse(), self.refined()] {
             digest.u64(matches.len() as u64);
@@ -249,7 +249,7 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// As [`FlowMatcher::push`], for a frame with invalid pixels: no feature is found there.
-    pub fn push_within<E: Executor>(
+    pub(crate) fn push_within<E: Executor>(
         &mut self,
         config: &SceneFlowConfig,
         left: View<'_, u8>,

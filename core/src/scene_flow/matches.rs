@@ -18,12 +18,12 @@ pub struct Match {
 
 impl Match {
     /// Disparity in the previous frame, px.
-    pub fn previous_disparity_px(&self) -> f32 {
+    pub(crate) fn previous_disparity_px(&self) -> f32 {
         self.previous_left[0] - self.previous_right[0]
     }
 
     /// Disparity in the current frame, px.
-    pub fn current_disparity_px(&self) -> f32 {
+    pub(crate) fn current_disparity_px(&self) -> f32 {
         self.current_left[0] - self.current_right[0]
     }
 
@@ -38,7 +38,7 @@ impl Match {
     }
 
     /// Movement in the left image, px.
-    pub fn flow_px(&self) -> [f32; 2] {
+    pub(crate) fn flow_px(&self) -> [f32; 2] {
         [self.current_left[0] - self.previous_left[0], self.current_left[1] - self.previous_left[1]]
     }
 }

@@ -132,7 +132,7 @@ impl<'s> StereoMatcher<'s> {
 
     /// As [`StereoMatcher::compute`], for a pair with invalid pixels: they get no disparity, nor do those whose partner in the
     /// right image is one of them.
-    pub fn compute_within<E: Executor>(
+    pub(crate) fn compute_within<E: Executor>(
         &mut self,
         config: &StereoConfig,
         left: View<'_, u8>,
@@ -195,7 +195,7 @@ impl<'s> StereoMatcher<'s> {
 
     /// Takes disparities from elsewhere (1/256 px, 0 none) in place of a pair's own. Of an image larger than the capacity, which the mapper
     /// refuses, what fits is taken.
-    pub fn take(&mut self, disparity_q8: View<'_, u16>) -> StereoReport {
+    pub(crate) fn take(&mut self, disparity_q8: View<'_, u16>) -> StereoReport {
         self.width = disparity_q8.width().min(self.image_width).max(1);
         self.height = disparity_q8.height().min(self.image_height).max(1);
         self.disparity.fill(0);
@@ -218,7 +218,7 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Takes a disparity error out of the last pair's disparities, whichever way they came.
-    pub fn correct<E: Executor>(&mut self, correction: ColumnCorrection, executor: &E) {
+    pub(crate) fn correct<E: Executor>(&mut self, correction: ColumnCorrection, executor: &E) {
         let (width, height) = (self.width, self.height);
         each(executor, Bands::of(height).split_mut(self.disparity, width), |rows: &mut [u16]| {
             rows.chunks_exact_mut(width.max(1)).for_each(|row| correction.correct_row(row));

@@ -26,7 +26,7 @@ const RIM_PX: i32 = 5;
 
 /// Where more matches are searched for.
 #[derive(Clone, Copy, Debug)]
-pub struct GuidedMatching<'a, 's> {
+pub(crate) struct GuidedMatching<'a, 's> {
     /// The images of this pair and the last.
     pub matcher: &'a FlowMatcher<'s>,
     /// Disparity of the current left image, 1/256 px, 0 none.

@@ -59,7 +59,7 @@ impl From<MatchOwner> for OwnerCode {
 
 /// The matches of a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct FrameMatches<'m> {
+pub(crate) struct FrameMatches<'m> {
     /// Refined below the pixel.
     pub refined: &'m [Match],
     /// Of other features, at whole pixels.

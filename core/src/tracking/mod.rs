@@ -3,13 +3,13 @@
 //!
 //! A frame passes through these values, each made from the one before:
 //!
-//! 1. [`Tracker::detect`] -> [`Detected`]: detections are validated, their masks packed, and associated with tracks;
-//! 2. [`Detected::assign_matches`] -> [`Assigned`]: each match of the scene flow is assigned to the instance it lies on;
-//!    [`Assigned::egomotion_mask`] then tells which matches the camera's egomotion may use, and with its motion
-//!    [`Assigned::segment_motion`] adds instances of what moves and no detector found;
-//! 3. [`Assigned::estimate_motions`] -> [`Tracked`]: each track's motion, state and pose;
-//!    [`Tracked::mask_dynamic_depth`] removes the depth under every delete mask, also where an object missed for a frame is predicted;
-//! 4. [`Tracked::commit`]: masks are kept for the next frame.
+//! 1. `Tracker::detect` -> `Detected`: detections are validated, their masks packed, and associated with tracks;
+//! 2. `Detected::assign_matches` -> `Assigned`: each match of the scene flow is assigned to the instance it lies on;
+//!    `Assigned::egomotion_mask` then tells which matches the camera's egomotion may use, and with its motion
+//!    `Assigned::segment_motion` adds instances of what moves and no detector found;
+//! 3. `Assigned::estimate_motions` -> `Tracked`: each track's motion, state and pose;
+//!    `Tracked::mask_dynamic_depth` removes the depth under every delete mask, also where an object missed for a frame is predicted;
+//! 4. `Tracked::commit`: masks are kept for the next frame.
 //!
 //! # Motion over ground
 //!
@@ -27,7 +27,7 @@
 //!
 //! Those whose current left keypoint lies under the delete mask (and under no other's copy mask) and whose previous one lay in the
 //! track's previous mask: the matches refined below the pixel and, where these are fewer than `matches_enough`, sparse ones of other
-//! features, which are found also where few neighbours move alike, and those of guided matching ([`GuidedMatching`]). At least
+//! features, which are found also where few neighbours move alike, and those of guided matching (`GuidedMatching`). At least
 //! `matches_min` the first time, at least `matches_again` once a motion is known. The estimator removes the outliers, starting from
 //! the last motion, with random samples of its own for each track and frame; the filter ([`MotionConfig`]) averages over frames.
 //!
@@ -67,14 +67,16 @@ pub use association::TrackCount;
 pub use class::{Class, Treatment};
 pub use config::{MotionConfig, Overlap, StateConfig, TrackingConfig};
 pub use detection::{Detection, DetectionCount, MAX_DETECTIONS};
-pub use egomotion_mask::{CameraMotion, EgomotionMask};
-pub use guided_matching::GuidedMatching;
+pub(crate) use egomotion_mask::{CameraMotion, EgomotionMask};
+pub(crate) use guided_matching::GuidedMatching;
 pub use instance_at::InstanceAt;
-pub use match_assignment::FrameMatches;
+pub(crate) use match_assignment::FrameMatches;
 pub use motion_segmentation::{SegmentationConfig, SegmentationReport};
-pub use motion_state::{MotionEvidence, MotionState};
+#[cfg(test)]
+pub(crate) use motion_state::MotionEvidence;
+pub use motion_state::MotionState;
 pub use report::{TrackReport, TrackingReport};
-pub use stages::{Assigned, Detected, Tracked};
+pub(crate) use stages::Tracked;
 
 pub(crate) use instance::Instance;
 pub(crate) use track::Track;
@@ -93,7 +95,7 @@ use motions::MotionInput;
 
 /// Instances and tracks.
 #[derive(Debug)]
-pub struct Tracker<'s> {
+pub(crate) struct Tracker<'s> {
     config: TrackingConfig,
     masks: TwoFrames<MaskStore<'s>>,
     instances: Instances<'s>,
@@ -112,7 +114,7 @@ pub struct Tracker<'s> {
 
 impl<'s> Tracker<'s> {
     /// Bytes of the slab.
-    pub const fn bytes(capacity: &Capacity) -> usize {
+    pub(crate) const fn bytes(capacity: &Capacity) -> usize {
         2 * region_bytes::<u64>(capacity.mask_words)
             + Instances::bytes(capacity)
             + TrackTable::bytes(capacity)
@@ -122,7 +124,7 @@ impl<'s> Tracker<'s> {
     }
 
     /// Allocates its regions.
-    pub fn new_in(capacity: &Capacity, config: &TrackingConfig, carver: &mut Carver<'s>) -> Self {
+    pub(crate) fn new_in(capacity: &Capacity, config: &TrackingConfig, carver: &mut Carver<'s>) -> Self {
         Self {
             config: *config,
             masks: TwoFrames::new([
@@ -185,7 +187,7 @@ impl<'s> Tracker<'s> {
     }
 
     /// Adds what is in use to a footprint.
-    pub fn note_use(&self, footprint: &mut Footprint) {
+    pub(crate) fn note_use(&self, footprint: &mut Footprint) {
         footprint.set_use::<Track>("tracking.track", self.tracks.all().len(), self.tracks.all().len());
     }
 }

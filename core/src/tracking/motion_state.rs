@@ -62,7 +62,7 @@ impl MotionState {
 
 /// What a frame measures of an object's speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotionEvidence {
+pub(crate) struct MotionEvidence {
     /// Speed over ground, m/s.
     pub speed_m_s: f32,
     /// Its error along the direction of motion, one sigma, m/s.

@@ -9,7 +9,7 @@ use crate::{
 
 impl<'s> Tracker<'s> {
     /// Begins frame `frame` of images of that size: validates its detections and associates them with tracks.
-    pub fn detect(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) -> Detected<'_, 's> {
+    pub(crate) fn detect(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) -> Detected<'_, 's> {
         self.ingest(frame, detections, size);
         Detected { tracker: self }
     }
@@ -18,13 +18,13 @@ impl<'s> Tracker<'s> {
 /// A frame's detections are associated with tracks.
 #[derive(Debug)]
 #[must_use]
-pub struct Detected<'t, 's> {
+pub(crate) struct Detected<'t, 's> {
     tracker: &'t mut Tracker<'s>,
 }
 
 impl<'t, 's> Detected<'t, 's> {
     /// Assigns the matches of the scene flow to instances.
-    pub fn assign_matches<'m>(self, matches: FrameMatches<'m>) -> Assigned<'t, 'm, 's> {
+    pub(crate) fn assign_matches<'m>(self, matches: FrameMatches<'m>) -> Assigned<'t, 'm, 's> {
         self.tracker.assign_matches(&matches);
         Assigned { tracker: self.tracker, matches }
     }
@@ -33,25 +33,25 @@ impl<'t, 's> Detected<'t, 's> {
 /// Its matches are assigned to instances as well.
 #[derive(Debug)]
 #[must_use]
-pub struct Assigned<'t, 'm, 's> {
+pub(crate) struct Assigned<'t, 'm, 's> {
     tracker: &'t mut Tracker<'s>,
     matches: FrameMatches<'m>,
 }
 
 impl<'t, 's> Assigned<'t, '_, 's> {
     /// Which matches the camera's own motion may be estimated from.
-    pub fn egomotion_mask(&self) -> EgomotionMask<'_, 's> {
+    pub(crate) fn egomotion_mask(&self) -> EgomotionMask<'_, 's> {
         self.tracker.egomotion_mask(self.matches.refined)
     }
 
     /// Adds instances of what moves and no detector found, if that is asked for ([`super::SegmentationConfig`]).
-    pub fn segment_motion(self, rig: &StereoRig, camera: &CameraMotion, disparity_q8: View<'_, u16>) -> Self {
+    pub(crate) fn segment_motion(self, rig: &StereoRig, camera: &CameraMotion, disparity_q8: View<'_, u16>) -> Self {
         self.tracker.segment_motion(rig, camera, &self.matches, disparity_q8);
         self
     }
 
     /// Estimates each track's motion, state and pose. `search` is where more matches are searched for on objects that have few.
-    pub fn estimate_motions(
+    pub(crate) fn estimate_motions(
         self,
         rig: &StereoRig,
         camera: &CameraMotion,
@@ -73,7 +73,7 @@ pub struct Tracked<'t, 's> {
 
 impl<'s> Tracked<'_, 's> {
     /// Sets the depth of what moves or may move to 0, so that the static map does not get it.
-    pub fn mask_dynamic_depth(&mut self, depth_m: &mut ViewMut<'_, f32>) {
+    pub(crate) fn mask_dynamic_depth(&mut self, depth_m: &mut ViewMut<'_, f32>) {
         self.tracker.report.pixels_masked = self.tracker.mask_dynamic_depth(depth_m);
     }
 
@@ -83,7 +83,7 @@ impl<'s> Tracked<'_, 's> {
     }
 
     /// Ends the frame: masks are kept for the next one.
-    pub fn commit(self) -> TrackingReport {
+    pub(crate) fn commit(self) -> TrackingReport {
         self.tracker.commit();
         self.tracker.report
     }

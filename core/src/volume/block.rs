@@ -14,7 +14,7 @@ pub const BLOCK_SIDE: usize = 8;
 pub const BLOCK_VOXELS: usize = BLOCK_SIDE * BLOCK_SIDE * BLOCK_SIDE;
 
 /// Lattice points of a block with one z.
-pub(crate) const LAYER_VOXELS: usize = BLOCK_SIDE * BLOCK_SIDE;
+pub const LAYER_VOXELS: usize = BLOCK_SIDE * BLOCK_SIDE;
 /// One value for each of them.
 pub(crate) type Layer<T> = [T; LAYER_VOXELS];
 
@@ -41,12 +41,12 @@ impl BlockCoord {
     }
 
     /// The block `offset` blocks away; `None` beyond the map.
-    pub fn offset(self, offset: [i32; 3]) -> Option<Self> {
+    pub(crate) fn offset(self, offset: [i32; 3]) -> Option<Self> {
         Self::new(i32::from(self.x) + offset[0], i32::from(self.y) + offset[1], i32::from(self.z) + offset[2])
     }
 
     /// The first lattice point of the block.
-    pub fn origin(self) -> [i32; 3] {
+    pub(crate) fn origin(self) -> [i32; 3] {
         [self.x, self.y, self.z].map(|c| i32::from(c) * BLOCK_SIDE as i32)
     }
 }
@@ -77,7 +77,7 @@ pub(super) fn colour_layer_mut(colour: &mut Colour, z: usize) -> Option<[&mut La
 
 /// 64 bytes of 0 or 1 as bits, the first lowest.
 #[inline]
-pub(crate) fn packed(flags: &Layer<u8>) -> u64 {
+pub fn packed(flags: &Layer<u8>) -> u64 {
     let mut bits = 0;
     for (row, flags) in (0u32..).zip(flags.as_chunks::<BLOCK_SIDE>().0) {
         // The factor moves byte i to bit 56 + i; no two products meet in one bit, so nothing carries.
@@ -127,12 +127,12 @@ pub struct Blocks<'s> {
 
 impl<'s> Blocks<'s> {
     /// Bytes of the slab.
-    pub const fn bytes(blocks: usize, colour: bool) -> usize {
+    pub(crate) const fn bytes(blocks: usize, colour: bool) -> usize {
         region_bytes::<Header>(blocks) + region_bytes::<Voxels>(blocks) + if colour { region_bytes::<Colour>(blocks) } else { 0 }
     }
 
     /// Cuts the memory of `capacity.blocks` blocks.
-    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub(crate) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
             header: carver.alloc("volume.header", capacity.blocks),
             voxels: carver.alloc_as_found("volume.voxels", capacity.blocks),

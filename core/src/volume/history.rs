@@ -33,14 +33,14 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// Bytes of the slab.
-    pub const fn bytes(capacity: &Capacity) -> usize {
+    pub(crate) const fn bytes(capacity: &Capacity) -> usize {
         region_bytes::<u64>(capacity.history_frames * Self::words(capacity))
             + region_bytes::<u64>(Self::words(capacity))
             + region_bytes::<u32>(capacity.blocks)
     }
 
     /// Cuts an empty history.
-    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub(crate) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let words = Self::words(capacity);
         Self {
             sets: carver.alloc("volume.history", capacity.history_frames * words),
@@ -54,7 +54,7 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// Frames the ring can hold.
-    pub fn capacity(&self) -> usize {
+    pub(crate) fn capacity(&self) -> usize {
         self.sets.len().checked_div(self.words).unwrap_or(0)
     }
 
@@ -68,9 +68,9 @@ impl<'s> VisibleHistory<'s> {
         self.len == 0
     }
 
-    /// The most frames ever in the ring.
-    pub fn peak(&self) -> usize {
-        self.peak
+    /// Words of the ring in use now and at most ever.
+    pub(super) fn words_in_use(&self) -> [usize; 2] {
+        [self.len * self.words, self.peak * self.words]
     }
 
     /// Notes that the block in `slot` was made in `frame`.
@@ -144,7 +144,7 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// The oldest frame in the ring.
-    pub fn oldest(&self) -> Option<u32> {
+    pub(crate) fn oldest(&self) -> Option<u32> {
         (self.len > 0).then_some(self.oldest)
     }
 
@@ -169,7 +169,7 @@ impl<'s> VisibleHistory<'s> {
     }
 
     /// Slots that are due and wait for a later frame.
-    pub fn due(&self) -> u32 {
+    pub(crate) fn due(&self) -> u32 {
         self.due.iter().map(|word| word.count_ones()).sum()
     }
 

@@ -3,7 +3,7 @@
 //! Space is a lattice of points `voxel_size_m` apart; lattice point (i, j, k) lies at `voxel_size_m * (i, j, k)` in the map's frame.
 //! 8 x 8 x 8 of them are a block. Each point keeps a signed distance, how often it was seen and, where the profile has it, a colour.
 //! A depth image is fused in two steps: blocks within the truncation of its surface are made ([`Volume::allocate`]), then every visible
-//! block is updated by integer averages ([`Volume::fuse`]); what was visible a fixed lag ago is rid of noise ([`Volume::prune`]).
+//! block is updated by integer averages ([`Volume::fuse`]); what was visible a fixed lag ago is rid of noise (`Volume::prune`).
 
 mod allocate;
 pub(crate) mod block;
@@ -31,7 +31,7 @@ pub use history::VisibleHistory;
 pub use index::BlockIndex;
 pub use pool::{Full, Slot, SlotPool};
 pub use prune::PruneReport;
-pub use recency::Recency;
+pub(crate) use recency::Recency;
 pub use sampler::{Sampler, VoxelSample};
 pub use store::{BlockStore, EvictedBlock, EvictionReport, LoadedBlock, NoStore};
 pub use viewpoint::Viewpoint;
@@ -106,7 +106,7 @@ impl<'s> Volume<'s> {
     }
 
     /// The block at `coord`.
-    pub fn find(&self, coord: BlockCoord) -> Option<Slot> {
+    pub(crate) fn find(&self, coord: BlockCoord) -> Option<Slot> {
         self.index.find(coord, |slot| self.blocks.coord(slot))
     }
 
@@ -116,7 +116,7 @@ impl<'s> Volume<'s> {
     }
 
     /// Digest of the coordinates and contents of all blocks, in any order they were made: the wrapping sum of theirs.
-    pub fn digest(&self) -> u64 {
+    pub(crate) fn digest(&self) -> u64 {
         self.digest
     }
 
@@ -132,11 +132,13 @@ impl<'s> Volume<'s> {
     }
 
     /// Enters what is in use into a footprint.
-    pub fn note_use(&self, footprint: &mut Footprint) {
+    pub(crate) fn note_use(&self, footprint: &mut Footprint) {
         let (now, peak) = (self.pool.len(), self.pool.peak());
         footprint.set_use::<block::Header>("volume.header", now, peak);
         footprint.set_use::<block::Voxels>("volume.voxels", now, peak);
         footprint.set_use::<block::Colour>("volume.colour", now, peak);
+        let [history, history_peak] = self.history.words_in_use();
+        footprint.set_use::<u64>("volume.history", history, history_peak);
         footprint.set_use::<Slot>("volume.visible", self.visible.slots().len(), self.visible.peak());
     }
 }

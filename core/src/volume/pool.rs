@@ -59,12 +59,12 @@ pub struct SlotPool<'s> {
 
 impl<'s> SlotPool<'s> {
     /// Bytes of the slab for `slots` slots.
-    pub const fn bytes(slots: usize) -> usize {
+    pub(crate) const fn bytes(slots: usize) -> usize {
         region_bytes::<u64>(slots.div_ceil(64)) + region_bytes::<Slot>(slots)
     }
 
     /// Cuts a pool of `slots` slots. `names` are those of its two regions: taken slots, free list.
-    pub fn new_in(carver: &mut Carver<'s>, slots: usize, names: [&'static str; 2]) -> Self {
+    pub(crate) fn new_in(carver: &mut Carver<'s>, slots: usize, names: [&'static str; 2]) -> Self {
         let [live, free_list] = names;
         Self {
             live: carver.alloc(live, slots.div_ceil(64)),
@@ -76,7 +76,7 @@ impl<'s> SlotPool<'s> {
     }
 
     /// Slots in all.
-    pub fn capacity(&self) -> usize {
+    pub(crate) fn capacity(&self) -> usize {
         self.freed.len()
     }
 
@@ -86,17 +86,17 @@ impl<'s> SlotPool<'s> {
     }
 
     /// Whether no slot is taken.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// Whether every slot is taken.
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.len() == self.capacity()
     }
 
     /// The most slots ever taken at once.
-    pub fn peak(&self) -> usize {
+    pub(crate) fn peak(&self) -> usize {
         self.peak
     }
 
@@ -106,7 +106,7 @@ impl<'s> SlotPool<'s> {
     }
 
     /// Takes a slot.
-    pub fn take(&mut self) -> Result<Slot, Full> {
+    pub(crate) fn take(&mut self) -> Result<Slot, Full> {
         let slot = if let Some(last) = self.freed_len.checked_sub(1) {
             let slot = *self.freed.get(last).ok_or(Full)?;
             self.freed_len = last;
@@ -126,7 +126,7 @@ impl<'s> SlotPool<'s> {
     }
 
     /// Gives a slot back, which must be taken.
-    pub fn free(&mut self, slot: Slot) {
+    pub(crate) fn free(&mut self, slot: Slot) {
         debug_assert!(self.is_live(slot), "a slot is freed once");
         if self.is_live(slot)
             && let Some(entry) = self.freed.get_mut(self.freed_len)
@@ -138,7 +138,7 @@ impl<'s> SlotPool<'s> {
     }
 
     /// Whether a slot is taken.
-    pub fn is_live(&self, slot: Slot) -> bool {
+    pub(crate) fn is_live(&self, slot: Slot) -> bool {
         self.live.get(slot.index() / 64).is_some_and(|word| word >> (slot.0 % 64) & 1 == 1)
     }
 
@@ -149,7 +149,7 @@ impl<'s> SlotPool<'s> {
     }
 
     /// The first slot at or after position `from` that is taken: a walk that may free slots on its way.
-    pub fn next_live(&self, from: u32) -> Option<Slot> {
+    pub(crate) fn next_live(&self, from: u32) -> Option<Slot> {
         let first = from / 64;
         let words = (first..).zip(self.live.iter().skip(first as usize));
         words.map(|(i, &word)| (i, if i == first { word & u64::MAX << (from % 64) } else { word })).find_map(|(i, word)| {

@@ -34,7 +34,7 @@ impl PruneReport {
 
 impl Volume<'_> {
     /// Remembers what is visible in this frame and prunes what was visible `prune_lag` frames ago.
-    pub fn prune(&mut self) -> PruneReport {
+    pub(crate) fn prune(&mut self) -> PruneReport {
         let mut report = PruneReport::default();
         if self.config.prune_weight == 0 {
             return report;
@@ -52,7 +52,7 @@ impl Volume<'_> {
     }
 
     /// Prunes everything still in the window, as at the end of a run.
-    pub fn finish(&mut self) -> PruneReport {
+    pub(crate) fn finish(&mut self) -> PruneReport {
         let mut report = PruneReport::default();
         while self.history.expire().is_some() {}
         self.visit_due(u32::MAX, &mut report);

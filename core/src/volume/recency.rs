@@ -8,7 +8,7 @@ use crate::state::Visitor;
 
 /// The list. Links are slot + 1; 0 is none.
 #[derive(Debug)]
-pub struct Recency<'s> {
+pub(crate) struct Recency<'s> {
     /// Towards blocks unseen for longer, and towards those seen later.
     links: &'s mut [[u32; 2]],
     /// Slot + 1 of the block unseen for longest and of the one seen last.
@@ -25,17 +25,17 @@ const NEWER: usize = 1;
 
 impl<'s> Recency<'s> {
     /// Bytes of the slab.
-    pub const fn bytes(blocks: usize) -> usize {
+    pub(crate) const fn bytes(blocks: usize) -> usize {
         region_bytes::<[u32; 2]>(blocks)
     }
 
     /// Cuts an empty list for `blocks` slots.
-    pub fn new_in(blocks: usize, carver: &mut Carver<'s>) -> Self {
+    pub(crate) fn new_in(blocks: usize, carver: &mut Carver<'s>) -> Self {
         Self { links: carver.alloc("volume.recency", blocks), ends: [0; 2] }
     }
 
     /// The slot unseen for longest.
-    pub fn oldest(&self) -> Option<Slot> {
+    pub(crate) fn oldest(&self) -> Option<Slot> {
         self.ends[OLDER].checked_sub(1).map(Slot::new)
     }
 

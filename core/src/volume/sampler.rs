@@ -21,13 +21,13 @@ pub struct Sampler<'v, 's> {
 
 impl<'v, 's> Sampler<'v, 's> {
     /// A reader of the map made of `index` and `blocks`.
-    pub fn new(index: &'v BlockIndex<'s>, blocks: &'v Blocks<'s>) -> Self {
+    pub(super) fn new(index: &'v BlockIndex<'s>, blocks: &'v Blocks<'s>) -> Self {
         Self { index, blocks, last: None }
     }
 
     /// The slot of a block, if the block exists.
     #[inline]
-    pub fn slot(&mut self, coord: BlockCoord) -> Option<Slot> {
+    fn slot(&mut self, coord: BlockCoord) -> Option<Slot> {
         match self.last {
             Some((last, slot)) if last == coord => slot,
             _ => {

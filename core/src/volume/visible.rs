@@ -23,12 +23,12 @@ pub struct VisibleList<'s> {
 
 impl<'s> VisibleList<'s> {
     /// Bytes of the slab.
-    pub const fn bytes(capacity: &Capacity) -> usize {
+    pub(crate) const fn bytes(capacity: &Capacity) -> usize {
         2 * region_bytes::<Slot>(capacity.visible_blocks) + region_bytes::<u32>(capacity.blocks)
     }
 
     /// Cuts the lists.
-    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+    pub(crate) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
             slots: carver.alloc("volume.visible", capacity.visible_blocks),
             len: 0,
@@ -122,7 +122,7 @@ impl<'s> VisibleList<'s> {
     }
 
     /// The most entries a frame ever had.
-    pub fn peak(&self) -> usize {
+    pub(crate) fn peak(&self) -> usize {
         self.peak
     }
 }

@@ -104,7 +104,7 @@ impl IcpReport {
     }
 
     /// The motion, where there is one to follow.
-    pub fn motion(&self) -> Option<Transform> {
+    pub(crate) fn motion(&self) -> Option<Transform> {
         (self.status == IcpStatus::Tracked).then_some(self.t_current_previous)
     }
 }

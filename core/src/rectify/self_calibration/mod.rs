@@ -107,9 +107,9 @@ impl SelfCalibrationReport {
     }
 
     /// Offset that is worth a warning, px.
-    pub const WARNING_PX: f64 = 0.3;
+    pub(crate) const WARNING_PX: f64 = 0.3;
     /// Offset that asks for a new calibration, px.
-    pub const RECALIBRATE_PX: f64 = 1.0;
+    pub(crate) const RECALIBRATE_PX: f64 = 1.0;
 
     /// The correction as it was found; `None` while too little is known.
     pub fn found(&self) -> Option<DisparityCorrection> {
@@ -136,7 +136,7 @@ impl SelfCalibrationReport {
 
 /// Finds the rig's disparity error.
 #[derive(Clone, Debug)]
-pub struct SelfCalibration {
+pub(crate) struct SelfCalibration {
     mode: SelfCalibrationMode,
     /// Where the search began.
     start: DisparityCorrection,
@@ -150,7 +150,7 @@ pub struct SelfCalibration {
 
 impl SelfCalibration {
     /// Before the first frame.
-    pub fn new(config: &RigConfig) -> Self {
+    pub(crate) fn new(config: &RigConfig) -> Self {
         let start = config.disparity_correction;
         Self {
             mode: config.self_calibration,
@@ -164,14 +164,14 @@ impl SelfCalibration {
     }
 
     /// What is to be added to the next frame's disparities.
-    pub fn correction(&self) -> DisparityCorrection {
+    pub(crate) fn correction(&self) -> DisparityCorrection {
         self.applied
     }
 
     /// Learns from a frame: what both cameras saw before and see now, corrected as
     /// [`SelfCalibration::correction`] says, in a stated order, and the motion in between as found
     /// from them. Observations no motion explains may be among them.
-    pub fn update<O>(&mut self, rig: &StereoRig, observations: O, t_current_previous: &Transform)
+    pub(crate) fn update<O>(&mut self, rig: &StereoRig, observations: O, t_current_previous: &Transform)
     where
         O: IntoIterator<Item = [StereoObservation; 2]>,
     {
@@ -236,7 +236,7 @@ impl SelfCalibration {
     }
 
     /// What is known.
-    pub fn report(&self) -> SelfCalibrationReport {
+    pub(crate) fn report(&self) -> SelfCalibrationReport {
         if self.mode == SelfCalibrationMode::Off {
             return SelfCalibrationReport { applied_offset_px: self.applied.offset_px, ..SelfCalibrationReport::default() };
         }
@@ -254,12 +254,6 @@ impl SelfCalibration {
             known: is_certain || obvious,
             corrected: self.mode == SelfCalibrationMode::Apply,
         }
-    }
-
-    /// The correction as it was found, to begin another run with; while nothing is known, what this
-    /// one began with.
-    pub fn found(&self) -> DisparityCorrection {
-        self.report().found().unwrap_or(self.start)
     }
 
     fn offset_prior(&self) -> Prior<1> {

@@ -5,7 +5,7 @@ use crate::{
     geometry::Transform,
     memory::SLAB_ALIGN,
     random::Random,
-    tracking::{Detected, Detection, TrackReport, TrackingConfig},
+    tracking::{Detection, TrackReport, TrackingConfig, stages::Detected},
 };
 use std::{vec, vec::Vec};
 

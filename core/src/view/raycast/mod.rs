@@ -182,7 +182,7 @@ impl<'s> Raycaster<'s> {
     /// Adds another map to the picture, of the same size and seen with the same rig; `view` is the camera's place in that map's own frame.
     /// Where the map is nearer than what is there it is shown, and [`Self::layer`] is `layer`. The report counts these pixels. After an
     /// error the picture is as it was.
-    pub fn cast_over<E: Executor>(
+    pub(crate) fn cast_over<E: Executor>(
         &mut self,
         volume: &Volume<'_>,
         view: &Viewpoint,
@@ -264,7 +264,7 @@ impl<'s> Raycaster<'s> {
     }
 
     /// Enters what was in use at most into a footprint.
-    pub fn note_use(&self, footprint: &mut Footprint) {
+    pub(crate) fn note_use(&self, footprint: &mut Footprint) {
         let (now, peak) = (self.surface.len(), self.peak_blocks);
         footprint.set_use::<[i32; 3]>("raycast.local", now, peak);
         footprint.set_use::<[Slot; 8]>("raycast.slots", now, peak);
