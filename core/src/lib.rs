@@ -23,6 +23,7 @@ pub mod masks;
 pub mod memory;
 pub mod objects;
 pub mod parallel;
+mod part;
 pub mod problem;
 pub mod random;
 pub mod rectify;

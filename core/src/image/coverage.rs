@@ -1,5 +1,7 @@
 //! Which pixels of an image show anything.
 
+use crate::part::part;
+
 /// Pixels a word has bits for.
 const WORD: usize = 64;
 
@@ -34,7 +36,7 @@ impl<'a> InvalidPixels<'a> {
     /// The columns of row `v` that are not to be used, from left to right.
     pub(crate) fn in_row(&self, v: usize) -> impl Iterator<Item = usize> + use<'a> {
         let row = Self::words_a_row(self.width);
-        let words = self.words.get(v * row..(v + 1) * row).unwrap_or(&[]);
+        let words = part(self.words, v * row..(v + 1) * row);
         words.iter().enumerate().flat_map(|(at, &word)| Bits(word).map(move |bit| at * WORD + bit))
     }
 }

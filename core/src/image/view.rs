@@ -1,5 +1,7 @@
 //! Row-major image views over borrowed slices.
 
+use crate::part::part;
+
 /// A read-only image. Rows are `stride` items apart.
 ///
 /// ```
@@ -80,12 +82,12 @@ impl<'a, T> View<'a, T> {
         if v >= self.height {
             return &[];
         }
-        self.data.get(v * self.stride..v * self.stride + self.width).unwrap_or(&[])
+        part(self.data, v * self.stride..v * self.stride + self.width)
     }
 
     /// The pixels row by row, of an image without padding; empty for one with.
     pub fn pixels(&self) -> &'a [T] {
-        if self.stride == self.width { self.data.get(..self.width * self.height).unwrap_or(&[]) } else { &[] }
+        if self.stride == self.width { part(self.data, ..self.width * self.height) } else { &[] }
     }
 
     /// The pixels from the first on, and how many items apart rows are.
@@ -96,7 +98,7 @@ impl<'a, T> View<'a, T> {
     /// All rows, top to bottom.
     pub fn rows(&self) -> impl Iterator<Item = &'a [T]> + use<'a, T> {
         let this = (self.data, self.width, self.stride);
-        (0..self.height).map(move |v| this.0.get(v * this.2..v * this.2 + this.1).unwrap_or(&[]))
+        (0..self.height).map(move |v| part(this.0, v * this.2..v * this.2 + this.1))
     }
 }
 

@@ -2,7 +2,10 @@
 //! the image, so that two masks meet word by word.
 
 use super::{PixelBox, pixel_box::share};
-use crate::state::Visitor;
+use crate::{
+    part::{part, part_mut},
+    state::Visitor,
+};
 use bytemuck::{Pod, Zeroable};
 
 /// Pixels in a word.
@@ -62,7 +65,7 @@ impl<'s> MaskStore<'s> {
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { words, used } = self;
         visitor.count(used, words.len());
-        visitor.u64s(words.get_mut(..*used).unwrap_or(&mut []));
+        visitor.u64s(part_mut(words, ..*used));
     }
 
     /// Forgets all masks.
@@ -91,8 +94,8 @@ impl<'s> MaskStore<'s> {
             return (mask, true);
         }
         let Some(to) = self.alloc(mask.pixels) else { return (MaskHandle::full(mask.pixels), false) };
-        let words = from.words.get(mask.start as usize..).unwrap_or(&[]);
-        let copy = self.words.get_mut(to.start as usize..self.used).unwrap_or(&mut []);
+        let words = part(from.words, mask.start as usize..);
+        let copy = part_mut(self.words, to.start as usize..self.used);
         copy.iter_mut().zip(words).for_each(|(to, from)| *to = *from);
         (to, true)
     }
@@ -104,7 +107,7 @@ impl<'s> MaskStore<'s> {
             return &[];
         }
         let start = mask.start as usize + row as usize * mask.stride as usize;
-        self.words.get(start..start + mask.stride as usize).unwrap_or(&[])
+        part(self.words, start..start + mask.stride as usize)
     }
 
     fn row_mut(&mut self, mask: &MaskHandle, v: i32) -> &mut [u64] {
@@ -113,7 +116,7 @@ impl<'s> MaskStore<'s> {
             return &mut [];
         }
         let start = mask.start as usize + row as usize * mask.stride as usize;
-        self.words.get_mut(start..start + mask.stride as usize).unwrap_or(&mut [])
+        part_mut(self.words, start..start + mask.stride as usize)
     }
 
     /// Whether a pixel of the image belongs to the mask.
@@ -174,7 +177,7 @@ impl<'s> MaskStore<'s> {
             return mask.pixels.area();
         }
         let end = mask.start as usize + mask.stride as usize * mask.pixels.height.max(0) as usize;
-        let words = self.words.get(mask.start as usize..end).unwrap_or(&[]);
+        let words = part(self.words, mask.start as usize..end);
         words.iter().map(|word| i64::from(word.count_ones())).sum()
     }
 

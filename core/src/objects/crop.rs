@@ -14,6 +14,7 @@ use crate::{
     image::View,
     masks::{MaskHandle, MaskStore, PixelBox},
     memory::{Capacity, Carver, region_bytes},
+    part::{part, part_mut},
     state::Visitor,
 };
 use bytemuck::{Pod, Zeroable};
@@ -232,7 +233,7 @@ impl<'s> Crops<'s> {
 
     /// The crops of a track, oldest first.
     pub fn of(&self, id: u32) -> impl Iterator<Item = (&Crop, &[u16], Picture<'_>)> {
-        let entries = self.entries.get(..self.len).unwrap_or(&[]);
+        let entries = part(self.entries, ..self.len);
         entries.iter().filter(move |crop| crop.id == id).filter_map(|crop| {
             let (disparity_q8, picture) = self.picture(crop)?;
             Some((crop, disparity_q8, picture))
@@ -272,10 +273,10 @@ impl<'s> Crops<'s> {
                 return;
             }
             visitor.content(crop.digest, |visitor| {
-                visitor.u16s(disparity_q8.get_mut(span.clone()).unwrap_or(&mut []));
-                visitor.bytes(grey.get_mut(span.clone()).unwrap_or(&mut []));
+                visitor.u16s(part_mut(disparity_q8, span.clone()));
+                visitor.bytes(part_mut(grey, span.clone()));
                 if crop.coloured > 0 {
-                    visitor.bytes(colour.get_mut(span).unwrap_or(&mut []).as_flattened_mut());
+                    visitor.bytes(part_mut(colour, span).as_flattened_mut());
                 }
             });
         }

@@ -12,6 +12,7 @@ use crate::{
     image::{InvalidPair, InvalidPixels, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, each, zip2},
+    part::part_mut,
 };
 
 /// Why a rectification does not fit a capacity.
@@ -177,7 +178,7 @@ impl<'s> Rectifier<'s> {
             return Err(RectifierError::RectifiedTooLarge { width: image_width, height: image_height });
         }
         for (camera, turned) in [(&mut self.left, &rectification.left), (&mut self.right, &rectification.right)] {
-            let entries = camera.map.get_mut(..width * height).unwrap_or(&mut []);
+            let entries = part_mut(camera.map, ..width * height);
             map::fill(entries, width, turned, rig);
             camera.invalid_count = map::mark_invalid(entries, width, height, camera.invalid);
         }

@@ -19,6 +19,7 @@ use crate::{
     image::{InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, each, zip3},
+    part::part,
     state::Visitor,
 };
 
@@ -128,17 +129,17 @@ impl<'s> FlowMatcher<'s> {
 
     /// The sparse pass' matches of the last frame: whole pixels, outliers included.
     pub(crate) fn sparse(&self) -> &[Match] {
-        self.sparse.get(..self.sparse_len).unwrap_or(&[])
+        part(self.sparse, ..self.sparse_len)
     }
 
     /// The dense pass' matches of the last frame that are supported by their neighbours, refined below the pixel.
     pub(crate) fn refined(&self) -> &[Match] {
-        self.refined.get(..self.refined_len).unwrap_or(&[])
+        part(self.refined, ..self.refined_len)
     }
 
     /// Positions in [`FlowMatcher::refined`] of the matches selected for egomotion: the best of each cell, cell by cell.
     pub(crate) fn selection(&self) -> &[u32] {
-        self.selection.get(..self.selection_len).unwrap_or(&[])
+        part(self.selection, ..self.selection_len)
     }
 
     /// The matches selected for egomotion.
@@ -280,7 +281,7 @@ impl<'s> FlowMatcher<'s> {
         report.refined = self.refined_len as u32;
         report.unrefined = closed as u32 - report.dense.unsupported - report.refined;
         let shape = Shape::new(size[0], size[1], usize::from(config.bucket_px).max(CELL_MIN_PX));
-        let (refined, score) = (self.refined.get(..self.refined_len).unwrap_or(&[]), &*self.score);
+        let (refined, score) = (part(self.refined, ..self.refined_len), &*self.score);
         self.selection_len = select(refined, score, shape, usize::from(config.bucket_matches), &mut self.cells, self.selection);
         report.bucketed = self.selection_len as u32;
         report
@@ -299,7 +300,7 @@ impl<'s> FlowMatcher<'s> {
         corners.trace(|_| widest, self.traced, executor);
         let closed = corners.gather(self.traced, self.sparse);
         self.sparse_len = closed.min(self.sparse.len());
-        let matches = self.sparse.get(..self.sparse_len).unwrap_or(&[]);
+        let matches = part(self.sparse, ..self.sparse_len);
         let shape = Shape::new(width, height, SPARSE_CELL_PX);
         support(matches, shape, config, &mut self.cells, self.motion, self.supported);
         let supported = matches.iter().zip(&*self.supported).filter(|&(_, &supported)| supported == 1).map(|(m, _)| *m);
@@ -326,7 +327,7 @@ impl<'s> FlowMatcher<'s> {
         corners.trace(|at| prior.reach(at).unwrap_or(widest), self.traced, executor);
         let closed = corners.gather(self.traced, self.refined);
         let stored = closed.min(self.refined.len());
-        let matches = self.refined.get(..stored).unwrap_or(&[]);
+        let matches = part(self.refined, ..stored);
         support(matches, Shape::new(width, height, CELL_MIN_PX), config, &mut self.cells, self.motion, self.supported);
         let supported = self.supported.iter().take(stored).filter(|&&supported| supported == 1).count();
         let count = PassCount {
@@ -371,7 +372,7 @@ impl<'s> FlowMatcher<'s> {
 /// The last two pairs, of that size.
 fn images<'a>(left: &'a Camera<'_>, right: &'a Camera<'_>, [width, height]: [usize; 2]) -> Images<'a> {
     let ((left_before, left), (right_before, right)) = (left.frames(), right.frames());
-    let pixels = |data: &'a [u8]| Pixels { data: data.get(..width * height).unwrap_or(&[]), width };
+    let pixels = |data: &'a [u8]| Pixels { data: part(data, ..width * height), width };
     Images {
         previous_left: pixels(left_before.pixels),
         previous_right: pixels(right_before.pixels),

@@ -7,7 +7,10 @@
 //! Memory: 64 bytes per bin.
 
 use super::{SceneFlowConfig, circle::Reach, matches::Match};
-use crate::memory::{Capacity, Carver, region_bytes};
+use crate::{
+    memory::{Capacity, Carver, region_bytes},
+    part::part_mut,
+};
 
 /// Side of a bin, px.
 const BIN_PX: usize = 50;
@@ -66,7 +69,7 @@ impl<'s> Prior<'s> {
             let last_column = if column + 1 < self.columns { column + 1 } else { column };
             for row in row.saturating_sub(1)..=(row + 1).min(self.rows.saturating_sub(1)) {
                 let bins = row * self.columns + column.saturating_sub(1)..=row * self.columns + last_column;
-                for bin in self.learned.get_mut(bins).unwrap_or(&mut []) {
+                for bin in part_mut(self.learned, bins) {
                     bin.to_previous_right = extended(bin.to_previous_right, m.previous_left, m.previous_right);
                     bin.to_current_right = extended(bin.to_current_right, m.previous_right, m.current_right);
                     bin.to_current_left = extended(bin.to_current_left, m.current_right, m.current_left);

@@ -5,6 +5,8 @@
 //! reaches [`RINGS`]; a match is kept when at least `support_min` of them, and at least half of them, agree in disparity and flow.
 //! No mesh, bounded work, and where matches stand dense more neighbours than a triangulation has.
 
+use crate::part::part;
+
 use super::{
     SceneFlowConfig,
     cells::{Cells, Shape},
@@ -33,7 +35,7 @@ pub(super) fn support(
         let [du, dv] = m.flow_px();
         *motion = [m.previous_disparity_px(), du, dv, 0.0];
     }
-    let motion = motion.get(..matches.len()).unwrap_or(&[]);
+    let motion = part(motion, ..matches.len());
     for (&index, own) in order.iter().zip(motion) {
         if let (Some(m), Some(supported)) = (matches.get(index as usize), supported.get_mut(index as usize)) {
             *supported = u8::from(is_supported(*own, shape.cell(m), shape, config, start, motion));
@@ -53,7 +55,7 @@ fn is_supported(own: Motion, [column, row]: [usize; 2], shape: Shape, config: &S
         for row in row.saturating_sub(ring)..=(row + ring).min(shape.rows - 1) {
             let (first, last) = (row * shape.columns + left, row * shape.columns + right);
             let (Some(&from), Some(&to)) = (start.get(first), start.get(last + 1)) else { continue };
-            let run = motion.get(from as usize..to as usize).unwrap_or(&[]);
+            let run = part(motion, from as usize..to as usize);
             neighbours += run.len();
             agreeing += run.iter().map(|other| usize::from(agree(own, *other, config))).sum::<usize>();
         }

@@ -11,7 +11,10 @@
 //! Memory: 66 bytes a point. Time: about linear on street scenes (a few flips a point). Four points on one circle keep the diagonal
 //! that the order of insertion gives. Points on one line make no triangle.
 
-use crate::memory::{Carver, region_bytes};
+use crate::{
+    memory::{Carver, region_bytes},
+    part::part,
+};
 use bytemuck::{Pod, Zeroable};
 
 /// A support point of one image.
@@ -122,7 +125,7 @@ impl<'s> Triangulation<'s> {
 
     /// The points.
     pub fn points(&self) -> &[SupportPoint] {
-        self.points.get(..self.len).unwrap_or(&[])
+        part(self.points, ..self.len)
     }
 
     /// The corners of all triangles, in the order in which they were made.

@@ -5,6 +5,8 @@
 //!
 //! Energies are integers: 16 times the descriptor distance plus the cost of leaving the plane. Of equal ones the smaller disparity wins.
 
+use crate::part::part;
+
 use super::{
     StereoConfig,
     descriptor::{Descriptor, Gradients, MARGIN, distance, texture},
@@ -70,7 +72,7 @@ impl DenseMatching<'_> {
         let [left_cells, right_cells] = &self.cells;
         let grid = if LEFT { left_cells } else { right_cells };
         let size = self.config.grid_size.max(1);
-        let sets = grid.cells.get(v / size * grid.columns..).unwrap_or(&[]);
+        let sets = part(grid.cells, v / size * grid.columns..);
         let least_texture = u32::from(self.config.match_texture);
         let most = usize::from(self.config.disparity_max);
         let mut list = [0u8; 256];
@@ -97,7 +99,7 @@ impl DenseMatching<'_> {
         let mean = usize::from((plane & 255) as u8);
         let costs = if plane >= STEEP { &self.cost.about_steep } else { &self.cost.about_plane };
         let low = mean.saturating_sub(self.cost.radius);
-        let costs = costs.get(low + self.cost.radius - mean..=2 * self.cost.radius).unwrap_or(&[]);
+        let costs = part(costs, low + self.cost.radius - mean..=2 * self.cost.radius);
         let best = least_key::<LEFT>(point, others, listed, self.cost.elsewhere, low, costs);
         if best == u32::MAX {
             return NO_PLANE;
@@ -177,7 +179,7 @@ fn list_disparities<'l>(set: &DisparitySet, list: &'l mut [u8; 256]) -> &'l [u8]
         }
     }
     let free = slots.len();
-    list.get(..list.len() - free).unwrap_or(&[])
+    part(list, ..list.len() - free)
 }
 
 /// Takes from the left row, in working units, what the right row, in px, contradicts. Returns how many matches there were and how many

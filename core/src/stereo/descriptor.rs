@@ -2,6 +2,8 @@
 //!
 //! Descriptors are never kept for a whole image (16 bytes a pixel): a row of them is built from the gradients when it is matched.
 
+use crate::part::part;
+
 use super::gradient::FLAT;
 use bytemuck::{Pod, Zeroable};
 
@@ -40,7 +42,7 @@ impl<'a> Gradients<'a> {
     /// Builds the descriptors of row `v` into `out`, which is as wide as the image. Those in the margin are left as they are; returns
     /// whether the row has descriptors at all.
     pub fn describe_row(&self, v: usize, out: &mut [Descriptor]) -> bool {
-        let row = |image: &'a [u8], v: usize| image.get(v * self.width..(v + 1) * self.width).unwrap_or(&[]);
+        let row = |image: &'a [u8], v: usize| part(image, v * self.width..(v + 1) * self.width);
         if v < MARGIN || v + MARGIN >= self.height || self.width < 2 * MARGIN || out.len() < self.width {
             return false;
         }
@@ -66,7 +68,7 @@ impl<'a> SampledRows<'a> {
     /// Describes pixels from column 2 on, by words, until the words would reach beyond the row; returns where it stopped.
     fn describe_most(&self, out: &mut [Descriptor]) -> usize {
         let ([du_above, du_here, du_below], [dv_above, dv_here, dv_below]) = (self.du, self.dv);
-        let from = |row: &'a [u8], column: usize| row.get(column..).unwrap_or(&[]);
+        let from = |row: &'a [u8], column: usize| part(row, column..);
         let words = du_here.array_windows::<8>();
         let threes = [du_above, du_below, dv_here].map(|row| from(row, 1).array_windows::<4>());
         let ones = [dv_above, dv_below].map(|row| from(row, 2).iter());

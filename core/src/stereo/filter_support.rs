@@ -1,5 +1,7 @@
 //! Support points that stand alone, or that add nothing, are taken back (Geiger et al., section 3.1; the published parameters).
 
+use crate::part::part;
+
 use super::{StereoConfig, support::NO_MATCH};
 
 /// Removes the points with fewer than `plausible_min` alike ones in the window about them, all tested before any is removed. `scratch`
@@ -19,7 +21,7 @@ pub(super) fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width:
                 .chunks_exact(width)
                 .skip(top)
                 .take(rows)
-                .map(|row| row.get(left..).unwrap_or(&[]).iter().take(columns).filter(alike).count())
+                .map(|row| part(row, left..).iter().take(columns).filter(alike).count())
                 .sum();
             if company < usize::from(config.plausible_min) {
                 *point = NO_MATCH;

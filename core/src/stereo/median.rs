@@ -1,12 +1,14 @@
 //! A 3 x 3 median, for pixels whose eight neighbours all have a disparity; the others stay.
 
+use crate::part::part;
+
 use super::dense::NONE;
 
 /// Filters `from`, whose row `first` is the first one of `to`.
 pub(super) fn median(from: &[i16], width: usize, first: usize, to: &mut [i16]) {
     let width = width.max(1);
     for (v, to) in (first..).zip(to.chunks_exact_mut(width)) {
-        to.iter_mut().zip(from.get(v * width..).unwrap_or(&[])).for_each(|(to, from)| *to = *from);
+        to.iter_mut().zip(part(from, v * width..)).for_each(|(to, from)| *to = *from);
         median_row(from, width, v, to);
     }
 }

@@ -4,6 +4,8 @@
 //! centre's: from full weight when equal to none at 4 px. All in 16-bit integers, but for one division per pixel in `f32`, whose operands
 //! are integers below 2^15 and which is therefore the same everywhere.
 
+use crate::part::part;
+
 use super::dense::NONE;
 
 /// Pixels to each side.
@@ -25,7 +27,7 @@ fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
         // At most 8 x 31 x 126 = 31,248 in the numerator; the centre alone makes the denominator 63.
         let (mut numerators, mut denominators) = ([0i16; BLOCK], [CUT >> 2; BLOCK]);
         for tap in taps {
-            let tap = tap.get(block * BLOCK..).unwrap_or(&[]);
+            let tap = part(tap, block * BLOCK..);
             let sums = numerators.iter_mut().zip(&mut denominators);
             for ((numerator, denominator), (&tap, &centre)) in sums.zip(tap.iter().zip(centre)) {
                 // Against NONE the difference is at most 2^15 - 64: no overflow, no weight.
@@ -52,7 +54,7 @@ pub(super) fn mean_along_rows(from: &[i16], width: usize, to: &mut [i16]) {
         let n = width.saturating_sub(2 * REACH);
         let taps = window().map(|k| from.get(k..).and_then(|tap| tap.get(..n)).unwrap_or(&[]));
         if let (Some(centre), Some(to)) = (from.get(REACH..), to.get_mut(REACH..)) {
-            mean(centre.get(..n).unwrap_or(&[]), taps, to.get_mut(..n).unwrap_or_default());
+            mean(part(centre, ..n), taps, to.get_mut(..n).unwrap_or_default());
         }
     }
 }

@@ -15,6 +15,7 @@ use crate::{
     audit::Audit,
     masks::{MaskStore, TwoFrames},
     memory::{Capacity, Carver, region_bytes},
+    part::{part, part_mut},
     state::Visitor,
 };
 
@@ -81,11 +82,11 @@ impl<'s> TrackTable<'s> {
 
     pub fn all(&self) -> &[Track] {
         debug_assert!(self.len <= self.tracks.len());
-        self.tracks.get(..self.len).unwrap_or(&[])
+        part(self.tracks, ..self.len)
     }
 
     pub fn all_mut(&mut self) -> &mut [Track] {
-        self.tracks.get_mut(..self.len).unwrap_or(&mut [])
+        part_mut(self.tracks, ..self.len)
     }
 
     /// Associates the instances of frame `frame` with tracks, or begins new ones. A track keeps the mask of the frame before until
@@ -140,7 +141,7 @@ impl<'s> TrackTable<'s> {
 
     /// Fills the table of scores, a row for each instance; 0 where either is associated already.
     fn score(&mut self, first: usize, config: &TrackingConfig, frame: u32, instances: &[Instance], masks: &TwoFrames<MaskStore<'_>>) {
-        let tracks = self.tracks.get(..self.len).unwrap_or(&[]);
+        let tracks = part(self.tracks, ..self.len);
         let rows = self.scores.chunks_exact_mut(self.tracks.len().max(1)).zip(instances).enumerate();
         for (at, (row, instance)) in rows {
             for (score, track) in row.iter_mut().zip(tracks) {

@@ -19,6 +19,7 @@ use crate::{
     digest::Digest,
     masks::{MaskHandle, MaskStore, PixelBox, ScaledMask},
     memory::{Capacity, Carver, region_bytes},
+    part::{part, part_mut},
 };
 use bytemuck::{Pod, Zeroable};
 use heapless::Vec;
@@ -99,11 +100,11 @@ impl<'s> Instances<'s> {
 
     pub fn all(&self) -> &[Instance] {
         debug_assert!(self.len <= self.table.len());
-        self.table.get(..self.len).unwrap_or(&[])
+        part(self.table, ..self.len)
     }
 
     pub fn all_mut(&mut self) -> &mut [Instance] {
-        self.table.get_mut(..self.len).unwrap_or(&mut [])
+        part_mut(self.table, ..self.len)
     }
 
     /// Validates a frame's detections and keeps the best, with their masks in `store`.

@@ -10,6 +10,7 @@ use super::{
 use crate::{
     egomotion::Estimator,
     geometry::{StereoRig, Transform},
+    part::part,
     random::Random,
     scene_flow::Match,
 };
@@ -116,7 +117,7 @@ pub(super) fn estimate_motion<'m>(
         }
         let count = find(&expected, buffer);
         debug_assert!(count <= buffer.len());
-        found = buffer.get(..count).unwrap_or(&[]);
+        found = part(buffer, ..count);
     }
     let matches = matches.chain(found);
     let range = DisparityRange::of(config, frame.rig, matches.clone());

@@ -8,8 +8,11 @@
 //! per visible block to enter a frame; a pass over one set to take one out.
 
 use super::Slot;
-use crate::memory::{Capacity, Carver, region_bytes};
 use crate::state::Visitor;
+use crate::{
+    memory::{Capacity, Carver, region_bytes},
+    part::part_mut,
+};
 
 /// Frames, as bit sets over slots, oldest first out.
 #[derive(Debug)]
@@ -137,10 +140,10 @@ impl<'s> VisibleHistory<'s> {
         visitor.count(peak, capacity);
         for age in 0..*len as u32 {
             let at = (oldest.wrapping_add(age) as usize).checked_rem(capacity).unwrap_or(0) * *words;
-            visitor.u64s(sets.get_mut(at..at + used).unwrap_or(&mut []));
+            visitor.u64s(part_mut(sets, at..at + used));
         }
-        visitor.u64s(due.get_mut(..used).unwrap_or(&mut []));
-        visitor.u32s(allocated_at.get_mut(..slots).unwrap_or(&mut []));
+        visitor.u64s(part_mut(due, ..used));
+        visitor.u32s(part_mut(allocated_at, ..slots));
     }
 
     /// The oldest frame in the ring.

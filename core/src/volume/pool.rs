@@ -7,6 +7,7 @@
 
 use crate::{
     memory::{Carver, region_bytes},
+    part::part_mut,
     state::Visitor,
 };
 use bytemuck::{Pod, Zeroable};
@@ -172,7 +173,7 @@ impl<'s> SlotPool<'s> {
         visitor.count(fresh, freed.len());
         visitor.count(freed_len, *fresh);
         visitor.count(peak, freed.len());
-        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(freed.get_mut(..*freed_len).unwrap_or(&mut [])));
+        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(part_mut(freed, ..*freed_len)));
     }
 
     /// Finds which slots are taken: those given out and not in the free list. Whether that list can be: each slot in it given out, and once.

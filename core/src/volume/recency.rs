@@ -3,8 +3,11 @@
 //! Memory: 8 bytes a block.
 
 use super::Slot;
-use crate::memory::{Carver, region_bytes};
 use crate::state::Visitor;
+use crate::{
+    memory::{Carver, region_bytes},
+    part::part_mut,
+};
 
 /// The list. Links are slot + 1; 0 is none.
 #[derive(Debug)]
@@ -67,7 +70,7 @@ impl<'s> Recency<'s> {
     pub(super) fn visit(&mut self, slots: usize, visitor: &mut impl Visitor) {
         let Self { links, ends } = self;
         visitor.u32s(ends);
-        visitor.u32s(links.get_mut(..slots).unwrap_or(&mut []).as_flattened_mut());
+        visitor.u32s(part_mut(links, ..slots).as_flattened_mut());
     }
 
     fn link(&mut self, entry: u32, links: [u32; 2]) {

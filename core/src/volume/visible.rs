@@ -6,8 +6,11 @@
 //! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
 
 use super::{Full, Slot};
-use crate::memory::{Capacity, Carver, region_bytes};
 use crate::state::Visitor;
+use crate::{
+    memory::{Capacity, Carver, region_bytes},
+    part::{part, part_mut},
+};
 
 /// This frame's visible slots, each once.
 #[derive(Debug)]
@@ -103,8 +106,8 @@ impl<'s> VisibleList<'s> {
         visitor.u32(frame);
         visitor.count(peak, slots.len());
         visitor.count(len, slots.len());
-        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(slots.get_mut(..*len).unwrap_or(&mut [])));
-        visitor.u32s(last_visible.get_mut(..end).unwrap_or(&mut []));
+        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(part_mut(slots, ..*len)));
+        visitor.u32s(part_mut(last_visible, ..end));
     }
 
     /// Orders the list by slot, which is the order of fusion and of memory; all slots are below `end`. Reads off which slots are
@@ -118,7 +121,7 @@ impl<'s> VisibleList<'s> {
 
     /// The slots visible in this frame, ascending.
     pub fn slots(&self) -> &[Slot] {
-        self.slots.get(..self.len).unwrap_or(&[])
+        part(self.slots, ..self.len)
     }
 
     /// The most entries a frame ever had.

@@ -4,7 +4,7 @@ use super::{
     SegmentationConfig,
     groups::{Extent, GROUPS_MAX, Group},
 };
-use crate::{geometry::Transform, state::Visitor, tracking::association::remove_at};
+use crate::{geometry::Transform, part::part, state::Visitor, tracking::association::remove_at};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
@@ -117,7 +117,7 @@ impl<'s> Hypotheses<'s> {
 
     pub fn all(&self) -> &[Hypothesis] {
         debug_assert!(self.len <= self.table.len());
-        self.table.get(..self.len).unwrap_or(&[])
+        part(self.table, ..self.len)
     }
 
     /// Continues hypotheses with a frame's groups, the nearest first for each, begins new ones and drops those missed for too long. Returns

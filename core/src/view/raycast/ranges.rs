@@ -11,6 +11,7 @@ use super::{
 use crate::{
     geometry::scalar::{max_f32, min_f32},
     memory::{Capacity, Carver, region_bytes},
+    part::part,
     volume::BLOCK_SIDE,
 };
 
@@ -83,7 +84,7 @@ impl<'s> Ranges<'s> {
 
     /// The ranges of a picture row, a tile each for two columns.
     pub fn row(&self, v: usize) -> &[[f32; 2]] {
-        self.depth_m.get(v * self.columns..(v + 1) * self.columns).unwrap_or(&[])
+        part(self.depth_m, v * self.columns..(v + 1) * self.columns)
     }
 }
 

@@ -3,7 +3,7 @@
 //! Memory: that of the cache of requested blocks, which fusion does not need; tiles are as small as fits, from 8 px on, and every 4 x 4
 //! of them are one tile of a coarser level.
 
-use crate::{geometry::scalar::max_f32, image::View};
+use crate::{geometry::scalar::max_f32, image::View, part::part_mut};
 
 /// Least side of a tile, px, as a shift.
 const TILE_SHIFT: u32 = 3;
@@ -67,7 +67,7 @@ impl<'a> Horizon<'a> {
 fn greatest<'d>(rows: impl Iterator<Item = &'d [f32]>, shift: u32, columns: usize, tiles: &mut [f32]) {
     tiles.fill(0.0);
     for (v, row) in rows.enumerate() {
-        let tiles = tiles.get_mut((v >> shift) * columns..).unwrap_or(&mut []);
+        let tiles = part_mut(tiles, (v >> shift) * columns..);
         for (tile, pixels) in tiles.iter_mut().zip(row.chunks(1 << shift)) {
             *tile = pixels.iter().fold(*tile, |greatest, &depth_m| max_f32(depth_m, greatest));
         }
