@@ -22,6 +22,7 @@ const ROUNDS: usize = 3;
 /// How an estimate went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MotionStatus {
     /// There is a motion, and its refinement converged.
     #[default]
@@ -39,6 +40,8 @@ pub enum MotionStatus {
 /// A motion, or why it could not be estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct MotionEstimate {
     /// How it went.
     pub status: MotionStatus,

@@ -10,6 +10,7 @@ use crate::image::DISPARITY_ONE_PX;
 /// the fourth power what is left of their lenses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DisparityCorrection {
     /// The same everywhere, px.
     pub offset_px: f64,

@@ -26,6 +26,7 @@ const SMALL_ANGLE_RAD: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transform {
     /// The rotation as a unit quaternion: x, y, z, w.
     pub rotation: [f64; 4],

@@ -12,6 +12,7 @@ use core::fmt;
 
 /// What is digested, in the order data flows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Digested {
     /// The images and detections as they came in.
     Input,
@@ -46,6 +47,7 @@ impl fmt::Display for Digested {
 /// The digest of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ObjectDigest {
     /// Number of its track; 0 where there is no object.
     pub id: u32,
@@ -56,6 +58,7 @@ pub struct ObjectDigest {
 /// The digests of all objects that have a volume, by id.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ObjectDigests([ObjectDigest; MAX_OBJECTS]);
 
 impl ObjectDigests {
@@ -87,6 +90,7 @@ impl fmt::Display for ObjectDigests {
 /// The digests of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StageDigests {
     /// See [`Digested::Input`]: a changed decoder is told from a changed core.
     pub input: u64,

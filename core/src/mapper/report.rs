@@ -22,6 +22,7 @@ use crate::{
 /// assert_eq!(Severity::MapAffected.name(), "map affected");
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Severity {
     /// Nothing to say.
     #[default]
@@ -46,6 +47,7 @@ impl Severity {
 /// How the camera's pose came about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PoseOrigin {
     /// The first frame: the camera is the world, or where it is said to be.
     #[default]
@@ -61,6 +63,8 @@ pub enum PoseOrigin {
 /// The state of a block pool after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct BlockCount {
     /// Blocks in use.
     pub used: u32,
@@ -75,6 +79,8 @@ pub struct BlockCount {
 /// One step.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Report {
     /// Number of the frame, from 0.
     pub frame: u32,

@@ -32,6 +32,7 @@ pub const MAX_OBJECTS: usize = 16;
 
 /// Why an object was handed over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Retirement {
     /// Its track was forgotten.
     #[default]
@@ -46,6 +47,7 @@ pub enum Retirement {
 
 /// What is known of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ObjectSummary {
     /// Number of its track, from 1; a track of several trajectory segments has several objects.
     pub id: u32,

@@ -6,6 +6,8 @@ use crate::tracking::{DetectionCount, SegmentationReport, TrackCount, TrackRepor
 /// How volumes were used in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct ObjectsReport {
     /// Objects with a volume.
     pub objects: u32,
@@ -30,6 +32,8 @@ pub struct ObjectsReport {
 /// One frame's instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct InstancesReport {
     /// How detections were used.
     pub detections: DetectionCount,

@@ -55,6 +55,8 @@ pub use rectifier::{Pair, RectifiedImages, Rectifier, RectifierError};
 /// What rectification did to a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct RectifyReport {
     /// Pixels of the left rectified image that no raw pixel covers.
     pub invalid_left: u32,

@@ -14,6 +14,7 @@ use crate::{
 /// Counts of one image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FeatureCount {
     /// Features of the dense pass kept.
     pub dense: u32,

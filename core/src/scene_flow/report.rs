@@ -5,6 +5,7 @@ use super::camera::FeatureCount;
 /// How a frame's scene flow went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FlowStatus {
     /// Matches against the previous frame were looked for.
     #[default]
@@ -18,6 +19,7 @@ pub enum FlowStatus {
 /// Counts of one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PassCount {
     /// Circles that closed.
     pub closed: u32,
@@ -30,6 +32,8 @@ pub struct PassCount {
 /// One frame's scene flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct FlowReport {
     /// How it went.
     pub status: FlowStatus,

@@ -3,6 +3,7 @@
 /// How a frame ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StereoStatus {
     /// Disparities were computed; how many the counts say.
     #[default]
@@ -24,6 +25,8 @@ pub enum StereoStatus {
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct StereoReport {
     /// How it ended.
     pub status: StereoStatus,
@@ -68,6 +71,7 @@ impl StereoReport {
 
 /// A step of the matcher, as a name for measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StereoStep {
     /// Sobel responses of both images.
     Gradients,

@@ -22,6 +22,7 @@ use crate::{
 /// How a frame's detections were associated with tracks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TrackCount {
     /// Tracks in the table.
     pub tracks: u32,

@@ -48,6 +48,7 @@ impl Detection<'_> {
 /// How a frame's detections were used. Each detection is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DetectionCount {
     /// Handed in.
     pub given: u32,

@@ -5,6 +5,7 @@ use crate::{geometry::Transform, masks::PixelBox};
 
 /// A track as it stands after a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TrackReport {
     /// Its number, from 1, never used again.
     pub id: u32,
@@ -46,6 +47,8 @@ pub struct TrackReport {
 /// One frame's detections and tracks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct TrackingReport {
     /// How detections were used.
     pub detections: DetectionCount,

@@ -26,6 +26,8 @@ pub const MAX_BLOCKS_PER_RAY: usize = 16 * 2 + 3;
 /// What one frame's allocation did. Requests refused repeat when several rays ask for the same block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct AllocationReport {
     /// Blocks made.
     pub made: u32,

@@ -20,6 +20,7 @@ pub(crate) type Layer<T> = [T; LAYER_VOXELS];
 
 /// A block's place: it holds the lattice points `8 * coord ..= 8 * coord + 7` on each axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BlockCoord {
     /// Along x.
     pub x: i16,

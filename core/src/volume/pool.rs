@@ -15,6 +15,7 @@ use core::fmt;
 
 /// Every slot is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Full;
 
 impl fmt::Display for Full {
@@ -28,6 +29,7 @@ impl core::error::Error for Full {}
 /// A position in a pool, and in the arrays that hold what belongs to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable)]
 #[repr(transparent)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Slot(u32);
 
 impl Slot {

@@ -11,6 +11,8 @@ use super::{BLOCK_VOXELS, Slot, Volume, block::Voxels};
 /// What pruning did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct PruneReport {
     /// Blocks visited.
     pub visited: u32,

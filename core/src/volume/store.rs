@@ -59,6 +59,8 @@ impl BlockStore for NoStore {
 /// Blocks that left and came back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct EvictionReport {
     /// Blocks that left and were kept.
     pub kept: u32,

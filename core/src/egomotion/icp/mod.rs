@@ -42,6 +42,7 @@ const NORMAL_ONE: f64 = 127.0;
 /// How tracking went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum IcpStatus {
     /// There is a motion, and nothing speaks against it.
     #[default]
@@ -75,6 +76,8 @@ impl IcpStatus {
 /// What the tracker made of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct IcpReport {
     /// How it went.
     pub status: IcpStatus,

@@ -90,6 +90,7 @@ pub struct SelfCalibrationReport {
 
 /// What to make of a [`SelfCalibrationReport`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CalibrationState {
     /// Nothing is known yet, or what is known is small.
     #[default]

@@ -55,6 +55,8 @@ const SCORE: f32 = 0.9;
 /// What motion segmentation found in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct SegmentationReport {
     /// Matches that were not assigned to an instance of the detector.
     pub matches: u32,

@@ -74,6 +74,8 @@ impl core::error::Error for RaycastError {}
 
 /// What a picture is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct RaycastReport {
     /// Pixels that show a surface.
     pub pixels: u32,
