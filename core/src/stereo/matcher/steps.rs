@@ -4,6 +4,7 @@ use super::{ROWS, StereoMatcher};
 use crate::{
     image::{DISPARITY_ONE_PX, InvalidPair, View},
     parallel::{BANDS, Bands, Executor, each, zip3},
+    part::{part, part_mut},
     stereo::{
         StereoConfig, StereoReport,
         config::DISPARITY_LIMIT,
@@ -50,7 +51,7 @@ impl StereoMatcher<'_> {
         let matching = SupportMatching { config, left, right };
         let jobs = zip3(bands.first(), bands.split_mut(self.support, columns), Bands::of(BANDS).split_mut(self.rows, ROWS * self.width));
         each(executor, jobs, |(first, grid, scratch)| matching.match_rows(first, grid, scratch));
-        let grid = self.support.get(..columns * rows).unwrap_or(&[]);
+        let grid = part(self.support, ..columns * rows);
         report.candidates = grid.len() as u32;
         report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
     }
@@ -78,7 +79,7 @@ impl StereoMatcher<'_> {
         let cells = columns * prior::cells(self.height, config.grid_size);
         let prepare = |mesh: &mut Triangulation<'_>, sets: &mut [DisparitySet]| {
             mesh.triangulate();
-            prior::mark_cells(config, mesh.points(), columns, sets.get_mut(..cells).unwrap_or(&mut []));
+            prior::mark_cells(config, mesh.points(), columns, part_mut(sets, ..cells));
         };
         executor.join(|| prepare(&mut self.left_mesh, self.left_cells), || prepare(&mut self.right_mesh, self.right_cells));
         report.triangles_left = self.left_mesh.triangle_count() as u32;
@@ -135,7 +136,7 @@ impl StereoMatcher<'_> {
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
         let (width, pixels, bands) = (self.width, self.width * self.height, Bands::of(self.height));
         let image = image_of(self.disparity, pixels);
-        let other = self.other.get_mut(..pixels).unwrap_or(&mut []);
+        let other = part_mut(self.other, ..pixels);
         if config.adaptive_mean {
             let rows = zip3(bands.first(), bands.split_mut(image, width), bands.split_mut(other, width));
             each(executor, rows, |(_, from, to)| smooth::mean_along_rows(from, width, to));
@@ -151,7 +152,7 @@ impl StereoMatcher<'_> {
 
     /// Turns working units into the result's.
     pub(super) fn finish(&mut self, invalid: Option<&InvalidPair<'_>>, report: &mut StereoReport) {
-        let disparities = self.disparity.get_mut(..self.width * self.height).unwrap_or(&mut []);
+        let disparities = part_mut(self.disparity, ..self.width * self.height);
         for disparity in disparities.iter_mut() {
             let working = *disparity as i16;
             // Smoothed values stay between those they come from: 0..=255 px.
