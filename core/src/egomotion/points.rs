@@ -200,7 +200,7 @@ impl SinglePrecision {
 
 /// The point a match shows, in the previous left camera, and its current observations.
 fn triangulate(m: &Match, rig: &StereoRig) -> Option<Point> {
-    let (left, right) = (rig.from_center(m.current_left), rig.from_center(m.current_right));
+    let (left, right) = (rig.centered(m.current_left), rig.centered(m.current_right));
     if !left.iter().chain(&right).all(|x| x.is_finite()) {
         return None;
     }

@@ -102,13 +102,13 @@ impl StereoRig {
     }
 
     /// A pixel by its distance from the principal point, px.
-    pub(crate) fn from_center(&self, [u, v]: [f32; 2]) -> [f64; 2] {
+    pub(crate) fn centered(&self, [u, v]: [f32; 2]) -> [f64; 2] {
         [f64::from(u) - self.center_u_px, f64::from(v) - self.center_v_px]
     }
 
     /// What a pixel of the left and a pixel of the right image show; its row is the mean of both.
     pub(crate) fn observation(&self, left: [f32; 2], right: [f32; 2]) -> StereoObservation {
-        let ([u_left_px, v_left], [u_right_px, v_right]) = (self.from_center(left), self.from_center(right));
+        let ([u_left_px, v_left], [u_right_px, v_right]) = (self.centered(left), self.centered(right));
         StereoObservation { u_left_px, v_px: 0.5 * (v_left + v_right), u_right_px }
     }
 

@@ -163,7 +163,7 @@ fn observation(m: &Match, frame: &MotionFrame<'_>) -> Option<Observation> {
     let previous = Point3::from(rig.triangulate(&rig.observation(m.previous_left, m.previous_right))?);
     Some(Observation {
         static_prediction: frame.t_current_previous.transform_point(previous),
-        left: rig.from_center(m.current_left),
-        right: rig.from_center(m.current_right),
+        left: rig.centered(m.current_left),
+        right: rig.centered(m.current_right),
     })
 }

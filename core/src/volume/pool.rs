@@ -89,7 +89,7 @@ impl<'s> SlotPool<'s> {
     }
 
     /// Whether no slot is taken.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
