@@ -121,7 +121,7 @@ fn a_strict_run_ends_at_the_first_frame_that_affects_the_map_and_names_the_cause
         output_text(&strict)
     );
     assert_eq!(names(root.path()), ["result"], "what was mapped is there");
-    let full = run(&["--overwrite", "--strict", "--set", "volume.voxel_size_m=0.2"]);
+    let full = run(&["--overwrite", "--strict", "--set", "volume.voxel_size_m=0.2", "--instances", "exact"]);
     assert!(output_text(&full).contains("objects refused"), "{}", output_text(&full));
     let coarse = ["--set", "volume.voxel_size_m=0.2", "--instances", "none"];
     assert!(run(&[&["--overwrite", "--strict"], &coarse[..]].concat()).status.success(), "no frame affects a map that fits");
@@ -190,8 +190,10 @@ fn a_written_street_is_mapped_as_a_kitti_folder() {
     let small = ["--set", "street.width=160", "--set", "street.height=64"];
     let written = dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "3"], &small[..]].concat());
     assert!(written.status.success(), "{}", output_text(&written));
-    let from_disk = dynvox(root.path(), &["run", "street", "--images", "colour", "--profile", "tiny", "--out", "a", "--json"]);
-    let settings = [&small[..], &["--set", "street.frames=3"]].concat();
+    let masks = ["--instances", "files:street/sequences/00/instances"];
+    let from_disk =
+        dynvox(root.path(), &[&["run", "street", "--images", "colour", "--profile", "tiny", "--out", "a", "--json"], &masks[..]].concat());
+    let settings = [&small[..], &["--set", "street.frames=3", "--instances", "exact"]].concat();
     let from_memory = dynvox(root.path(), &[&["run", "--profile", "tiny", "--out", "b", "--json"], &settings[..]].concat());
     let digest = |output: &Output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["digest"].clone();
     assert_eq!(digest(&from_disk), digest(&from_memory), "PNG files lose nothing");
@@ -218,8 +220,10 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
         assert!(output.status.success(), "{}", output_text(output));
         serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["lidar"].clone()
     };
-    let from_disk = figures(&run(&["street", "--images", "colour", "--evaluate", "lidar", "--out", "a"]));
-    let from_memory = figures(&run(&[&small[..], &["--set", "street.frames=4", "--evaluate", "lidar", "--out", "b"]].concat()));
+    let masks = ["--instances", "files:street/sequences/00/instances"];
+    let from_disk = figures(&run(&[&["street", "--images", "colour", "--evaluate", "lidar", "--out", "a"], &masks[..]].concat()));
+    let from_memory =
+        figures(&run(&[&small[..], &["--set", "street.frames=4", "--instances", "exact", "--evaluate", "lidar", "--out", "b"]].concat()));
     for (source, key) in [("input", "accuracy"), ("input", "completeness"), ("fused", "f1"), ("fused", "points")] {
         let of = |figures: &serde_json::Value| figures["static"][source][key].as_f64().unwrap();
         assert!((of(&from_disk) / of(&from_memory) - 1.0).abs() < 1e-3, "{source} {key}: {from_disk} {from_memory}");
@@ -231,7 +235,9 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
     let report = fs::read_to_string(root.path().join("a/report.html")).unwrap();
     assert!(report.contains("Evaluation against LiDAR") && report.contains("map against LiDAR"));
     // Exact depth is denser, and only the street has it; two frames later the first two are evaluated.
-    let settings = [&small[..], &["--set", "street.frames=4", "--evaluate", "exact", "--evaluation-delay", "2", "--out", "c"]].concat();
+    let settings =
+        [&small[..], &["--set", "street.frames=4", "--instances", "exact", "--evaluate", "exact", "--evaluation-delay", "2", "--out", "c"]]
+            .concat();
     let exact = figures(&run(&settings));
     assert_eq!((&exact["frames"], &exact["delay_frames"]), (&2.into(), &2.into()));
     let points = |figures: &serde_json::Value| figures["static"]["fused"]["points"].as_u64().unwrap() / figures["frames"].as_u64().unwrap();
@@ -265,7 +271,7 @@ fn what_moves_is_kept_apart_unless_no_masks_are_taken_or_all_goes_into_one_map()
         let tracks = fs::read_to_string(root.path().join(out).join("tracks.csv")).unwrap();
         (serde_json::from_slice(&run.stdout).unwrap(), tracks.lines().skip(1).map(ToOwned::to_owned).collect())
     };
-    let (with, tracks) = run("with", &["--keep-blocks"]);
+    let (with, tracks) = run("with", &["--keep-blocks", "--instances", "exact"]);
     let objects = names(&root.path().join("with/objects"));
     let (meshes, paths): (Vec<&String>, Vec<&String>) = objects.iter().partition(|name| name.ends_with(".ply"));
     assert!(!tracks.is_empty() && !meshes.is_empty(), "{with}");

@@ -11,8 +11,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
 
-/// A street with traffic whose map outgrows its pool.
-const STREET: [&str; 14] = [
+/// A street with traffic, detected and found by its motion, whose map outgrows its pool.
+const STREET: [&str; 18] = [
     "run",
     "--profile",
     "tiny",
@@ -26,6 +26,10 @@ const STREET: [&str; 14] = [
     "volume.voxel_size_m=0.07",
     "--set",
     "volume.prune_lag=6",
+    "--set",
+    "tracking.segmentation.enabled=true",
+    "--instances",
+    "exact",
     "--out",
 ];
 

@@ -60,18 +60,18 @@ fn a_killed_sweep_resumes_and_merged_shards_equal_the_whole() {
     let results = |out: &str| results(&root.path().join(out));
     kill_after_two_results(root.path(), "cut");
     let before = results("cut");
-    assert!((2..6).contains(&before.len()), "killed in the middle: {before:?}");
+    assert!((2..7).contains(&before.len()), "killed in the middle: {before:?}");
     let made = |path: &PathBuf| (fs::read(path).unwrap(), fs::metadata(path).unwrap().modified().unwrap());
     let kept: Vec<_> = before.iter().map(made).collect();
     let resumed = dynvox(root.path(), &[&SWEEP[..], &["cut"]].concat());
     assert!(resumed.status.success(), "{}", output_text(&resumed));
     assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "finished runs are not repeated");
-    assert_eq!(results("cut").len(), 6, "two late, two scales, tracker and no objects");
+    assert_eq!(results("cut").len(), 7, "two late, two scales, tracker, no objects and motion");
     assert_eq!(names(&root.path().join("cut")), ["methods.csv", "plan.json", "prune-weight.csv", "report.html", "runs", "scale.csv"]);
     assert!(names(&root.path().join("cut/runs")).iter().all(|name| name.ends_with(".json")), "only its result stays of a run");
     for part in ["1/2", "2/2"] {
         let run = dynvox(root.path(), &[&SWEEP[..], &[&part[..1], "--shard", part]].concat());
-        assert!(run.status.success() && results(&part[..1]).len() == 3, "{}", output_text(&run));
+        assert!(run.status.success() && results(&part[..1]).len() >= 3, "{}", output_text(&run));
     }
     let merged = dynvox(root.path(), &["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
     assert!(merged.status.success(), "{}", output_text(&merged));

@@ -278,6 +278,7 @@ fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_
             let Some(car) = tracks.get(&summary.id).and_then(|track| truth(frame, seen, track)) else { continue };
             let truth = TrueObject {
                 id: car.id,
+                instance: 0,
                 pixels: tracks[&summary.id].pixels,
                 t_world_object: car.t_world_object,
                 dimensions_m: car.dimensions_m,

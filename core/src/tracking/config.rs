@@ -84,8 +84,8 @@ impl TrackingConfig {
         area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > least(self.area_min_px, width)
     }
 
-    /// Whether it can be tracked.
-    pub(super) fn trackable(&self, area_px: i64, width: usize) -> bool {
+    /// Whether so many pixels are enough to be tracked.
+    pub fn is_trackable(&self, area_px: i64, width: usize) -> bool {
         area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > least(self.track_area_min_px, width)
     }
 

@@ -243,7 +243,7 @@ fn validate(
         return None;
     }
     let tracked_only = !config.is_reconstructable(pixels.area(), image.width as usize);
-    if tracked_only && !config.trackable(pixels.area(), image.width as usize) {
+    if tracked_only && !config.is_trackable(pixels.area(), image.width as usize) {
         count.too_small += 1;
         return None;
     }

@@ -129,17 +129,17 @@ fn masks(dataset: &dyn FrameSource) -> String {
             let has = |index: &usize| dataset.stem(*index).is_some_and(|stem| folder.join(format!("{stem}.png")).is_file());
             let there = (0..dataset.len()).filter(has).count();
             match there {
-                0 => format!("{} has no mask of any frame's name: objects go into the static map", folder.display()),
+                0 => format!("{} has no mask of any frame's name: objects are found only while they move", folder.display()),
                 there if there == dataset.len() => format!("masks in {}: objects are separate from the static map", folder.display()),
                 there => format!(
-                    "masks in {} for {there} of {} frames: objects of the others go into the static map",
+                    "masks in {} for {there} of {} frames: in the others objects are found only while they move",
                     folder.display(),
                     dataset.len()
                 ),
             }
         }
-        AvailableMasks::Exact => "exact masks: objects are separate from the static map".to_owned(),
-        AvailableMasks::Absent => "no masks: objects go into the static map, unless --instances names some".to_owned(),
+        AvailableMasks::Exact => "exact masks, by --instances exact".to_owned(),
+        AvailableMasks::Absent => "no masks: objects are found only while they move, unless --instances names some".to_owned(),
     }
 }
 

@@ -48,6 +48,7 @@ Examples:
   dynvox run ~/kitti --sequence 06 --evaluate lidar     accuracy and completeness of input and map
   dynvox evaluate trajectory out/kitti-odometry-06-001 ~/kitti/poses/06.txt
   dynvox evaluate stereo ~/kitti-stereo-2015        D1 and coverage of the matcher, by region
+  dynvox evaluate masks masks/motion ~/tracking/instances/0003   IoU of masks that a run saved
   dynvox sweep street ~/kitti:06 --out sweep    prune weights, frame rates and scales on one page
   dynvox synth --out street --set street.frames=50
   dynvox fixtures new pinned --from ~/my-rig --memory 32MiB   digests of your own rig, for your CI
@@ -76,7 +77,7 @@ enum Command {
     Calibration(calibration::CalibrationArgs),
     /// Show where the bytes go: all profiles, or one region by region
     Budget(budget::BudgetArgs),
-    /// Evaluate files against ground truth: trajectories, disparities
+    /// Evaluate files against ground truth: trajectories, disparities, masks
     Evaluate(evaluate::EvaluateArgs),
     /// Run many times with one setting varied, and compare the results with the original's numbers on one page
     Sweep(Box<sweep::SweepArgs>),

@@ -2,6 +2,7 @@
 
 mod results;
 mod resume;
+mod saved;
 mod stream;
 
 use super::capacity::CapacityArgs;
@@ -81,10 +82,13 @@ pub struct RunArgs {
     /// and not disparity), disparity:DIR, depth:DIR, or exact (the synthetic street)
     #[arg(long, default_value = "elas", value_name = "SOURCE")]
     depth: DepthChoice,
-    /// Source of instance masks: auto, motion (no masks: moving objects are found by their motion), none,
-    /// files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or noisy[:SEED] (the synthetic street)
+    /// Source of instance masks: auto (files where the data set has them, and motion), motion (moving objects are found by their motion
+    /// alone), none, files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or noisy[:SEED] (the synthetic street)
     #[arg(long, default_value = "auto", value_name = "SOURCE")]
     instances: MaskChoice,
+    /// Save every frame's instance masks to a new folder, for --instances files:DIR; those found by motion go to DIR/motion
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["snapshot_every", "scale"])]
+    save_instances: Option<PathBuf>,
     /// Whether objects are masked out of the static map and reconstructed separately; off fuses everything into one map [default: on]
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     dynamic: Option<bool>,
@@ -253,8 +257,8 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
     if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &frames) {
         settings.set_frame_interval_s(interval_s);
     }
-    if args.instances.finds_motion() {
-        settings.find_motion();
+    if let Some(finds_motion) = args.instances.finds_motion() {
+        settings.set_motion_segmentation(finds_motion);
     }
     if let Some(dynamic) = args.dynamic {
         settings.set_dynamic(dynamic);
@@ -285,6 +289,7 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
         strict: args.strict,
         evaluate: args.evaluate,
         evaluation_delay: args.evaluation_delay,
+        save_instances: None,
         rss_limit_bytes: args.rss_limit_mib.map_or(capacity.bytes() as u64 + HOST_OVERHEAD_BYTES, |mib| mib.saturating_mul(MIB)),
         quiet: args.silent(),
         dataset,
@@ -324,13 +329,19 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     plan.checkpoints = args.snapshot_every.map(|every| resume::checkpoints(&plan, every)).transpose()?;
     let target = args.out.clone().unwrap_or_else(|| RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name()));
     let folder = RunFolder::begin(&target, args.overwrite)?;
+    let saved = args.save_instances.as_deref().map(saved::begin).transpose()?;
+    plan.save_instances = saved.as_ref().map(|saved| saved.path().to_path_buf());
     if !args.silent() {
         print_header(&plan);
         if plan.checkpoints.is_some() {
             eprintln!("note: if the run is interrupted, `dynvox run --resume {}` resumes it", target.display());
         }
     }
-    finish(args, &plan, folder, None)
+    finish(args, &plan, folder, None)?;
+    if let Some(saved) = saved {
+        saved.commit(&[])?;
+    }
+    Ok(())
 }
 
 /// A run whose results are written, and incomplete.

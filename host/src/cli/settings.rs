@@ -133,9 +133,9 @@ impl Settings {
         self.tracking.dynamic = dynamic;
     }
 
-    /// Searches for moving objects by their motion.
-    pub fn find_motion(&mut self) {
-        self.tracking.segmentation.enabled = true;
+    /// Sets whether moving objects are searched for by their motion.
+    pub fn set_motion_segmentation(&mut self, enabled: bool) {
+        self.tracking.segmentation.enabled = enabled;
     }
 
     /// The street's configuration.

@@ -1,5 +1,6 @@
 //! How good a run was, where the truth is known.
 
+pub mod masks;
 pub mod objects;
 pub mod quantile;
 pub mod reference;

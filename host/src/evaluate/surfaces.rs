@@ -174,6 +174,7 @@ mod tests {
     fn side() -> SeenSide {
         let truth = TrueObject {
             id: 1,
+            instance: 0,
             pixels: PixelBox { left: 0, top: 0, width: 100, height: 80 },
             t_world_object: Transform::from_translation([0.0, 1.0, 10.0]),
             dimensions_m: [2.0, 1.5, 4.0],

@@ -115,6 +115,7 @@ mod tests {
     fn counts_what_stands_where_a_car_drove_and_not_the_road_below_it() {
         let car = |z: f64, moving| TrueObject {
             id: 1,
+            instance: 0,
             pixels: PixelBox::default(),
             t_world_object: Transform::from_translation([3.0, 1.6, z]),
             dimensions_m: [1.8, 1.5, 4.0],

@@ -4,6 +4,7 @@
 mod blocks;
 mod frame;
 mod health;
+mod instances;
 mod keyframes;
 mod objects;
 pub mod pictures;
@@ -16,6 +17,7 @@ mod volume_copy;
 pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
 pub use frame::{FrameRow, STAGES, StageTime};
 pub use health::{HealthObserver, HealthSection};
+pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
 pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, ReferenceSection};
@@ -32,7 +34,7 @@ use dynvox_core::view::Raycaster;
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Capacity, Config, Mapper};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why an observer cannot continue.
 #[derive(Debug, thiserror::Error)]
@@ -72,6 +74,8 @@ pub struct Setup<'p> {
     pub folder: PathBuf,
     /// Where the camera's motion comes from: `stereo`, `icp` or `file`.
     pub motion_source: &'static str,
+    /// Folder that every frame's instances are saved to, if they are.
+    pub save_instances: Option<&'p Path>,
     /// What the map is evaluated against, and when.
     pub reference: Option<ReferencePlan>,
 }
@@ -182,6 +186,7 @@ pub struct Observers {
     objects: ObjectsObserver,
     blocks: BlocksObserver,
     health: HealthObserver,
+    instances: InstancesObserver,
 }
 
 /// What the observers found.
@@ -224,7 +229,8 @@ impl Observer for Observers {
         self.tracks.frame(setup, frame)?;
         self.objects.frame(setup, frame)?;
         self.blocks.frame(setup, frame)?;
-        self.health.frame(setup, frame)
+        self.health.frame(setup, frame)?;
+        self.instances.frame(setup, frame)
     }
 
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {

@@ -1,12 +1,15 @@
 //! Tracks frame by frame and over the whole run, and their errors against ground truth.
 
 use super::{Finished, FrameContext, ObserveError, Observer, Setup};
+use crate::evaluate::masks::{MovingErrors, MovingFigures, Overlaps};
 use crate::evaluate::objects::{ObjectErrors, ObjectFigures, TrackComparison, TrackErrors};
 use crate::evaluate::quantile::median;
+use crate::formats::Image;
+use dynvox_core::Mapper;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::{Class, MotionState, TrackReport};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of a motion state in tables and files.
 pub const fn state_name(state: MotionState) -> &'static str {
@@ -104,6 +107,8 @@ pub struct TracksSection {
     pub tracks: Vec<TrackRecord>,
     /// All against ground truth, where it is known.
     pub figures: Option<ObjectFigures>,
+    /// Masks of what moves against exact ones, where these are known.
+    pub masks: Option<MovingFigures>,
     /// Every comparison with a true object, by frame and then by track.
     pub comparisons: Vec<(u32, TrackComparison)>,
 }
@@ -113,6 +118,7 @@ pub struct TracksSection {
 pub struct TracksObserver {
     frames: Vec<FrameTracks>,
     errors: ObjectErrors,
+    masks: MovingErrors,
 }
 
 impl Observer for TracksObserver {
@@ -124,6 +130,11 @@ impl Observer for TracksObserver {
             let size = setup.dataset.size();
             let large_enough = |pixels: &PixelBox| setup.config.tracking.is_reconstructable(pixels.area(), size.0);
             self.errors.add(&tracks, &frame.row.report.t_world_camera, truth, size, large_enough);
+            if let Some(exact) = &frame.images.exact {
+                let (overlaps, by_motion) = overlaps(frame.view.mapper(), &exact.instances);
+                let large_enough = |pixels: u64| setup.config.tracking.is_trackable(pixels as i64, size.0);
+                self.masks.add(&overlaps, &truth.objects, &truth.t_world_camera, large_enough, |label| by_motion.contains(&label));
+            }
         }
         self.frames.push(FrameTracks { frame: frame.row.frame, tracks: tracks.iter().map(TrackRow::from).collect() });
         Ok(())
@@ -133,10 +144,27 @@ impl Observer for TracksObserver {
         Ok(TracksSection {
             tracks: track_records(&self.frames, &self.errors.tracks()),
             figures: self.errors.figures(),
+            masks: self.masks.figures(),
             comparisons: self.errors.comparisons(),
             frames: self.frames,
         })
     }
+}
+
+/// Overlaps of this frame's instances with the exact masks, and the labels of those found by motion. Labels number the instances.
+fn overlaps(mapper: &Mapper<'_>, exact: &Image<u8>) -> (Overlaps, BTreeSet<u16>) {
+    let (mut labels, mut by_motion) = (BTreeMap::<(Option<u32>, Class), u16>::new(), BTreeSet::new());
+    let width = exact.width();
+    let overlaps = Overlaps::of(exact.pixels().iter().enumerate().map(|(at, truth)| {
+        let found = mapper.instance_at((at % width) as i32, (at / width) as i32).map_or(0, |instance| {
+            let next = labels.len() as u16 + 1;
+            *labels.entry((instance.track, instance.class)).or_insert(next)
+        });
+        (found, u16::from(*truth))
+    }));
+    let moving = labels.iter().filter(|((_, class), _)| *class == Class::MovingObject);
+    by_motion.extend(moving.map(|(_, label)| *label));
+    (overlaps, by_motion)
 }
 
 /// Every track over all frames.

@@ -1,7 +1,7 @@
 //! The last lines of a run on the console.
 
 use super::rig;
-use super::text::{MIB, lost_because, motion_error, states_in_time};
+use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time};
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::TrajectoryErrors;
 use crate::observe::Sections;
@@ -22,6 +22,7 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
         let [near, far] = [&figures.moving_near, &figures.moving_far].map(error);
         lines.push(("motion error", format!("per frame of moving objects: {near} within 20 m; {far} at 20 to 32 m")));
     }
+    lines.extend(tracks.masks.iter().map(|masks| ("moving objects", moving_masks(masks))));
     lines.extend(block_lines(run));
     lines.extend(pose_lines(run));
     lines.push((if rig::is_warning(run) { "calibration WARNING" } else { "calibration" }, rig::sentence(run)));

@@ -1,6 +1,7 @@
 //! `summary.json`: the figures of a run under fixed keys. A key is absent where its value is unknown.
 
 use super::rig::RigSummary;
+use crate::evaluate::masks::MovingFigures;
 use crate::evaluate::objects::{ObjectFigures, TrackErrors};
 use crate::evaluate::reference::ReferenceFigures;
 use crate::evaluate::surfaces::SurfaceFigures;
@@ -37,6 +38,9 @@ pub struct Summary {
     /// Tracks against ground truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     objects_truth: Option<ObjectFigures>,
+    /// Masks of what moves against exact ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    masks_truth: Option<MovingFigures>,
     map: MapSummary,
     prune: PruneSummary,
     evict: EvictSummary,
@@ -205,6 +209,7 @@ impl Summary {
             lidar: sections.reference.as_ref().and_then(|reference| reference.figures.clone()),
             objects: sections.tracks.tracks.iter().map(|track| ObjectSummary::of(track, &sections.objects.objects)).collect(),
             objects_truth: sections.tracks.figures.clone(),
+            masks_truth: sections.tracks.masks.clone(),
             map: MapSummary {
                 blocks: sections.blocks.blocks,
                 blocks_peak: sections.blocks.totals.peak,

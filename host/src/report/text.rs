@@ -1,5 +1,6 @@
 //! Numbers and sentences that console and page share.
 
+use crate::evaluate::masks::{FOUND_IOU, MovingFigures, RangeFigures};
 use crate::evaluate::objects::{LateStates, Medians, SETTLING_FRAMES};
 use crate::run::RunRecord;
 
@@ -32,6 +33,22 @@ pub fn states_in_time(of: &LateStates) -> String {
 /// Median error of a frame's motion; `None` without one.
 pub fn motion_error(of: &Medians) -> Option<String> {
     Some(format!("{:.1} cm, {:.2} deg", 100.0 * of.t_m?, of.r_deg?))
+}
+
+/// How many of what moves was found, and how much of it.
+pub fn moving_masks(masks: &MovingFigures) -> String {
+    let range = |range: &RangeFigures| {
+        let [begin_m, end_m] = range.distance_m;
+        format!("{} of {} at {begin_m} to {end_m} m", range.found, range.objects)
+    };
+    let ranges: Vec<String> = masks.ranges.iter().map(range).collect();
+    let mean_iou = masks.mean_iou.map_or_else(String::new, |iou| format!("; mean IoU {iou:.3}"));
+    let false_masks = masks.false_masks;
+    format!(
+        "found with an IoU of {FOUND_IOU} or more: {}{mean_iou}; {false_masks} false masks in {} frames",
+        ranges.join(", "),
+        masks.frames
+    )
 }
 
 /// Why blocks are lost, and what to do.

@@ -8,6 +8,7 @@ use crate::observe::{Reference, ReferencePlan, Setup};
 use dynvox_core::MotionSource;
 use dynvox_core::geometry::Transform;
 use dynvox_core::{Capacity, Config};
+use std::path::PathBuf;
 
 /// Bytes the host may use in addition to the slab, by default: decoded images, the synthetic street, a row per frame, pictures for the
 /// report, the index of the block file.
@@ -47,6 +48,8 @@ pub struct Plan {
     pub evaluate: Option<Reference>,
     /// Frames after which the map is evaluated against a frame's reference, from the frame's pose.
     pub evaluation_delay: usize,
+    /// Folder that every frame's instances are saved to, if they are.
+    pub save_instances: Option<PathBuf>,
     /// What is doubtful about the images.
     pub warnings: Vec<String>,
     /// Whether to show no progress.
@@ -68,6 +71,7 @@ impl Plan {
                 (None, MotionSource::Stereo) => "stereo",
                 (None, MotionSource::Icp) => "icp",
             },
+            save_instances: self.save_instances.as_deref(),
             reference: match self.evaluate {
                 Some(reference) => ReferencePlan::all(dataset, self.frames.listed(), reference, self.evaluation_delay),
                 None => ReferencePlan::sampled(dataset, self.frames.listed()),

@@ -20,7 +20,7 @@ pub enum Kind {
     Depth,
     /// Whether objects are separate from the static map.
     Dynamic,
-    /// The three methods of Table I: depth tracker, stereo egomotion, stereo egomotion and objects.
+    /// The three methods of Table I: depth tracker, stereo egomotion, stereo egomotion and objects; and objects without a detector.
     Methods,
 }
 
@@ -129,6 +129,9 @@ impl Plan {
             for (data, reference) in &request.data {
                 for (value, more, delayed) in values(kind, request, data) {
                     let mut arguments = request.common.clone();
+                    if data.path.is_none() && !more.contains(&MOTION[0].to_owned()) {
+                        arguments.extend(["--instances", "exact"].map(str::to_owned));
+                    }
                     arguments.extend(more);
                     if let Some(reference) = reference {
                         arguments.extend(["--evaluate", reference].map(str::to_owned));
@@ -181,6 +184,9 @@ impl Plan {
     }
 }
 
+/// No masks: objects are found by their motion. Otherwise the street is swept with its exact masks.
+const MOTION: [&str; 2] = ["--instances", "motion"];
+
 /// Values of one sweep on one data set: as shown, as arguments, and whether the map is evaluated later.
 fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Vec<String>, bool)> {
     let one = |value: &dyn std::fmt::Display, arguments: &[&str], delayed: bool| {
@@ -229,6 +235,7 @@ fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Vec<S
             one(&"depth tracker (ICP)", &["--dynamic", "off", "--egomotion", "icp"], false),
             one(&"stereo egomotion", &["--dynamic", "off"], false),
             one(&"stereo egomotion, separate objects", &[], false),
+            one(&"stereo egomotion, objects by motion alone", &MOTION, false),
         ],
     }
 }

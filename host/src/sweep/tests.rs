@@ -59,8 +59,8 @@ fn points_that_mean_the_same_run_share_it() {
     assert_eq!(run(Kind::Depth, "elas"), run(Kind::Methods, "stereo egomotion, separate objects"));
     assert_ne!(run(Kind::FrameRate, "1"), run(Kind::Scale, "100"), "the one is looked at late");
     assert!(run(Kind::Depth, "exact").is_some() && plan.of(Kind::Depth, "06").count() == 1, "only the street has exact depth");
-    // By hand: 3 weights and 1 rate late; default, 50 %, off, tracker; on the street exact depth as well.
-    assert_eq!(plan.runs.len(), 2 * 8 + 1);
+    // By hand: 3 weights and 1 rate late; default, 50 %, off, tracker, motion; on the street exact depth as well.
+    assert_eq!(plan.runs.len(), 2 * 9 + 1);
     let paths = plan.runs.values().flatten().any(|argument| argument.contains("where"));
     assert!(!paths, "a plan is the same wherever the data lie");
 }

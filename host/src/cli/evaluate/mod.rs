@@ -1,5 +1,6 @@
 //! `dynvox evaluate`: figures from files, without a run.
 
+mod masks;
 mod stereo;
 mod trajectory;
 
@@ -15,11 +16,14 @@ enum Subject {
     Trajectory(trajectory::TrajectoryArgs),
     /// Evaluate disparity against a stereo benchmark: KITTI 2012 or 2015
     Stereo(stereo::StereoArgs),
+    /// Evaluate instance masks against true ones: IoU mask by mask, and recall
+    Masks(masks::MasksArgs),
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     match &args.subject {
         Subject::Trajectory(args) => trajectory::run(args),
         Subject::Stereo(args) => stereo::run(args),
+        Subject::Masks(args) => masks::run(args),
     }
 }

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 34] = [
+pub const FIXED_ARGUMENTS: [&str; 35] = [
     "path",
     "sequence",
     "dataset",
@@ -27,6 +27,7 @@ pub const FIXED_ARGUMENTS: [&str; 34] = [
     "scale",
     "depth",
     "instances",
+    "save_instances",
     "dynamic",
     "egomotion",
     "fuse_every",

@@ -15,6 +15,7 @@ fn truth(frame: u32, moving: bool) -> ObjectsTruth {
         if moving { Transform::new(Vector3::new(0.0, 0.02, 0.0) * f, Vector3::new(0.0, 0.0, 1.0) * f) } else { Transform::IDENTITY };
     let object = TrueObject {
         id: 7,
+        instance: 0,
         pixels: PIXELS,
         t_world_object: Transform::from_translation([3.0, 1.6, 12.0]) * along,
         dimensions_m: [1.8, 1.5, 4.0],

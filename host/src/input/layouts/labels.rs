@@ -75,6 +75,7 @@ fn label(line: &str) -> Option<(usize, Labelled)> {
     }
     let object = TrueObject {
         id: words.get(1)?.parse().ok()?,
+        instance: 0,
         pixels,
         t_world_object: Transform::new([0.0, turn + std::f64::consts::FRAC_PI_2, 0.0], [x, y, z]),
         dimensions_m: [width, height, length],

@@ -117,10 +117,11 @@ fn objects_truth(frame: &SynthFrame) -> ObjectsTruth {
             *found = Some([l.min(u), t.min(v), r.max(u), b.max(v)]);
         }
     }
-    let seen = frame.objects.iter().zip(boxes).filter_map(|(object, found)| {
+    let seen = frame.objects.iter().zip(boxes).zip(1..).filter_map(|((object, found), instance)| {
         let [left, top, right, bottom] = found?;
         Some(TrueObject {
             id: object.id,
+            instance,
             pixels: PixelBox { left, top, width: right - left + 1, height: bottom - top + 1 },
             t_world_object: object.t_world_object,
             dimensions_m: object.dimensions_m,

@@ -8,7 +8,7 @@ use std::str::FromStr;
 /// Where masks come from, as the command line says it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum MaskChoice {
-    /// The data set's own: its folder of instances, the street's exact masks, else none.
+    /// The data set's folder of instances, if it has one, and moving objects by their motion.
     #[default]
     Auto,
     /// No masks, and no search for moving objects.
@@ -28,9 +28,13 @@ pub enum MaskChoice {
 }
 
 impl MaskChoice {
-    /// Whether moving objects are found by their motion.
-    pub fn finds_motion(&self) -> bool {
-        matches!(self, Self::Motion)
+    /// Whether moving objects are searched for by their motion; `None` where the settings decide.
+    pub fn finds_motion(&self) -> Option<bool> {
+        match self {
+            Self::Auto | Self::Motion => Some(true),
+            Self::None => Some(false),
+            Self::Files(_) | Self::Mots(_) | Self::Mnc(_) | Self::Exact | Self::Noisy(_) => None,
+        }
     }
 }
 
@@ -118,8 +122,7 @@ impl OpenedSource {
             MaskChoice::Exact => exact(Box::new(Exact), "exact masks"),
             MaskChoice::Noisy(seed) => exact(Box::new(Noisy { inner: Exact, seed: *seed }), "exact masks with a detector's faults"),
             MaskChoice::Auto => match dataset.masks() {
-                AvailableMasks::Absent => Ok(None),
-                AvailableMasks::Exact => exact(Box::new(Exact), "exact masks"),
+                AvailableMasks::Absent | AvailableMasks::Exact => Ok(None),
                 AvailableMasks::Folder(folder) => match boxed(Indexed::open(&folder, frames())) {
                     (_, 0) => Ok(None),
                     found => Ok(Some(files(found, &folder))),

@@ -14,10 +14,14 @@ mod indexed;
 mod mnc;
 mod mots;
 mod noisy;
+mod pairs;
+mod save;
 #[cfg(test)]
 mod tests;
 
 pub use choice::{MaskChoice, attach};
+pub use pairs::{LabelPair, label_pairs};
+pub use save::save_masks;
 
 use crate::formats::{FormatError, Image, read_png_u16};
 use crate::input::source::{FrameMasks, InputError, StereoImages};

@@ -314,8 +314,9 @@ fn street() -> Box<dyn FrameSource> {
 
 #[test]
 fn the_street_knows_every_car_it_draws_parked_ones_too() {
-    let dataset = attach(street(), &MaskChoice::Auto).unwrap();
-    let frame = dataset.frame(20).unwrap();
+    let given = |choice: &MaskChoice| attach(street(), choice).unwrap().frame(20).unwrap();
+    assert!(given(&MaskChoice::Auto).masks.instances.is_empty(), "exact masks are given only to those who ask for them");
+    let frame = given(&MaskChoice::Exact);
     let truth = frame.objects.unwrap();
     assert_eq!(frame.masks.instances.len(), truth.objects.len());
     assert!(truth.objects.iter().any(|object| object.moving) && truth.objects.iter().any(|object| !object.moving));
@@ -356,6 +357,8 @@ fn sources_are_named_on_the_command_line() {
     for wrong in ["", "files", "files:", "onnx:a", "noisy:x", "AUTO"] {
         assert!(choice(wrong).is_err(), "{wrong}");
     }
+    let finds_motion = |text: &str| choice(text).unwrap().finds_motion();
+    assert_eq!(["auto", "motion", "none", "files:a", "exact"].map(finds_motion), [Some(true), Some(true), Some(false), None, None]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::evaluate::objects::{LateStates, OVERLAP_MIN, ObjectFigures};
 use crate::evaluate::surfaces::SurfaceFigures;
 use crate::observe::{ReconstructedObject, TrackRecord, TracksSection, state_name};
 use crate::report::chart::{Bar, Lane, lanes};
-use crate::report::text::{grouped, motion_error, states_in_time};
+use crate::report::text::{grouped, motion_error, moving_masks, states_in_time};
 use crate::run::RunRecord;
 use dynvox_core::tracking::MotionState;
 use maud::{Markup, html};
@@ -37,6 +37,7 @@ pub fn section(run: &RunRecord) -> Markup {
             }
             @if !refused.is_empty() { p.soft.small { "The source of masks: " (refused.join(", ")) "." } }
             @if let Some(figures) = &tracks.figures { (truth(figures)) }
+            @if let Some(masks) = &tracks.masks { p.small { "Moving objects, masks against exact ones: " (moving_masks(masks)) "." } }
             @if let Some(count) = run.sections.objects.swept_triangles {
                 p.small { "Triangles of the static map in the volume that moving objects swept: " b { (grouped(count)) } "." }
             }

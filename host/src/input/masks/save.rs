@@ -1,0 +1,41 @@
+//! Writes masks as instance PNGs with lists, so that another run, or another program, takes them.
+
+use crate::formats::FormatError;
+use crate::input::source::{InputError, InstanceMask};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Writes the masks of a frame as `STEM.png` and `STEM.txt` into a folder. Where masks overlap, the higher score is on top.
+///
+/// # Errors
+/// A file cannot be written, or there are more masks than a picture has values.
+pub fn save_masks(folder: &Path, stem: &str, (width, height): (usize, usize), masks: &[InstanceMask]) -> Result<(), InputError> {
+    let mut order: Vec<(u16, &InstanceMask)> = (1..).zip(masks).collect();
+    if order.len() < masks.len() {
+        return Err(InputError::masks(folder, format!("{} masks in a frame are more than a picture has values", masks.len())));
+    }
+    order.sort_by(|(_, a), (_, b)| a.score.total_cmp(&b.score));
+    let mut labels = vec![0u16; width * height];
+    for (label, mask) in order {
+        let rows = (mask.pixels.top.max(0)..).take(mask.pixels.height.max(0) as usize).take_while(|v| (*v as usize) < height);
+        for v in rows {
+            let pixels = labels.get_mut(v as usize * width..(v as usize + 1) * width).unwrap_or_default();
+            let columns = (0..).zip(pixels).skip(mask.pixels.left.max(0) as usize).take(mask.pixels.width.max(0) as usize);
+            columns.filter(|(u, _)| mask.contains(*u, v)).for_each(|(_, pixel)| *pixel = label);
+        }
+    }
+    let mut list = String::from("# id class score x1 y1 x2 y2\n");
+    for (label, mask) in (1u16..).zip(masks) {
+        let [left, top] = [mask.pixels.left, mask.pixels.top];
+        let (right, bottom) = (left + mask.pixels.width, top + mask.pixels.height);
+        // Writing to a String cannot fail.
+        let _ = writeln!(list, "{label} {} {} {left}.0 {top}.0 {right}.0 {bottom}.0", mask.class.name(), mask.score);
+    }
+    let picture = folder.join(format!("{stem}.png"));
+    let bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_ne_bytes()).collect();
+    image::save_buffer(&picture, &bytes, width as u32, height as u32, image::ExtendedColorType::L16).map_err(|error| {
+        InputError::masks_format(FormatError::content(&picture, error.to_string(), "Free the disk or choose another folder"))
+    })?;
+    let list_path = folder.join(format!("{stem}.txt"));
+    std::fs::write(&list_path, list).map_err(|error| InputError::masks(&list_path, format!("it cannot be written ({error})")))
+}
