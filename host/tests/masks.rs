@@ -46,15 +46,15 @@ fn saved_masks_repeat_the_run_and_equal_themselves() {
     let again = street(root.path(), "again", &["--frames", "6", "--instances", "files:saved"]);
     assert_eq!(exact["digest"], again["digest"]);
     let evaluate = |args: &[&str]| dynvox(root.path(), &[&["evaluate", "masks"], args].concat());
-    let told = evaluate(&["saved", "saved", "--json"]);
-    let figures: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
+    let output = evaluate(&["saved", "saved", "--json"]);
+    let figures: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&figures["frames"], &figures["false_masks"]), (&6.into(), &0.into()));
     let truth = &figures["truth"][0];
     assert!(truth["masks"].as_u64() > Some(5) && truth["masks"] == truth["found"] && truth["mean_iou"] == 1.0, "{truth}");
     assert!(String::from_utf8_lossy(&evaluate(&["saved", "saved"]).stdout).contains("6 frames; "));
     // Nothing was found by motion: exact masks were taken alone.
-    let told = evaluate(&["saved/motion", "saved", "--json"]);
-    let figures: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
+    let output = evaluate(&["saved/motion", "saved", "--json"]);
+    let figures: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((figures["found"].as_array().map(Vec::len), &figures["truth"][0]["found"]), (Some(0), &0.into()));
     fs::create_dir(root.path().join("empty")).unwrap();
     let refused = evaluate(&["empty", "saved"]);

@@ -45,7 +45,7 @@ pub struct AreaFigures {
     pub masks: u64,
     /// Of these, found.
     pub found: u64,
-    /// Mean IoU of all with their best mask, 0 where there is none.
+    /// Mean IoU of all with their best mask, 0 without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_iou: Option<f64>,
     /// Mean IoU of those found.

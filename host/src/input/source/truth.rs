@@ -8,7 +8,7 @@ use dynvox_core::masks::PixelBox;
 pub struct TrueObject {
     /// Its number, over all frames.
     pub id: u32,
-    /// Its value in the exact masks ([`crate::input::ExactFrame`]); 0 where there are none.
+    /// Its value in the exact masks ([`crate::input::ExactFrame`]); 0 without them.
     pub instance: u8,
     /// The box of its visible pixels in the left image.
     pub pixels: PixelBox,
