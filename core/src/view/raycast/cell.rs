@@ -1,6 +1,6 @@
 //! One cell of the lattice as a ray meets it: the trilinear field between its corners.
 
-use super::eye::{AXES, Ray};
+use super::ray_camera::{AXES, Ray};
 use crate::geometry::scalar::{max_f32, min_f32};
 
 /// Most steps towards a root; the first hits it where the field is linear.
@@ -100,12 +100,12 @@ pub(super) struct RaySegment {
     to: [f32; 3],
 }
 
-/// In place of an axis: within a cell, not on a wall.
+/// In place of an axis: within a cell, not on a face.
 pub(super) const NO_AXIS: usize = 3;
 
 impl RaySegment {
     /// The way between two depths through a cell that the ray enters and leaves across `axes` ([`NO_AXIS`] where it begins within), given
-    /// where the ray would be at depth 0 from the cell's first corner. Coordinates on these walls are exactly 0 or 1.
+    /// where the ray would be at depth 0 from the cell's first corner. Coordinates on these faces are exactly 0 or 1.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     pub fn new(ray: &Ray, offset: [f32; 3], depths_m: [f32; 2], axes: [usize; 2]) -> Self {

@@ -2,14 +2,14 @@
 
 use super::{
     cell::{Corners, Field, NO_AXIS, RaySegment, mean, within},
-    eye::{Depth, Ray, RayCamera, depth_from_m, depth_in_m},
-    spot::{CORNER_STRIDES, CellFace, CellIndex, FACES},
+    cell_index::{CORNER_STRIDES, CellFace, CellIndex, FACES},
+    ray_camera::{Depth, Ray, RayCamera, depth_from_m, depth_in_m},
     surface::Surface,
 };
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks, Slot};
 
 /// Most blocks one ray visits.
-const MAX_BLOCKS: usize = 6 * super::eye::MAX_REACH_BLOCKS as usize;
+const MAX_BLOCKS: usize = 6 * super::ray_camera::MAX_REACH_BLOCKS as usize;
 /// Most cells a ray passes in one block.
 const MAX_CELLS: usize = 3 * BLOCK_SIDE;
 
@@ -28,7 +28,7 @@ pub(super) struct Hit {
 pub(super) struct Marcher<'a, 's> {
     pub surface: &'a Surface<'s>,
     pub blocks: &'a Blocks<'s>,
-    pub eye: &'a RayCamera,
+    pub ray_camera: &'a RayCamera,
     pub min_weight: u8,
 }
 
@@ -46,16 +46,16 @@ struct BlockContext<'a> {
 impl BlockContext<'_> {
     /// Where the ray would be at depth 0, from a cell's first corner.
     #[inline(always)]
-    fn offset(&self, spot: CellIndex) -> [f32; 3] {
+    fn offset(&self, cell: CellIndex) -> [f32; 3] {
         let [x, y, z] = self.offset;
-        [x - spot.coordinate(0) as f32, y - spot.coordinate(1) as f32, z - spot.coordinate(2) as f32]
+        [x - cell.coordinate(0) as f32, y - cell.coordinate(1) as f32, z - cell.coordinate(2) as f32]
     }
 }
 
 /// A ray's way through one crossed cell.
 #[derive(Clone, Copy)]
 struct Step {
-    spot: CellIndex,
+    cell: CellIndex,
     /// Whether all corners were seen.
     fully_observed: bool,
     from: Depth,
@@ -74,7 +74,7 @@ struct PreviousSample {
 /// Where the surface was met.
 struct Crossing<'a> {
     slots: &'a [Slot; 8],
-    spot: CellIndex,
+    cell: CellIndex,
     /// The field's gradient there.
     gradient: [f32; 3],
     /// The point within the cell.
@@ -87,25 +87,25 @@ impl Marcher<'_, '_> {
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "a layer is below 8, axes are below 3")]
     pub fn cast(&self, u: usize, v: usize, [from_m, to_m]: [f32; 2]) -> Option<Hit> {
-        let ray = &self.eye.ray(u, v);
+        let ray = &self.ray_camera.ray(u, v);
         let (mut from, last) = (depth_from_m(from_m), depth_from_m(to_m));
         let [delta_x, delta_y, delta_z] =
             [CellIndex::delta(0, ray.ahead[0]), CellIndex::delta(1, ray.ahead[1]), CellIndex::delta(2, ray.ahead[2])];
         let [stride_x, stride_y, stride_z] = [ray.stride(0), ray.stride(1), ray.stride(2)];
-        let (mut block, mut spot, [mut next_x, mut next_y, mut next_z]) = begin(ray, from);
+        let (mut block, mut cell, [mut next_x, mut next_y, mut next_z]) = begin(ray, from);
         let mut entered = NO_AXIS;
-        let mut trail = PreviousSample::default();
+        let mut previous = PreviousSample::default();
         for _ in 0..MAX_BLOCKS {
             let Some(entry) = self.surface.entry(block) else {
                 (from, entered) = ray.leaves(block);
                 if from > last {
                     return None;
                 }
-                (block, spot, [next_x, next_y, next_z]) = begin(ray, from);
+                (block, cell, [next_x, next_y, next_z]) = begin(ray, from);
                 continue;
             };
             let (cells, slots) = self.surface.block(entry)?;
-            let here = BlockContext { ray, slots, sdf: self.blocks.sdf(slots[0])?, offset: ray.offset(block) };
+            let block_context = BlockContext { ray, slots, sdf: self.blocks.sdf(slots[0])?, offset: ray.offset(block) };
             for _ in 0..MAX_CELLS {
                 // Ties go to the first axis; the cells of no depth between them stop no ray.
                 let (to, axis) = if next_x <= next_y {
@@ -115,31 +115,31 @@ impl Marcher<'_, '_> {
                 } else {
                     (next_z, 2)
                 };
-                let (layer, bit) = spot.bit();
+                let (layer, bit) = cell.bit();
                 let layer = &cells[layer];
                 if layer.crossed >> bit & 1 == 1 && to > from {
                     let fully_observed = layer.fully_observed >> bit & 1 == 1;
-                    let step = Step { spot, fully_observed, from, to, axes: [entered, axis] };
-                    if let Some(crossing) = self.through(&here, step, &mut trail) {
+                    let step = Step { cell, fully_observed, from, to, axes: [entered, axis] };
+                    if let Some(crossing) = self.through(&block_context, step, &mut previous) {
                         return (crossing.depth_m <= to_m).then(|| self.hit(&crossing));
                     }
                 }
                 match axis {
-                    0 => (next_x, spot) = (next_x + stride_x, spot.plus(delta_x)),
-                    1 => (next_y, spot) = (next_y + stride_y, spot.plus(delta_y)),
-                    _ => (next_z, spot) = (next_z + stride_z, spot.plus(delta_z)),
+                    0 => (next_x, cell) = (next_x + stride_x, cell.plus(delta_x)),
+                    1 => (next_y, cell) = (next_y + stride_y, cell.plus(delta_y)),
+                    _ => (next_z, cell) = (next_z + stride_z, cell.plus(delta_z)),
                 }
                 (from, entered) = (to, axis);
-                if spot.is_outside() {
+                if cell.is_outside() {
                     break;
                 }
             }
             if from > last {
                 return None;
             }
-            let (moved, arrived) = spot.arrived();
+            let (moved, arrived) = cell.arrived();
             block = [block[0] + moved[0], block[1] + moved[1], block[2] + moved[2]];
-            spot = arrived;
+            cell = arrived;
         }
         None
     }
@@ -147,68 +147,70 @@ impl Marcher<'_, '_> {
     /// Looks for the surface in a crossed cell: the field must fall from above 0 to 0 or below.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    fn through<'h>(&self, here: &BlockContext<'h>, step: Step, trail: &mut PreviousSample) -> Option<Crossing<'h>> {
+    fn through<'h>(&self, block_context: &BlockContext<'h>, step: Step, previous: &mut PreviousSample) -> Option<Crossing<'h>> {
         let axis = step.axes[1];
-        let last = self.wall_value(here, step, axis, step.to, here.ray.ahead[axis] as u32);
-        let before = core::mem::replace(trail, PreviousSample { value: last, depth: step.to });
+        let last = self.face_value(block_context, step, axis, step.to, block_context.ray.ahead[axis] as u32);
+        let before = core::mem::replace(previous, PreviousSample { value: last, depth: step.to });
         if last > 0.0 {
             return None;
         }
-        let first = self.first_value(here, step, before);
-        if first > 0.0 { self.crossing(here, step, first, last) } else { None }
+        let first = self.first_value(block_context, step, before);
+        if first > 0.0 { self.crossing(block_context, step, first, last) } else { None }
     }
 
     /// The field where the ray enters a cell.
     #[inline(never)]
-    fn first_value(&self, here: &BlockContext<'_>, step: Step, before: PreviousSample) -> f32 {
+    fn first_value(&self, block_context: &BlockContext<'_>, step: Step, before: PreviousSample) -> f32 {
         let axis = step.axes[0];
         if before.depth == step.from {
             // Taken over from the cell before: should the two have guessed differently at a corner never seen, no ray slips through.
             before.value
-        } else if let Some(&ahead) = here.ray.ahead.get(axis) {
-            self.wall_value(here, step, axis, step.from, 1 - ahead as u32)
+        } else if let Some(&ahead) = block_context.ray.ahead.get(axis) {
+            self.face_value(block_context, step, axis, step.from, 1 - ahead as u32)
         } else {
-            // It begins within the cell, on no axis' wall.
-            self.guessed_value(here, step, step.from)
+            // It begins within the cell, on no axis' face.
+            self.guessed_value(block_context, step, step.from)
         }
     }
 
-    /// The field on a wall of a cell, lower (0) or upper (1) on an axis, where the ray passes it at `depth`: the mean of its four corners. One
+    /// The field on a face of a cell, lower (0) or upper (1) on an axis, where the ray passes it at `depth`: the mean of its four corners. One
     /// that was not seen completes the parallelogram of the others; with fewer, the cell has to tell.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3, the masks keep blocks below 8 and voxels below 512")]
-    fn wall_value(&self, here: &BlockContext<'_>, step: Step, axis: usize, depth: Depth, upper: u32) -> f32 {
-        let wall = &FACES[axis];
-        let corner = step.spot.plus(upper * wall.delta);
-        let [a, b, c, d] = if corner.shares_block(wall.far) && step.fully_observed {
-            let slot_sdf = if corner.is_in_own_block() { Some(here.sdf) } else { self.blocks.sdf(here.slots[corner.block() & 7]) };
+    fn face_value(&self, block_context: &BlockContext<'_>, step: Step, axis: usize, depth: Depth, upper: u32) -> f32 {
+        let face = &FACES[axis];
+        let corner = step.cell.plus(upper * face.delta);
+        let [a, b, c, d] = if corner.shares_block(face.far) && step.fully_observed {
+            let slot_sdf =
+                if corner.is_in_own_block() { Some(block_context.sdf) } else { self.blocks.sdf(block_context.slots[corner.block() & 7]) };
             let Some(sdf) = slot_sdf else { return 0.0 };
             let voxel = corner.voxel();
             let value = |stride: usize| f32::from(sdf[(voxel + stride) & 511]);
-            [value(0), value(wall.stride_u), value(wall.stride_v), value(wall.stride_u + wall.stride_v)]
+            [value(0), value(face.stride_u), value(face.stride_v), value(face.stride_u + face.stride_v)]
         } else {
-            match self.wall_corners(here, corner, wall, step.fully_observed) {
+            match self.face_corners(block_context, corner, face, step.fully_observed) {
                 Some(corners) => corners,
-                None => return self.guessed_value(here, step, depth),
+                None => return self.guessed_value(block_context, step, depth),
             }
         };
         let depth_m = depth_in_m(depth);
-        let at = |axis: usize| within(here.offset[axis] - step.spot.coordinate(axis) as f32, here.ray.slope[axis], depth_m);
-        let (at_u, at_v) = (at(wall.u), at(wall.v));
+        let at =
+            |axis: usize| within(block_context.offset[axis] - step.cell.coordinate(axis) as f32, block_context.ray.slope[axis], depth_m);
+        let (at_u, at_v) = (at(face.u), at(face.v));
         let (low, high) = (a + (b - a) * at_u, c + (d - c) * at_u);
         low + (high - low) * at_v
     }
 
-    /// The corners of a wall that lies in several blocks or may not wholly be seen; `None` when two or more are unseen.
+    /// The corners of a face that lies in several blocks or may not wholly be seen; `None` when two or more are unseen.
     #[inline(never)]
-    fn wall_corners(&self, here: &BlockContext<'_>, corner: CellIndex, wall: &CellFace, fully_observed: bool) -> Option<[f32; 4]> {
-        let points = [corner, corner.plus(wall.far - wall.delta_v), corner.plus(wall.delta_v), corner.plus(wall.far)];
+    fn face_corners(&self, block_context: &BlockContext<'_>, corner: CellIndex, face: &CellFace, fully_observed: bool) -> Option<[f32; 4]> {
+        let points = [corner, corner.plus(face.far - face.delta_v), corner.plus(face.delta_v), corner.plus(face.far)];
         let [a, b, c, d] = points;
         let [a, b, c, d] = [
-            self.point(here, a, fully_observed),
-            self.point(here, b, fully_observed),
-            self.point(here, c, fully_observed),
-            self.point(here, d, fully_observed),
+            self.point(block_context, a, fully_observed),
+            self.point(block_context, b, fully_observed),
+            self.point(block_context, c, fully_observed),
+            self.point(block_context, d, fully_observed),
         ];
         completed([a, b, c, d])
     }
@@ -216,8 +218,8 @@ impl Marcher<'_, '_> {
     /// The distance at a point, if it was seen.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
-    fn point(&self, here: &BlockContext<'_>, point: CellIndex, fully_observed: bool) -> Option<f32> {
-        let slot = here.slots[point.block() & 7];
+    fn point(&self, block_context: &BlockContext<'_>, point: CellIndex, fully_observed: bool) -> Option<f32> {
+        let slot = block_context.slots[point.block() & 7];
         let voxel = point.voxel() & 511;
         let sdf = f32::from(self.blocks.sdf(slot)?[voxel]);
         (fully_observed || self.blocks.weight(slot)?[voxel] >= self.min_weight).then_some(sdf)
@@ -225,23 +227,23 @@ impl Marcher<'_, '_> {
 
     /// The field where the ray enters or leaves a cell, corners guessed where they were not seen; 0, which stops no ray, where nothing tells it.
     #[inline(never)]
-    fn guessed_value(&self, here: &BlockContext<'_>, step: Step, depth: Depth) -> f32 {
-        let Some(corners) = self.corners(here, step) else { return 0.0 };
-        mean(&corners, passage(here, step).end(depth == step.to))
+    fn guessed_value(&self, block_context: &BlockContext<'_>, step: Step, depth: Depth) -> f32 {
+        let Some(corners) = self.corners(block_context, step) else { return 0.0 };
+        mean(&corners, segment(block_context, step).end(depth == step.to))
     }
 
     /// The point in a cell at which the field falls to 0.
     #[inline(never)]
-    fn crossing<'h>(&self, here: &BlockContext<'h>, step: Step, first: f32, last: f32) -> Option<Crossing<'h>> {
-        let field = Field::new(&self.corners(here, step)?);
-        let passage = passage(here, step);
-        let share = passage.root(&field, first, last);
-        let point = passage.at(share);
+    fn crossing<'h>(&self, block_context: &BlockContext<'h>, step: Step, first: f32, last: f32) -> Option<Crossing<'h>> {
+        let field = Field::new(&self.corners(block_context, step)?);
+        let segment = segment(block_context, step);
+        let share = segment.root(&field, first, last);
+        let point = segment.at(share);
         let (from_m, to_m) = (depth_in_m(step.from), depth_in_m(step.to));
         let depth_m = from_m + (to_m - from_m) * share;
         Some(Crossing {
-            slots: here.slots,
-            spot: step.spot,
+            slots: block_context.slots,
+            cell: step.cell,
             gradient: field.gradient(point),
             point,
             depth_m,
@@ -256,19 +258,19 @@ impl Marcher<'_, '_> {
     /// Distances at the corners of a cell, guessed where they were not seen.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "the mask keeps blocks below 8")]
-    fn corners(&self, here: &BlockContext<'_>, step: Step) -> Option<[f32; 8]> {
-        let in_one_block = step.spot.shares_block(CellIndex::FAR);
+    fn corners(&self, block_context: &BlockContext<'_>, step: Step) -> Option<[f32; 8]> {
+        let in_one_block = step.cell.shares_block(CellIndex::FAR);
         if in_one_block && step.fully_observed {
-            return Some(step.spot.corner_values(here.sdf)?.map(f32::from));
+            return Some(step.cell.corner_values(block_context.sdf)?.map(f32::from));
         }
         let mut corners = Corners::default();
         if in_one_block {
-            let weights = step.spot.corner_values(self.blocks.weight(here.slots[0])?)?;
-            corners.sdf = step.spot.corner_values(here.sdf)?.map(f32::from);
+            let weights = step.cell.corner_values(self.blocks.weight(block_context.slots[0])?)?;
+            corners.sdf = step.cell.corner_values(block_context.sdf)?.map(f32::from);
             (0..).zip(weights).for_each(|(corner, weight)| corners.observed |= u8::from(weight >= self.min_weight) << corner);
         } else {
-            for (corner, (sdf, point)) in corners.sdf.iter_mut().zip(step.spot.corners()).enumerate() {
-                let slot = here.slots[point.block() & 7];
+            for (corner, (sdf, point)) in corners.sdf.iter_mut().zip(step.cell.corners()).enumerate() {
+                let slot = block_context.slots[point.block() & 7];
                 if let Some(value) = self.blocks.sdf(slot).and_then(|sdfs| sdfs.get(point.voxel())) {
                     *sdf = f32::from(*value);
                     corners.observed |= u8::from(step.fully_observed || self.is_seen(slot, point.voxel())) << corner;
@@ -282,7 +284,7 @@ impl Marcher<'_, '_> {
     #[inline]
     fn hit(&self, crossing: &Crossing<'_>) -> Hit {
         let gradient = crossing.gradient;
-        let [right, down, forward] = self.eye.rotation.map(|row| row[0] * gradient[0] + row[1] * gradient[1] + row[2] * gradient[2]);
+        let [right, down, forward] = self.ray_camera.rotation.map(|row| row[0] * gradient[0] + row[1] * gradient[1] + row[2] * gradient[2]);
         let length = libm::sqrtf(right * right + down * down + forward * forward);
         let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
         let (colour, weight) = self.colour(crossing);
@@ -298,13 +300,13 @@ impl Marcher<'_, '_> {
     #[inline(never)]
     #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
     fn colour(&self, crossing: &Crossing<'_>) -> ([u8; 3], u8) {
-        let (spot, slots) = (crossing.spot, crossing.slots);
-        let nearest = spot.plus(CellIndex::steps(crossing.point.map(|c| u32::from(c >= 0.5))));
+        let (cell, slots) = (crossing.cell, crossing.slots);
+        let nearest = cell.plus(CellIndex::steps(crossing.point.map(|c| u32::from(c >= 0.5))));
         let weight = self.blocks.weight(slots[nearest.block() & 7]).map_or(0, |weights| weights[nearest.voxel() & 511]);
         let mut colours = Colours::default();
         let counts = counts(crossing.point);
-        if spot.shares_block(CellIndex::FAR) {
-            let window = |plane| CellIndex::window(spot, plane);
+        if cell.shares_block(CellIndex::FAR) {
+            let window = |plane| CellIndex::window(cell, plane);
             if let Some([red, green, blue]) = self.blocks.colour(slots[0])
                 && let (Some(red), Some(green), Some(blue)) = (window(red), window(green), window(blue))
             {
@@ -313,7 +315,7 @@ impl Marcher<'_, '_> {
                 }
             }
         } else {
-            for (point, count) in spot.corners().into_iter().zip(counts) {
+            for (point, count) in cell.corners().into_iter().zip(counts) {
                 if let Some([red, green, blue]) = self.blocks.colour(slots[point.block() & 7]) {
                     let voxel = point.voxel() & 511;
                     colours.add([red[voxel], green[voxel], blue[voxel]], count);
@@ -367,11 +369,11 @@ fn begin(ray: &Ray, depth: Depth) -> ([i32; 3], CellIndex, [Depth; 3]) {
 }
 
 #[inline(always)]
-fn passage(here: &BlockContext<'_>, step: Step) -> RaySegment {
-    RaySegment::new(here.ray, here.offset(step.spot), [depth_in_m(step.from), depth_in_m(step.to)], step.axes)
+fn segment(block_context: &BlockContext<'_>, step: Step) -> RaySegment {
+    RaySegment::new(block_context.ray, block_context.offset(step.cell), [depth_in_m(step.from), depth_in_m(step.to)], step.axes)
 }
 
-/// The corners a, b, c, d of a wall (a and d face each other), one may follow from the others.
+/// The corners a, b, c, d of a face (a and d face each other), one may follow from the others.
 #[inline]
 pub(super) fn completed(corners: [Option<f32>; 4]) -> Option<[f32; 4]> {
     match corners {

@@ -19,12 +19,12 @@
 //! When more blocks are in view than `visible_blocks`, the picture ends nearer, and the report says where.
 
 mod cell;
+mod cell_index;
 mod config;
-mod eye;
 mod march;
 mod ranges;
+mod ray_camera;
 mod signs;
-mod spot;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -39,9 +39,9 @@ use crate::{
     volume::{Slot, Viewpoint, Volume},
 };
 use core::fmt;
-use eye::RayCamera;
 use march::Marcher;
 use ranges::Ranges;
+use ray_camera::RayCamera;
 use surface::Surface;
 
 /// Units of a normal's components: ±127 is ±1.
@@ -205,17 +205,22 @@ impl<'s> Raycaster<'s> {
         layer: Layer,
         executor: &E,
     ) -> Result<RaycastReport, RaycastError> {
-        let eye = RayCamera::new(view, volume.config().voxel_size_m).ok_or(RaycastError::Viewpoint)?;
+        let ray_camera = RayCamera::new(view, volume.config().voxel_size_m).ok_or(RaycastError::Viewpoint)?;
         let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
         let near_m = self.config.near_m;
-        let in_view = self.surface.find(volume, &eye, [near_m, self.config.far_m], min_weight, executor);
+        let in_view = self.surface.find(volume, &ray_camera, [near_m, self.config.far_m], min_weight, executor);
         let limits_m = [near_m, min_f32(in_view.far_m, self.config.far_m)];
-        self.ranges.find(&self.surface, &eye, limits_m);
+        self.ranges.find(&self.surface, &ray_camera, limits_m);
         (self.width, self.height) = (view.width, view.height);
         if self.surface.len() > self.peak_blocks {
             self.peak_blocks = self.surface.len();
         }
-        let marcher = Marcher { surface: &self.surface, blocks: volume.blocks(), eye: &eye, min_weight };
+        let marcher = Marcher {
+            surface: &self.surface,
+            blocks: volume.blocks(),
+            ray_camera: &ray_camera,
+            min_weight,
+        };
         let ranges = &self.ranges;
         let picture = Band {
             first_row: 0,
@@ -277,7 +282,7 @@ impl<'s> Raycaster<'s> {
 
 /// Fills a band and counts the pixels that show the map.
 fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: Layer, band: Band<'_>) -> u32 {
-    let width = marcher.eye.width.max(1);
+    let width = marcher.ray_camera.width.max(1);
     let images = band
         .depth_m
         .chunks_mut(width)

@@ -4,7 +4,7 @@
 //! may cover. Rays then begin right before the surface.
 
 use super::{
-    eye::{AXES, Extent, RayCamera},
+    ray_camera::{AXES, Extent, RayCamera},
     signs::Cells,
     surface::Surface,
 };
@@ -50,9 +50,9 @@ impl<'s> Ranges<'s> {
 
     /// Enters the crossed cells of all blocks in view.
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn find(&mut self, surface: &Surface<'_>, eye: &RayCamera, [near_m, far_m]: [f32; 2]) {
-        self.columns = eye.width.div_ceil(1 << TILE_SHIFT);
-        if let Some(tiles) = self.depth_m.get_mut(..self.columns * eye.height) {
+    pub fn find(&mut self, surface: &Surface<'_>, ray_camera: &RayCamera, [near_m, far_m]: [f32; 2]) {
+        self.columns = ray_camera.width.div_ceil(1 << TILE_SHIFT);
+        if let Some(tiles) = self.depth_m.get_mut(..self.columns * ray_camera.height) {
             tiles.fill([f32::MAX, 0.0]);
         }
         for (block, cells) in surface.blocks() {
@@ -64,7 +64,7 @@ impl<'s> Ranges<'s> {
                     // A hundredth of a cell more than the box, so that no rounding starts a ray behind its first cell.
                     half[axis] = 0.5 * (high - low) + 0.01;
                 }
-                if let Some(extent) = eye.extent(center, half, near_m, far_m) {
+                if let Some(extent) = ray_camera.extent(center, half, near_m, far_m) {
                     self.widen(&extent);
                 }
             });
@@ -106,7 +106,7 @@ fn for_each_box(cells: &Cells, mut visit: impl FnMut([i32; 3], [i32; 3])) {
             let [first, second] = [occupied & 0x0003, occupied & 0x0300].map(|bits| i32::from(bits != 0));
             let [lower, upper] = [lower, upper].map(|bits| i32::from(bits != 0));
             let base = [(corner & 7) as i32, (corner >> 3) as i32, z];
-            // An end without cells moves the box's wall in by one.
+            // An end without cells moves the box's face in by one.
             let low = [base[0] + 1 - left, base[1] + 1 - first, base[2] + 1 - lower];
             let high = [base[0] + 1 + right, base[1] + 1 + second, base[2] + 1 + upper];
             visit(low, high);

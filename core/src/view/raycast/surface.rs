@@ -4,7 +4,7 @@
 //! ray asks one bit per cell, and most blocks not at all: only those with crossed cells remain in the table.
 
 use super::{
-    eye::RayCamera,
+    ray_camera::RayCamera,
     signs::{self, Cells},
 };
 use crate::{
@@ -81,8 +81,15 @@ impl<'s> Surface<'s> {
     }
 
     /// Finds the blocks in view and the cells the surface runs through.
-    pub fn find<E: Executor>(&mut self, volume: &Volume<'_>, eye: &RayCamera, limits_m: [f32; 2], min_weight: u8, executor: &E) -> InView {
-        let in_view = self.cull(volume, eye, limits_m);
+    pub fn find<E: Executor>(
+        &mut self,
+        volume: &Volume<'_>,
+        ray_camera: &RayCamera,
+        limits_m: [f32; 2],
+        min_weight: u8,
+        executor: &E,
+    ) -> InView {
+        let in_view = self.cull(volume, ray_camera, limits_m);
         self.index(|_| true);
         self.read_signs(volume, min_weight, executor);
         self.join_neighbours();
@@ -91,13 +98,13 @@ impl<'s> Surface<'s> {
     }
 
     /// Lists the blocks that have a cell, or a neighbour with a corner, that may be in the picture.
-    fn cull(&mut self, volume: &Volume<'_>, eye: &RayCamera, [near_m, far_m]: [f32; 2]) -> InView {
+    fn cull(&mut self, volume: &Volume<'_>, ray_camera: &RayCamera, [near_m, far_m]: [f32; 2]) -> InView {
         // Cells of the block before this one end at this block's first points: the box is one longer on that side.
         let half = (BLOCK_SIDE as f32 + 1.0) * 0.5;
         let blocks = volume.pool().live().filter_map(|slot| {
-            let local = eye.local(volume.blocks().coord(slot)?)?;
+            let local = ray_camera.local(volume.blocks().coord(slot)?)?;
             let center = local.map(|c| (c * BLOCK_SIDE as i32) as f32 + half - 1.0);
-            Some((slot, local, eye.extent(center, [half; 3], near_m, far_m)?.depth_m[0]))
+            Some((slot, local, ray_camera.extent(center, [half; 3], near_m, far_m)?.depth_m[0]))
         });
         self.len = 0;
         let mut count = 0;

@@ -14,8 +14,8 @@ use crate::{
     },
 };
 use cell::{Corners, Field, NO_AXIS, RaySegment, mean, within};
-use eye::{AXES, depth_from_m, depth_in_m};
 use nalgebra::{Point3, Vector3};
+use ray_camera::{AXES, depth_from_m, depth_in_m};
 use scenes::{Ball, Plane, Scene, filled, rough, seen_from_origin, true_distances};
 use std::{boxed::Box, vec, vec::Vec};
 

@@ -4,8 +4,8 @@ use super::{scenes::rough, *};
 
 /// One pixel, the obvious way: every cell from the nearest depth to the farthest, corners looked up in the index one by one.
 fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize, v: usize) -> Option<f32> {
-    let eye = RayCamera::new(view, VOXEL_M).unwrap();
-    let ray = eye.ray(u, v);
+    let ray_camera = RayCamera::new(view, VOXEL_M).unwrap();
+    let ray = ray_camera.ray(u, v);
     let mut sampler = volume.sampler();
     let far = depth_from_m(config.far_m);
     let mut from = depth_from_m(config.near_m);
@@ -18,7 +18,7 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
         let axis = next.iter().position(|&depth| depth == to).unwrap();
         let mut corners = Corners::default();
         for corner in 0..8 {
-            let point = AXES.map(|axis| cell[axis] + 8 * eye.base[axis] + (corner >> axis & 1) as i32);
+            let point = AXES.map(|axis| cell[axis] + 8 * ray_camera.base[axis] + (corner >> axis & 1) as i32);
             if let Some(sample) = sampler.voxel(point).filter(|sample| sample.weight >= config.min_weight) {
                 corners.sdf[corner] = f32::from(sample.sdf);
                 corners.observed |= 1 << corner;
@@ -27,14 +27,14 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
         let is_seen = |corner: usize| corners.observed >> corner & 1 == 1;
         let any = |test: fn(f32) -> bool| (0..8).any(|corner| is_seen(corner) && test(corners.sdf[corner]));
         // A cell belongs to the block of its first corner and is skipped where that is not in the map.
-        let own = BlockCoord::of_lattice(AXES.map(|axis| cell[axis] + 8 * eye.base[axis])).and_then(|coord| volume.find(coord));
+        let own = BlockCoord::of_lattice(AXES.map(|axis| cell[axis] + 8 * ray_camera.base[axis])).and_then(|coord| volume.find(coord));
         if own.is_some() && to > from && any(|sdf| sdf > 0.0) && any(|sdf| sdf <= 0.0) {
             let block = ray.offset(cell.map(|c| c >> 3));
             let offset = AXES.map(|axis| block[axis] - (cell[axis] & 7) as f32);
-            let passage = RaySegment::new(&ray, offset, [from, to].map(depth_in_m), [entered.unwrap_or(NO_AXIS), axis]);
+            let segment = RaySegment::new(&ray, offset, [from, to].map(depth_in_m), [entered.unwrap_or(NO_AXIS), axis]);
             let guessed = corners.complete();
-            let value = |wall: Option<(usize, usize)>, depth| {
-                if let Some((axis, upper)) = wall {
+            let value = |face: Option<(usize, usize)>, depth| {
+                if let Some((axis, upper)) = face {
                     let [u, v] = [[1, 2], [0, 2], [0, 1]][axis];
                     let four = [0, 1 << u, 1 << v, 1 << u | 1 << v].map(|corner| corner | upper << axis);
                     if let Some([a, b, c, d]) = march::completed(four.map(|corner| is_seen(corner).then(|| corners.sdf[corner]))) {
@@ -43,13 +43,13 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
                         return low + (high - low) * v;
                     }
                 }
-                guessed.map_or(0.0, |corners| mean(&corners, passage.end(depth == to)))
+                guessed.map_or(0.0, |corners| mean(&corners, segment.end(depth == to)))
             };
             let first =
                 if last_cell.1 == from { last_cell.0 } else { value(entered.map(|axis| (axis, 1 - ray.ahead[axis] as usize)), from) };
             let last = value(Some((axis, ray.ahead[axis] as usize)), to);
             if let (true, true, Some(corners)) = (first > 0.0, last <= 0.0, guessed) {
-                let share = passage.root(&Field::new(&corners), first, last);
+                let share = segment.root(&Field::new(&corners), first, last);
                 let [from_m, to_m] = [from, to].map(depth_in_m);
                 return Some(from_m + (to_m - from_m) * share).filter(|&depth_m| depth_m <= config.far_m);
             }

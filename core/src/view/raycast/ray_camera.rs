@@ -172,7 +172,7 @@ pub(super) struct Ray {
     zero: [Depth; 3],
     /// Depth from plane to plane, negative where the ray runs towards smaller coordinates.
     per_plane: [Depth; 3],
-    /// 1 where the ray runs towards larger coordinates, so that it leaves a cell by the upper wall; else 0.
+    /// 1 where the ray runs towards larger coordinates, so that it leaves a cell by the upper face; else 0.
     pub ahead: [i32; 3],
 }
 
