@@ -12,7 +12,7 @@
 //! that a second flip does not undo it but by chance. The product is the widest that processors without 64-bit ones have, and with the sum one
 //! instruction on a Cortex-M7.
 
-/// Of the golden ratio.
+/// The fraction of the golden ratio, in 1/2^64.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 /// Lanes of a run.
 const LANES: usize = 8;

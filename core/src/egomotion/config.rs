@@ -2,7 +2,7 @@
 
 use crate::problem::{Problems, require};
 
-/// What the motion estimate can be told. One set serves the camera; objects use another copy.
+/// Settings of the motion estimate. One set serves the camera; objects use another copy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct EgomotionConfig {

@@ -49,7 +49,7 @@ pub struct MotionEstimate {
     pub t_current_previous: Option<Transform>,
     /// Matches handed in that could be triangulated.
     pub matches: u32,
-    /// Of these, explained by the motion.
+    /// Matches among them that the motion explains.
     pub inliers: u32,
     /// Root mean square error of one coordinate over the inliers, px.
     pub residual_rms_px: f64,

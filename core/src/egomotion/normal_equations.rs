@@ -7,7 +7,7 @@ use super::points::Point;
 use crate::geometry::{StereoObservation, StereoRig, Transform};
 
 const N: usize = 6;
-/// A pivot below this share of its diagonal is none: the motion is not determined.
+/// With a pivot below this share of its diagonal the motion is not determined.
 const PIVOT_MIN: f64 = 1e-12;
 
 /// Sums of weighted J'J (lower half) and J'r over points, in the order of the points.

@@ -78,7 +78,7 @@ impl ColumnCorrection {
         let mut u = 0.0;
         for disparity in disparity_q8 {
             let px = f32::from(*disparity) / ONE_PX;
-            // Casts hold at the ends, so that what is below 0 is none.
+            // Casts saturate, so that values below 0 become 0, which is none.
             let corrected = ((px + self.at(u - px)) * ONE_PX + 0.5) as u16;
             *disparity = if *disparity == 0 { 0 } else { corrected };
             u += 1.0;

@@ -57,9 +57,9 @@ impl Iterator for Bits {
 /// The pixels of a pair that are not to be used.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InvalidPair<'a> {
-    /// Of the left image.
+    /// Pixels of the left image.
     pub left: InvalidPixels<'a>,
-    /// Of the right image.
+    /// Pixels of the right image.
     pub right: InvalidPixels<'a>,
 }
 

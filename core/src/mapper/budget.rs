@@ -1,7 +1,7 @@
 //! A capacity for a given number of bytes and a given image: what the profiles are for four cases, for all others.
 //!
-//! The rules, in order. What the image needs comes first and follows from its pixels alone (see [`Capacity::for_budget`]). Of the rest at
-//! most a fifth goes to volumes of objects, in steps; all that remains is blocks of the static map, since they decide how far a run
+//! The rules, in order. What the image needs comes first and follows from its pixels alone (see [`Capacity::for_budget`]). At most a
+//! fifth of the rest goes to volumes of objects, in steps; all that remains is blocks of the static map, since they decide how far a run
 //! gets before blocks leave the pool. The result never exceeds the budget, and one block more would.
 
 use super::{MIN_HEIGHT, MIN_WIDTH};
@@ -22,11 +22,11 @@ const MIN_BLOCKS: usize = 1_024;
 const COLOUR_BLOCKS: usize = 20_000;
 /// Steps of objects reconstructed at once, and blocks of each; the first that fits its share is taken.
 const OBJECTS: [(usize, usize); 6] = [(16, 4_000), (8, 1_200), (4, 700), (2, 300), (2, 150), (0, 0)];
-/// Of what the image leaves, one part in so many may go to volumes of objects.
+/// Volumes of objects may take one part in so many of what the image leaves.
 const OBJECTS_SHARE: usize = 5;
-/// Where their number is asked for, one part in so many.
+/// The same where their number is asked for.
 const ASKED_OBJECTS_SHARE: usize = 2;
-/// Of what the image leaves, one part in so many may go to crops that wait.
+/// Waiting crops may take one part in so many of what the image leaves.
 const CROPS_SHARE: usize = 16;
 /// Voxel size the numbers of visible blocks are for, m.
 const VOXEL_SIZE_M: f32 = 0.05;
@@ -56,7 +56,7 @@ pub enum BudgetError {
     },
     /// The image is too small or too large.
     Image,
-    /// More objects are asked for than can be told apart.
+    /// More objects are asked for than the core supports.
     Objects,
     /// The voxel size is not a positive number.
     VoxelSize,
@@ -104,7 +104,7 @@ const SHORT_HISTORY_FRAMES: usize = 64;
 impl Capacity {
     /// The largest capacity of at most `bytes` for images of `width` x `height` px: `capacity.bytes() <= bytes`, always.
     ///
-    /// Of every 16 pixels one may be a feature and of every 40 one a match; masks may cover 8 images of pixels; 64 detections and tracks. The
+    /// One pixel in 16 may be a feature and one in 40 a match; masks may cover 8 images of pixels; 64 detections and tracks. The
     /// pruning window is 200 frames where `bytes` is 96 MiB or more, else 64. Objects and blocks share the rest as the module says.
     ///
     /// ```

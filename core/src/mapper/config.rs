@@ -15,7 +15,7 @@ use crate::{
     volume::VolumeConfig,
 };
 
-/// Everything a mapper can be told, beside its bounds. Every default stands with its field, in the struct of the stage it belongs to.
+/// All settings of a mapper, apart from its capacity. Every default stands with its field, in the struct of the stage it belongs to.
 ///
 /// ```
 /// use dynvox_core::{Config, geometry::StereoRig};
@@ -31,7 +31,7 @@ pub struct Config {
     pub rig: StereoRig,
     /// How raw pairs become those of `rig`; `None` where they come rectified.
     pub rectification: Option<Rectification>,
-    /// What of the rig can be told beside its calibration.
+    /// Settings of the rig in addition to its calibration.
     pub rig_settings: RigConfig,
     /// Stereo matching.
     pub stereo: StereoConfig,

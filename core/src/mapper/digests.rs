@@ -142,7 +142,7 @@ impl StageDigests {
             (Digested::Background, self.background, other.background),
         ];
         let stage = stages.iter().find(|(_, mine, theirs)| mine != theirs).map(|&(stage, ..)| stage);
-        // Of the objects the one of lowest id that only one step has, or that differs.
+        // The object of lowest id that differs or that only one step has.
         let alone =
             |of: &Self, than: Self| of.objects.iter().find(|&object| than.objects.iter().all(|known| known != object)).map(|o| o.id);
         stage.or_else(|| alone(self, *other).into_iter().chain(alone(other, *self)).min().map(Digested::Object))

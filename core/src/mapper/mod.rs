@@ -175,7 +175,7 @@ impl<'s> Mapper<'s> {
     /// Checks a frame against the capacity and the frames before; the size of the rectified images.
     fn validate(&mut self, frame: &StereoFrame<'_>) -> Result<[usize; 2], StepError> {
         let given = [frame.left.width(), frame.left.height()];
-        // Of the left image, of the right one, and of what comes out of them.
+        // Sizes of the left image, of the right one, and of the rectified ones.
         let [left, right, size] = match self.rectifier.rectification() {
             None => [given; 3],
             Some(raw) => {

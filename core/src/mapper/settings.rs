@@ -13,7 +13,7 @@ pub enum MotionSource {
     Icp,
 }
 
-/// What the loop can be told.
+/// Settings of the loop over frames.
 ///
 /// ```
 /// use dynvox_core::{Config, MotionSource, geometry::StereoRig};

@@ -168,7 +168,7 @@ impl<'s> Mapper<'s> {
             // Told by the caller; a fingerprint stands for them.
             config: _,
             capacity,
-            // Of one frame alone.
+            // Belong to one frame.
             stereo: _,
             estimator: _,
             depth_m: _,

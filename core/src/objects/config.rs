@@ -15,8 +15,8 @@ pub struct ObjectsConfig {
     pub truncation_m: f32,
     /// Farthest depth fused, m; above the map's `near_m`; 20.
     pub far_m: f32,
-    /// How far from the object's median depth a pixel may lie, m: what is visible through windows and at the rim is left out; above 0; 3. Of a bus
-    /// viewed lengthwise a frame shows at most twice this.
+    /// How far from the object's median depth a pixel may lie, m: what is visible through windows and at the rim is left out; above 0; 3. A frame
+    /// shows at most twice this length of a bus viewed lengthwise.
     pub extent_m: f32,
     /// What one observation of a voxel weighs; by depth (the original: one).
     pub observation_weight: ObservationWeight,

@@ -50,7 +50,7 @@ pub struct InstancesReport {
 }
 
 impl InstancesReport {
-    /// Of a frame, from the reports of its stages. `matches_excluded` is the camera's.
+    /// The report of a frame, from those of its stages. `matches_excluded` is the camera's.
     pub(crate) fn of(tracking: &TrackingReport, objects: ObjectsReport, matches_excluded: u32) -> Self {
         let &TrackingReport { detections, tracks, segmentation, pixels_masked } = tracking;
         Self { detections, segmentation, tracks, objects, matches_excluded, pixels_masked }

@@ -39,9 +39,9 @@ pub struct RawRig {
 /// Rotations that rectify a pair, raw camera coordinates to rectified ones, and the distance of the cameras.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
-    /// Of the left camera.
+    /// Rotation of the left camera.
     pub r_rectified_left: Matrix3<f64>,
-    /// Of the right camera.
+    /// Rotation of the right camera.
     pub r_rectified_right: Matrix3<f64>,
     /// Distance between the cameras, m.
     pub baseline_m: f64,

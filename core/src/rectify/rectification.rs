@@ -23,7 +23,7 @@ pub enum Sizing {
         /// Highest image, px.
         max_height: u32,
     },
-    /// Of this size, looking at the middle of what both cameras see.
+    /// Images of this size, centred on what both cameras see.
     Given {
         /// Width, px.
         width: u32,

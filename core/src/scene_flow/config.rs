@@ -2,7 +2,7 @@
 
 use crate::problem::{Problems, require};
 
-/// What the scene flow can be told. Defaults are DynSLAM's, with sub-pixel refinement.
+/// Settings of the scene flow. Defaults are DynSLAM's, with sub-pixel refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct SceneFlowConfig {

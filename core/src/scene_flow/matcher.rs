@@ -206,7 +206,7 @@ impl<'s> FlowMatcher<'s> {
             right,
             last,
             capacity,
-            // Of one frame alone.
+            // Belong to one frame.
             matched: _,
             traced: _,
             prior: _,

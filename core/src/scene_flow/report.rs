@@ -23,9 +23,9 @@ pub enum FlowStatus {
 pub struct PassCount {
     /// Circles that closed.
     pub closed: u32,
-    /// Of these, dropped because the list was full.
+    /// Closed circles dropped because the list was full.
     pub dropped: u32,
-    /// Of those kept, without support in their neighbourhood.
+    /// Kept ones without support in their neighbourhood.
     pub unsupported: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Outlier removal: a match without neighbours that move alike is none.
+//! Outlier removal: a match without neighbours that move alike is removed.
 //!
 //! The paper asks for agreement along the edges of a Delaunay triangulation, where four of about six nearest neighbours must agree.
 //! Here a match's neighbours are those in the square of cells around it, which grows ring by ring until it holds [`NEIGHBOURS`] or

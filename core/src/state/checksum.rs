@@ -8,7 +8,7 @@
 //! the checksum, with the same chance. A caller whose source knows its end makes that certain too by
 //! asking that nothing is left.
 
-/// Of the golden ratio: odd, so that multiplying by it can be undone.
+/// The fraction of the golden ratio, in 1/2^64: odd, so that multiplying by it can be undone.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// The checksum so far. Not a [`crate::digest::Digest`], whose steps cannot be undone: two states may

@@ -105,8 +105,8 @@ impl<'s> Triangulation<'s> {
         self.triangles = 0;
     }
 
-    /// Adds a point in scan order; within a row points may come in any order. Of two points at one pixel the nearer, with
-    /// the larger disparity, stays. Says whether a point was dropped: this one, as the buffer is full, or the farther of the two.
+    /// Adds a point in scan order; within a row points may come in any order. The nearer of two points at one
+    /// pixel, with the larger disparity, stays. Returns whether a point was dropped: this one, as the buffer is full, or the farther one.
     pub fn add(&mut self, point: SupportPoint) -> bool {
         let key = |p: &SupportPoint| (p.v, p.u);
         let points = self.points.get_mut(..self.len).unwrap_or_default();

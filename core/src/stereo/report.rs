@@ -32,15 +32,15 @@ pub struct StereoReport {
     pub status: StereoStatus,
     /// Candidates on the grid.
     pub candidates: u32,
-    /// Candidates matched, before any was taken back.
+    /// Candidates matched, before filtering.
     pub support_matches: u32,
-    /// Support points removed for want of company.
+    /// Support points removed because too few neighbours agree.
     pub implausible: u32,
-    /// Support points removed as they add nothing.
+    /// Support points removed as redundant.
     pub redundant: u32,
     /// Support points left.
     pub support_points: u32,
-    /// Of these, dropped in the right image as another lies at the same place.
+    /// Support points dropped in the right image because another lies at the same pixel.
     pub occluded_right: u32,
     /// Triangles in the left image.
     pub triangles_left: u32,
@@ -48,9 +48,9 @@ pub struct StereoReport {
     pub triangles_right: u32,
     /// Pixels matched densely in the left image.
     pub matched: u32,
-    /// Of these, contradicted by the right image.
+    /// Matched pixels that the right image contradicts.
     pub inconsistent: u32,
-    /// Of these, in segments too small.
+    /// Matched pixels in segments that are too small.
     pub speckles: u32,
     /// Pixels filled between others.
     pub filled: u32,

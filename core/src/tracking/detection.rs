@@ -60,7 +60,7 @@ pub struct DetectionCount {
     pub bad_box: u32,
     /// Mask shorter than its box, or without a pixel in the image.
     pub bad_mask: u32,
-    /// Of a class that is left to the static map.
+    /// Class that is left to the static map.
     pub ignored: u32,
     /// Box not larger than the least area to be reconstructed, even if its mask is unusable or does not fit.
     pub too_small: u32,

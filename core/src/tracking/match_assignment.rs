@@ -62,7 +62,7 @@ impl From<MatchOwner> for OwnerCode {
 pub(crate) struct FrameMatches<'m> {
     /// Refined below the pixel.
     pub refined: &'m [Match],
-    /// Of other features, at whole pixels.
+    /// Matches of other features, at whole pixels.
     pub sparse: &'m [Match],
 }
 
@@ -80,7 +80,7 @@ impl Tracker<'_> {
     pub(super) fn assign_from(&mut self, first: usize, matches: &FrameMatches<'_>) {
         let masks = self.masks.current();
         let (instances, tracks) = (self.instances.all(), self.tracks.all());
-        // Of two cars parked one behind the other in the distance neither takes the other's matches.
+        // Two cars parked one behind the other in the distance keep their matches.
         let distinct = |other: &Instance| {
             let moves = || other.track.get().and_then(|at| tracks.get(at)).is_some_and(Track::moves);
             !other.tracked_only.get() || moves()

@@ -22,7 +22,7 @@ pub(super) struct MotionFrame<'a> {
     pub t_world_camera: &'a Transform,
     pub t_current_previous: &'a Transform,
     pub interval_s: f64,
-    /// Of the random samples.
+    /// Seed of the random samples.
     pub seed: u64,
 }
 

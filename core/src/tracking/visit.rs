@@ -9,14 +9,14 @@ impl Tracker<'_> {
         self.tracks.audit(self.frame, self.instances.all().len(), audit);
     }
 
-    /// Visits all that outlives a frame. Of the two mask stores that is this frame's: the next frame empties the other one.
+    /// Visits all that outlives a frame. Only this frame's mask store does: the next frame empties the other one.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self {
             masks,
             tracks,
             segmenter,
             config,
-            // Of one frame alone.
+            // Belong to one frame.
             instances: _,
             refined_owner: _,
             sparse_owner: _,

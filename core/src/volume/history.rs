@@ -118,7 +118,7 @@ impl<'s> VisibleHistory<'s> {
         let set = self.sets.get(at)?;
         for (i, (due, seen)) in self.due.iter_mut().zip(set).enumerate() {
             let mut bits = *seen;
-            // Of the seen slots only those whose block is as old as the frame.
+            // Only visible slots whose block is as old as the frame are due.
             while bits != 0 {
                 let bit = bits.trailing_zeros();
                 bits &= bits - 1;

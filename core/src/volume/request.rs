@@ -200,7 +200,7 @@ impl Axis {
     fn new(from: f32, to: f32) -> Self {
         let (at, last) = (floor_i32(from), floor_i32(to));
         let (ahead, left) = (last > at, last.saturating_sub(at).saturating_abs().min(MAX_BLOCKS_PER_RAY as i32));
-        // Of no use where no border is crossed.
+        // Unused where no border is crossed.
         let per_block = 1.0 / (to - from);
         let border = at as f32 + if ahead { 1.0 } else { 0.0 };
         Self {

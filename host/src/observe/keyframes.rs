@@ -33,7 +33,7 @@ pub struct Keyframe {
 /// Pictures of a run.
 #[derive(Clone, Debug)]
 pub struct KeyframesSection {
-    /// Of some frames.
+    /// Pictures of some frames.
     pub keyframes: Vec<Keyframe>,
     /// The finished map from behind and above the last camera, as a PNG file; empty without frames.
     pub overview_png: Vec<u8>,

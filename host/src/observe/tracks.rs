@@ -39,7 +39,7 @@ pub struct TrackRow {
     pub speed_m_s: Option<[f32; 2]>,
     /// Matches on it.
     pub matches: u32,
-    /// Of these, inliers of its motion.
+    /// Matches among them that are inliers of its motion.
     pub inliers: u32,
     /// Blocks of its volume.
     pub blocks: u32,
@@ -86,7 +86,7 @@ pub struct TrackRecord {
     pub last_frame: usize,
     /// Frames it was seen in.
     pub frames: usize,
-    /// Of these, frames in each state: uncertain, static, dynamic.
+    /// Frames among them in each state: uncertain, static, dynamic.
     pub states: [usize; 3],
     /// The more frequent of static and dynamic; uncertain if it was neither.
     pub state: MotionState,

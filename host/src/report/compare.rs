@@ -49,9 +49,9 @@ pub enum CompareError {
 /// The digests of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// Of all stages.
+    /// Digest of all stages.
     pub digest: u64,
-    /// Of each.
+    /// Digest of each stage.
     pub stages: StageDigests,
 }
 

@@ -143,7 +143,7 @@ struct MapSummary {
     blocks_peak: u32,
     bytes: u64,
     triangles: u64,
-    /// Of these, in the volume that moving objects swept.
+    /// Triangles among them in the volume that moving objects swept.
     #[serde(skip_serializing_if = "Option::is_none")]
     swept_triangles: Option<u64>,
 }

@@ -52,7 +52,7 @@ pub struct RunRecord {
     pub sections: Sections,
     /// Wall time of the run, s.
     pub seconds: f64,
-    /// Of it, mapping and waiting for images: without pictures, evaluation and files that only the report needs, s.
+    /// The part of it for mapping and waiting for images: without pictures, evaluation and files that only the report needs, s.
     pub mapping_seconds: f64,
     /// Most bytes resident, where the system reports it.
     pub rss_peak_bytes: Option<u64>,

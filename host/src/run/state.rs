@@ -21,7 +21,7 @@ pub(super) struct RunState {
 pub(super) struct Timers {
     /// All of it.
     pub total: Duration,
-    /// Of it, the time that only the report and checkpoints needed.
+    /// The part of it that only the report and checkpoints needed.
     pub overhead: Duration,
 }
 

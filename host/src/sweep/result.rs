@@ -45,7 +45,7 @@ impl FrameSample {
 }
 
 impl RunResult {
-    /// Of a finished run.
+    /// The result of a finished run.
     ///
     /// # Errors
     /// The summary cannot be turned into JSON.

@@ -5,7 +5,7 @@ use crate::problem::{Problems, require};
 /// Most levels of the pyramid.
 pub const MAX_LEVELS: u8 = 4;
 
-/// What the depth tracker can be told.
+/// Settings of the depth tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct IcpConfig {

@@ -34,7 +34,7 @@ use pyramid::Pyramid;
 const PAIRS_MIN: u32 = 100;
 /// Step below which a level is done, rad and m: a tenth of a voxel at most.
 const STEP_MIN: f64 = 1e-4;
-/// Noise of a point beside that of its disparity, m.
+/// Noise of a point in addition to that of its disparity, m.
 const NOISE_M: f64 = 0.02;
 /// Units of a normal's components.
 const NORMAL_ONE: f64 = 127.0;
@@ -85,7 +85,7 @@ pub struct IcpReport {
     pub t_current_previous: Transform,
     /// Points of the finest level that fall on a surface of the map.
     pub points: u32,
-    /// Of these, within the distance of it.
+    /// Points among them within the distance of that surface.
     pub pairs: u32,
     /// Root mean square distance of the pairs from their planes, m.
     pub residual_rms_m: f64,

@@ -54,7 +54,7 @@ fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_f
 fn the_middle_of_a_car_unseen_goes_on_with_it() {
     let mut middles = Vec::new();
     run(8, ahead, |frame| frame < 6, |_, run| middles.push(run.track(1).unwrap().center_world_m[2]));
-    // Of a frame with a motion it is where the middle was before it.
+    // In a frame with a motion it is the middle before that motion.
     let steps = [middles[6] - middles[5], middles[7] - middles[6]];
     assert!(steps.iter().all(|step| (step - 0.8).abs() < 0.05), "{steps:?}");
 }

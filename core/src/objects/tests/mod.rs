@@ -144,7 +144,7 @@ pub(super) struct Board {
     /// Half its width and height, m.
     pub half_m: [f64; 2],
     pub points: usize,
-    /// Of these the first so many stand still instead, as background under the mask does.
+    /// Number of points, from the first, that stand still instead, like background under the mask.
     pub background: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What of the rig can be told beside its calibration.
+//! Settings of the rig in addition to its calibration.
 
 use crate::{
     geometry::DisparityCorrection,
@@ -18,7 +18,7 @@ pub enum SelfCalibrationMode {
     Off,
 }
 
-/// What of the rig can be told beside its calibration.
+/// Settings of the rig in addition to its calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct RigConfig {

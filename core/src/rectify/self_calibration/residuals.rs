@@ -46,7 +46,7 @@ pub(super) struct Residuals<'r> {
 }
 
 impl<'r> Residuals<'r> {
-    /// Of observations corrected by `applied`, linearised at `at`.
+    /// Residuals of observations corrected by `applied`, linearised at `at`.
     pub(super) fn new(
         rig: &'r StereoRig,
         t_current_previous: &'r Transform,

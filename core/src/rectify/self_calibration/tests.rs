@@ -21,7 +21,7 @@ fn street(error: &DisparityCorrection, motion: &Transform, far_m: f64, random: &
             let z = 1.0 / uniform(1.0 / far_m, if far_m > FAR_M { 0.005 } else { 0.2 });
             let [x, y, _] = [uniform(-0.8, 0.8) * z, uniform(-0.2, 0.2) * z, z];
             let seen = [[x, y, z], motion.transform_point([x, y, z])].map(|point| {
-                // Of three uniform numbers: nearly normal, and never far.
+                // The sum of three uniform numbers: nearly normal, and bounded.
                 let mut noise = |sigma: f64| sigma * (uniform(-1.0, 1.0) + uniform(-1.0, 1.0) + uniform(-1.0, 1.0));
                 let exact = RIG.project(point)?;
                 let column = (exact.u_right_px + RIG.center_u_px) as f32;

@@ -15,7 +15,7 @@
 //! 5. A disparity is right by the first of the [`ACCEPTANCE_RULES`]: off by at most 3 px or 5 %. `accuracy = correct / (total - missing)`,
 //!    `completeness = 1 - missing_alone / total`, `f1 = 2 a c / (a + c)`, per frame; a run's figure is the mean over the frames that have it.
 //!
-//! Of exact depth at most [`EXACT_POINTS`] pixels are taken, evenly.
+//! Exact depth is sampled at no more than [`EXACT_POINTS`] pixels, evenly.
 //!
 //! Memory: 16 bytes a point for each frame that waits for its evaluation, 500 bytes a region for each evaluated frame.
 

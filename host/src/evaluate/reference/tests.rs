@@ -62,7 +62,7 @@ const HITS: [Hit; 13] = [
     (390, 180, 30.0, 0.0, 0.0),      // both lack it
     (720, 220, 50.0, 50.0, 50.0),    // on a parked car
     (820, 220, 50.0, 50.0, 20.0),    // on a car of unknown motion
-    (920, 220, 50.0, 20.0, 50.0),    // on somebody
+    (920, 220, 50.0, 20.0, 50.0),    // on a person
 ];
 
 /// One frame's points, settled with that frame's masks; and the map's depth where the hits say so.

@@ -27,7 +27,7 @@ const ONE_PX: f32 = 256.0;
 pub struct StereoCounts {
     /// Pixels with truth.
     pixels: u64,
-    /// Of these, with an estimate of their own.
+    /// Pixels among them with an estimate of their own.
     given: u64,
     /// Wrong by D1: given ones, all after filling.
     d1: [u64; 2],

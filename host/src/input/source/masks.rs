@@ -128,7 +128,7 @@ pub struct FrameMasks {
 }
 
 impl FrameMasks {
-    /// Of a frame the source has no file for.
+    /// The masks of a frame without a file.
     pub fn missing() -> Self {
         Self {
             refusals: MaskRefusals { missing: 1, ..MaskRefusals::default() },

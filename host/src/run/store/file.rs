@@ -105,7 +105,7 @@ pub struct BlockFile<F> {
     index: BlockIndexOnDisk,
     records: u64,
     end: u64,
-    /// Of all records.
+    /// Checksum of all records.
     checksum: crc32fast::Hasher,
     /// Bytes the file may grow to.
     most: u64,
