@@ -108,11 +108,11 @@ impl<'s> RectifiedImages<'s> {
         if pixels == 0 {
             return Self::default();
         }
-        Self {
+        carver.group("rectify.images", |carver| Self {
             left: carver.alloc("rectify.left", pixels),
             right: carver.alloc("rectify.right", pixels),
             colour: if capacity.colour { carver.alloc("rectify.colour", pixels) } else { &mut [] },
-        }
+        })
     }
 }
 
@@ -143,19 +143,19 @@ impl<'s> Rectifier<'s> {
     /// Allocates the regions; none without raw pixels. It rectifies nothing until [`Rectifier::prepare`].
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let [pixels, words] = lengths(capacity);
-        let mut camera = |[map, invalid]: [&'static str; 2]| {
+        let camera = |carver: &mut Carver<'s>| {
             if pixels == 0 {
                 return Camera::default();
             }
-            Camera {
-                map: carver.alloc(map, pixels),
-                invalid: carver.alloc(invalid, words),
+            carver.group("rectify.maps", |carver| Camera {
+                map: carver.alloc("rectify.map", pixels),
+                invalid: carver.alloc("rectify.invalid", words),
                 invalid_count: 0,
-            }
+            })
         };
         Self {
-            left: camera(["rectify.map_left", "rectify.invalid_left"]),
-            right: camera(["rectify.map_right", "rectify.invalid_right"]),
+            left: camera(carver),
+            right: camera(carver),
             capacity: *capacity,
             rectification: None,
         }

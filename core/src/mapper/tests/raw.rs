@@ -58,6 +58,14 @@ fn a_raw_pair_is_mapped_as_the_rectified_pair_is() {
 }
 
 #[test]
+fn every_profile_has_regions_left_for_raw_pairs() {
+    for (name, profile) in Capacity::PROFILES {
+        let raw = Capacity { raw_width: 1_392, raw_height: 512, colour: true, ..profile };
+        assert_eq!(raw.footprint().bytes(), raw.bytes(), "{name}: a region is not in the list");
+    }
+}
+
+#[test]
 fn pixels_that_show_nothing_have_neither_disparity_nor_match() {
     let (walk, config) = (Walk::new(3), config(Some(0.7 * RIG.focal_px)));
     with_raw_mapper(&config, |mapper| {
