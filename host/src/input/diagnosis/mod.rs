@@ -6,7 +6,10 @@
 
 mod order;
 mod patches;
+#[cfg(test)]
+mod planted;
 mod rectified;
+mod rows;
 #[cfg(test)]
 mod tests;
 
@@ -14,6 +17,7 @@ use crate::formats::Image;
 use crate::input::source::{FrameSource, InputError};
 use patches::PatchMatch;
 pub use rectified::RectifiedSource;
+use rows::RowError;
 
 /// Pairs that are matched.
 const PAIRS: usize = 10;
@@ -121,6 +125,7 @@ fn finding(fault: Fault, refused: bool, message: String) -> Finding {
 
 /// What is measured of one pair.
 struct Pair {
+    width_px: f64,
     matches: Vec<PatchMatch>,
     difference: f64,
     mean: f64,
@@ -134,6 +139,7 @@ impl Pair {
         let sum = |image: &Image<u8>| image.pixels().iter().map(|&grey| u64::from(grey)).sum::<u64>() as f64 / count;
         let differences = left.pixels().iter().zip(right.pixels()).map(|(a, b)| u64::from(a.abs_diff(*b)));
         Self {
+            width_px: left.width() as f64,
             matches: patches::matches(left, right),
             difference: differences.sum::<u64>() as f64 / count,
             mean: 0.5 * (sum(left) + sum(right)),
@@ -190,26 +196,27 @@ fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
     }
     let matches: Vec<&PatchMatch> = pairs.iter().flat_map(|pair| &pair.matches).collect();
     if matches.len() >= FEWEST_MATCHES {
-        findings.extend(check_matches(&matches));
+        findings.extend(check_matches(&matches, pairs.first().map_or(0.0, |pair| pair.width_px)));
     }
     findings
 }
 
-fn check_matches(matches: &[&PatchMatch]) -> Vec<Finding> {
+fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
     let mut findings = Vec::new();
     let share = |holds: &dyn Fn(&PatchMatch) -> bool| matches.iter().filter(|one| holds(one)).count() as f64 / matches.len() as f64;
     if share(&|one| one.disparity_px < -1.0) > 0.6 {
         let message = "left and right are exchanged: what is near lies further left in the left images. Exchange the two folders or files";
         findings.push(finding(Fault::Exchanged, true, message.to_owned()));
     }
-    let rows_px = median(matches.iter().map(|one| one.rows_px.abs()).collect());
-    let roll_deg = roll_deg(matches);
-    if rows_px > ROWS_PX || roll_deg.abs() > ROLL_DEG {
+    let RowError { shift_px, roll_deg, median_px } = RowError::of(matches, width_px);
+    if median_px > ROWS_PX || shift_px.abs() > ROWS_PX || roll_deg.abs() > ROLL_DEG {
         let message = format!(
-            "these images are not rectified: matches lie {rows_px:.1} px apart in height (median), with a roll of {roll_deg:.2} degrees between \
-             the cameras. Give the raw images with their calibration: --calibration FILE"
+            "these images are not rectified: matches lie {median_px:.1} px apart in height (median). Right images are {:.1} px too {} in the \
+             middle and rotated by {roll_deg:+.2} degrees (clockwise). Give the raw images with their calibration: --calibration FILE",
+            shift_px.abs(),
+            if shift_px > 0.0 { "low" } else { "high" }
         );
-        findings.push(finding(Fault::NotRectified, rows_px > REFUSED_ROWS_PX, message));
+        findings.push(finding(Fault::NotRectified, median_px > REFUSED_ROWS_PX, message));
     }
     let exposure = median(matches.iter().map(|one| one.brightness).collect());
     if !(1.0 / EXPOSURE..=EXPOSURE).contains(&exposure) {
@@ -217,17 +224,4 @@ fn check_matches(matches: &[&PatchMatch]) -> Vec<Finding> {
         findings.push(finding(Fault::Exposure, false, message));
     }
     findings
-}
-
-/// Roll of the right camera against the left: how the distance of rows grows from the left third of the image to the right one.
-fn roll_deg(matches: &[&PatchMatch]) -> f64 {
-    let mut columns: Vec<f64> = matches.iter().map(|one| one.u_px).collect();
-    columns.sort_by(f64::total_cmp);
-    let (Some(&low), Some(&high)) = (columns.get(columns.len() / 3), columns.get(2 * columns.len() / 3)) else { return 0.0 };
-    let side = |holds: &dyn Fn(f64) -> bool| {
-        let of = |value: fn(&PatchMatch) -> f64| median(matches.iter().filter(|one| holds(one.u_px)).map(|one| value(one)).collect());
-        [of(|one| one.u_px), of(|one| one.rows_px)]
-    };
-    let ([u0, rows0], [u1, rows1]) = (side(&|u| u < low), side(&|u| u > high));
-    if u1 - u0 < 20.0 { 0.0 } else { ((rows1 - rows0) / (u1 - u0)).atan().to_degrees() }
 }
