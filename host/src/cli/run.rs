@@ -5,7 +5,7 @@ mod resume;
 mod saved;
 mod stream;
 
-use super::capacity::CapacityArgs;
+use super::capacity::{CapacityArgs, ImageSize};
 use super::egomotion::EgomotionChoice;
 use super::settings::Settings;
 use crate::input::depth::{self, DepthChoice};
@@ -61,6 +61,12 @@ pub struct RunArgs {
     /// has a file), of rectified ones KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
     #[arg(long, value_name = "FILE")]
     calibration: Vec<PathBuf>,
+    /// Size raw pairs are rectified to [default: the calibration's own, else all that both cameras see, at most 1920x1088]
+    #[arg(long, value_name = "WxH")]
+    rectified: Option<ImageSize>,
+    /// Focal length raw pairs are rectified to, px [default: the least that leaves no pixel without image]
+    #[arg(long, value_name = "PX", requires = "rectified")]
+    rectified_focal: Option<f64>,
     #[command(flatten)]
     bounds: CapacityArgs,
     /// Threads; the result does not depend on them [default: as many as the machine has, at most 4]
@@ -176,7 +182,7 @@ impl RunArgs {
         self.quiet || self.json
     }
 
-    fn options(&self) -> OpenOptions {
+    fn options(&self, settings: &Settings) -> OpenOptions {
         OpenOptions {
             layout: self.dataset,
             sequence: self.sequence.clone(),
@@ -184,6 +190,7 @@ impl RunArgs {
             bits: self.bits,
             stacking: self.stacking(),
             calibration: self.calibration.clone(),
+            rectified: settings.rectified_size(),
         }
     }
 
@@ -199,7 +206,7 @@ impl RunArgs {
         let dataset: Box<dyn FrameSource> = match &self.path {
             Some(path) if stream::is_stream(path) => stream::open(self, stop)?,
             _ if self.rate.is_some() || self.when_late.is_some() => bail!("--rate and --when-late are for a stream: `dynvox run -`"),
-            Some(path) => input::open(path, &self.options())?,
+            Some(path) => input::open(path, &self.options(settings))?,
             None if self.dataset.is_some() || self.sequence.is_some() => {
                 bail!("--dataset and --sequence need a data set. Give its path: `dynvox run PATH`")
             }
@@ -249,6 +256,9 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
     }
     if threads == 0 || args.stride == 0 || args.frames == Some(0) {
         bail!("--threads, --stride and --frames must be at least 1. Give a larger number");
+    }
+    if let Some(size) = args.rectified {
+        settings.set_rectified_size(size, args.rectified_focal);
     }
     let dataset = args.open(&settings, stop)?;
     let (profile, capacity) = args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;

@@ -1,5 +1,7 @@
 //! Settings: defaults, then the file of `--config`, then each `--set key=value`. Unknown keys are errors that name the key.
 
+use super::capacity::ImageSize;
+use crate::formats::calibration::RectifiedSize;
 use crate::synth::StreetConfig;
 use anyhow::{Context, bail};
 use dynvox_core::egomotion::EgomotionConfig;
@@ -23,6 +25,7 @@ use toml::{Table, Value};
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     rig: RigConfig,
+    rectify: RectifiedSize,
     stereo: StereoConfig,
     scene_flow: SceneFlowConfig,
     egomotion: EgomotionConfig,
@@ -71,6 +74,7 @@ impl Settings {
     pub fn config(&self, rig: StereoRig, rectification: Option<&Rectification>) -> Config {
         let Self {
             rig: rig_settings,
+            rectify: _,
             stereo,
             scene_flow,
             egomotion,
@@ -136,6 +140,21 @@ impl Settings {
     /// Sets whether moving objects are searched for by their motion.
     pub fn set_motion_segmentation(&mut self, enabled: bool) {
         self.tracking.segmentation.enabled = enabled;
+    }
+
+    /// How large raw pairs are rectified.
+    pub fn rectified_size(&self) -> RectifiedSize {
+        self.rectify
+    }
+
+    /// Rectifies raw pairs to a size and, where it is given, a focal length.
+    pub fn set_rectified_size(&mut self, ImageSize(width, height): ImageSize, focal_px: Option<f64>) {
+        let side = |side: usize| Some(u32::try_from(side).unwrap_or(u32::MAX));
+        self.rectify = RectifiedSize {
+            width_px: side(width),
+            height_px: side(height),
+            focal_px: focal_px.or(self.rectify.focal_px),
+        };
     }
 
     /// The street's configuration.

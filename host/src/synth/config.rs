@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::lens::{RigError, StreetLens};
+
 /// The synthetic street's appearance, its traffic and its cameras.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -36,6 +38,10 @@ pub struct StreetConfig {
     pub lidar_noise_m: f64,
     /// Share of parking spaces that are taken, 0 to 1.
     pub parked_density: f64,
+    /// The lens of both cameras. With one, images come raw; depth, masks and poses stay those of the ideal rig they are rectified to.
+    pub lens: StreetLens,
+    /// How far the right camera is from where its calibration has it.
+    pub rig_error: RigError,
     /// Who drives.
     pub traffic: Traffic,
 }
@@ -58,6 +64,8 @@ impl Default for StreetConfig {
             gain_difference: 0.03,
             lidar_noise_m: 0.0,
             parked_density: 0.6,
+            lens: StreetLens::Ideal,
+            rig_error: RigError::default(),
             traffic: Traffic::default(),
         }
     }
@@ -105,7 +113,7 @@ impl StreetConfig {
                 return Some(format!("street.{name} is {value}; it must lie within {low} to {high}"));
             }
         }
-        self.traffic.problem()
+        self.rig_error.problem().or_else(|| self.traffic.problem())
     }
 }
 

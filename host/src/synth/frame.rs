@@ -2,17 +2,20 @@
 
 use dynvox_core::geometry::Transform;
 
-/// A stereo pair and everything true about it. Images are row by row, `width` x `height`.
+/// A stereo pair and everything true about it. Images are row by row: depth and masks `width` x `height`, colour and grey `image_size`,
+/// which is the same unless images are raw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SynthFrame {
     /// Number of the frame.
     pub index: u32,
     /// Time since frame 0, s.
     pub time_s: f64,
-    /// Image width, px.
+    /// Width of depth and masks, px.
     pub width: usize,
-    /// Image height, px.
+    /// Height of depth and masks, px.
     pub height: usize,
+    /// Width and height of colour and grey images, px.
+    pub image_size: [usize; 2],
     /// Left colour image.
     pub left_rgb: Vec<[u8; 3]>,
     /// Right colour image.

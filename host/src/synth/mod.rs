@@ -8,6 +8,8 @@
 //! Time: about 40,000 triangles a view are set up at any size, the rest is linear in pixels. What can go wrong: a configuration
 //! out of range is refused by [`Street::new`].
 //!
+//! Through a lens of [`StreetLens`] images come raw, with a calibration; a [`RigError`] is what that calibration does not know.
+//!
 //! Left out: lens and motion blur, rolling shutter, pedestrians, rain; glass shows no rooms; the LiDAR's revolution takes no time.
 //!
 //! ```
@@ -25,6 +27,7 @@ mod facade;
 mod frame;
 mod furniture;
 mod layout;
+mod lens;
 mod lidar;
 mod light;
 mod mesh;
@@ -32,6 +35,9 @@ mod paint;
 mod path;
 mod random;
 mod raster;
+mod raw;
+#[cfg(test)]
+mod raw_tests;
 mod render;
 mod scene;
 mod segment;
@@ -48,6 +54,7 @@ mod writer;
 
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
 pub use frame::{ObjectTruth, SynthFrame};
+pub use lens::{DoubleSphere, Equidistant, ExtendedUnified, RadialTangential, RigError, StreetLens};
 pub use path::SEGMENT_M;
 pub use street::{Street, SynthError};
 pub use writer::write_kitti;

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
 use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::rectify::Rectification;
 use nalgebra::Vector3;
 
 use super::camera;
@@ -16,13 +17,16 @@ use super::mesh::Mesh;
 use super::paint::Painter;
 use super::path::{Centerline, RoadSpan, SEGMENT_M};
 use super::random::Rng;
-use super::render::Renderer;
+use super::raster::Pinhole;
+use super::raw::{self, CameraView};
+use super::render::{Picture, Renderer};
 use super::scene::Scene;
 use super::segment::{Segment, segment};
 use super::sensor::{Sensor, luma};
 use super::shadow::SunAxes;
 use super::surface::Tone;
 use super::traffic;
+use crate::formats::calibration::StereoCalibration;
 
 /// How far behind and ahead of the camera the street exists, m.
 const REACH_M: (f64, f64) = (70.0, 180.0);
@@ -60,6 +64,9 @@ pub struct Street {
     bodies: [Mesh; 5],
     segments: Mutex<VecDeque<(i64, Arc<Segment>)>>,
     t_camera0_street: Transform,
+    calibration: Option<StereoCalibration>,
+    /// How images are sampled, where the rig is not ideal.
+    views: Option<[CameraView; 2]>,
 }
 
 /// A car near the camera at one frame.
@@ -96,7 +103,11 @@ impl Street {
         let flat = libm::cos(height);
         let to_sun = Vector3::new(flat * libm::sin(side), -libm::sin(height), -flat * libm::cos(side));
         let t_street_camera = camera::t_street_camera(&config, &centerline.span(0, 0), 0.0);
+        let rig = camera::rig(&config);
+        let calibration = raw::calibration(&config, &rig)?;
         Ok(Self {
+            views: raw::views(&config, &rig, calibration.as_ref()),
+            calibration,
             centerline,
             painter: Painter::new(),
             light: Light { to_sun: to_sun.map(|value| value as f32) },
@@ -118,6 +129,16 @@ impl Street {
         camera::rig(&self.config)
     }
 
+    /// The calibration of raw images; `None` where they come rectified.
+    pub fn calibration(&self) -> Option<&StereoCalibration> {
+        self.calibration.as_ref()
+    }
+
+    /// How raw images are rectified to the ideal rig's; `None` where they come so.
+    pub fn rectification(&self) -> Option<Rectification> {
+        self.calibration.as_ref().and_then(raw::rectification)
+    }
+
     /// Time of frame `index` since frame 0, s.
     pub fn time_s(&self, index: u32) -> f64 {
         f64::from(index) / self.config.rate_hz
@@ -136,32 +157,50 @@ impl Street {
     /// Frame `index` with all its truth.
     pub fn frame(&self, index: u32) -> SynthFrame {
         let around = self.surroundings(index);
-        let renderer = Renderer {
-            painter: &self.painter,
-            light: &self.light,
-            bodies: &self.bodies,
-            pinhole: camera::pinhole(&self.config),
+        let ideal = camera::pinhole(&self.config);
+        let (left, right) = rayon::join(|| self.view(&around.scene, index, 0), || self.view(&around.scene, index, 1));
+        // What an ideal rig sees holds depth and masks as well; through a lens they are rendered for themselves.
+        let truth = match &self.views {
+            None => None,
+            Some(_) => Some(self.render(&around.scene, ideal, 0, &Sensor::new(0, 0, 0, 0.0))),
         };
-        let view = |camera: u32, offset_m: f64, gain: f64| {
-            let sensor = Sensor::new(self.config.seed, index, camera, self.config.noise_sigma);
-            renderer.picture(&around.scene, offset_m, gain as f32, &sensor)
-        };
-        let (left, right) = rayon::join(|| view(0, 0.0, 1.0), || view(1, self.config.baseline_m, 1.0 + self.config.gain_difference));
+        let Picture { rgb: left_rgb, depth_m, instances } = left;
+        let (depth_m, instances) = truth.map_or((depth_m, instances), |truth| (truth.depth_m, truth.instances));
+        let right_rgb = right.rgb;
         let objects = around.cars.iter().map(|car| self.truth(car)).collect();
         SynthFrame {
             index,
             time_s: self.time_s(index),
             width: self.config.width as usize,
             height: self.config.height as usize,
-            left_grey: left.rgb.iter().map(|&pixel| luma(pixel)).collect(),
-            right_grey: right.rgb.iter().map(|&pixel| luma(pixel)).collect(),
-            left_rgb: left.rgb,
-            right_rgb: right.rgb,
-            depth_m: left.depth_m,
-            instances: left.instances,
+            image_size: self.views.as_ref().map_or([ideal.width, ideal.height], |[left, _]| left.size),
+            left_grey: left_rgb.iter().map(|&pixel| luma(pixel)).collect(),
+            right_grey: right_rgb.iter().map(|&pixel| luma(pixel)).collect(),
+            left_rgb,
+            right_rgb,
+            depth_m,
+            instances,
             t_world_camera: self.to_world(&around.t_street_camera, index),
             objects,
         }
+    }
+
+    /// One camera's image, 0 left or 1 right; with depth and masks where the rig is ideal.
+    fn view(&self, scene: &Scene, index: u32, camera: u32) -> Picture {
+        let sensor = Sensor::new(self.config.seed, index, camera, self.config.noise_sigma);
+        match self.views.as_ref().and_then(|views| views.get(camera as usize)) {
+            None => self.render(scene, camera::pinhole(&self.config), camera, &sensor),
+            Some(view) => {
+                let rendering = self.render(scene, view.pinhole, camera, &Sensor::new(0, 0, 0, 0.0));
+                Picture { rgb: view.image(&rendering, &sensor), depth_m: Vec::new(), instances: Vec::new() }
+            }
+        }
+    }
+
+    fn render(&self, scene: &Scene, pinhole: Pinhole, camera: u32, sensor: &Sensor) -> Picture {
+        let renderer = Renderer { painter: &self.painter, light: &self.light, bodies: &self.bodies, pinhole };
+        let (offset_m, gain) = if camera == 0 { (0.0, 1.0) } else { (self.config.baseline_m, 1.0 + self.config.gain_difference) };
+        renderer.picture(scene, offset_m, gain as f32, sensor)
     }
 
     fn truth(&self, car: &Present) -> ObjectTruth {

@@ -12,6 +12,10 @@ use rayon::prelude::*;
 
 use super::frame::SynthFrame;
 use super::street::{Street, SynthError};
+use crate::formats::calibration::{to_kalibr, to_toml};
+
+/// The calibration of raw images, in dynvox's own format.
+const CALIBRATION_FILE: &str = "calibration.toml";
 
 /// Writes the configured number of frames to `folder` in KITTI's odometry layout, as sequence 00:
 ///
@@ -20,7 +24,9 @@ use super::street::{Street, SynthError};
 /// - `sequences/00/depth` (1/256 m) and `disp` (1/256 px) as 16-bit PNG, 0 where it is missing or does not fit;
 /// - `sequences/00/instances/NNNNNN.png` (k = the frame's instance k) and `.txt` (`id class score x1 y1 x2 y2`);
 /// - `sequences/00/objects.csv`: every car near the camera at every frame, `instance` being its value in the masks;
-/// - `poses/00.txt`.
+/// - `poses/00.txt`;
+/// - where images are raw, their calibration as `sequences/00/calibration.toml`, and as `camchain.yaml` for lenses that Kalibr has. Depth, masks,
+///   poses and `calib.txt` are then of the rectified pair.
 ///
 /// `progress` receives (frames written, frames in all). Colour and grey cameras share one position, so `P2` equals `P0` and `P3` equals `P1`.
 ///
@@ -91,6 +97,12 @@ fn write_all(street: &Street, folder: &Path, progress: &mut impl FnMut(u32, u32)
     write(&sequence.join("times.txt"), times.as_bytes())?;
     write(&sequence.join("objects.csv"), objects.as_bytes())?;
     write(&sequence.join("calib.txt"), calibration(street).as_bytes())?;
+    if let Some(calibration) = street.calibration() {
+        write(&sequence.join(CALIBRATION_FILE), to_toml(calibration).as_bytes())?;
+        if let Some(text) = to_kalibr(calibration) {
+            write(&sequence.join("camchain.yaml"), text.as_bytes())?;
+        }
+    }
     write(&folder.join("poses/00.txt"), poses.as_bytes())
 }
 
@@ -121,19 +133,20 @@ fn write_frame(street: &Street, sequence: &Path, frame: &SynthFrame, scan: &[[f3
     let focal_baseline = street.rig().focal_baseline_px_m() as f32;
     let fixed = |value: f32| if value > 0.0 && value * 256.0 < 65_535.0 { (value * 256.0 + 0.5) as u16 } else { 0 };
     let sixteen = |of: &dyn Fn(f32) -> f32| -> Vec<u8> { frame.depth_m.iter().flat_map(|&z| fixed(of(z)).to_ne_bytes()).collect() };
+    let (images, truth) = (frame.image_size, [frame.width, frame.height]);
     let pictures = [
-        ("image_0", frame.left_grey.clone(), L8),
-        ("image_1", frame.right_grey.clone(), L8),
-        ("image_2", frame.left_rgb.concat(), Rgb8),
-        ("image_3", frame.right_rgb.concat(), Rgb8),
-        ("depth", sixteen(&|z| z), L16),
-        ("disp", sixteen(&|z| if z > 0.0 { focal_baseline / z } else { 0.0 }), L16),
-        ("instances", frame.instances.clone(), L8),
+        ("image_0", frame.left_grey.clone(), L8, images),
+        ("image_1", frame.right_grey.clone(), L8, images),
+        ("image_2", frame.left_rgb.concat(), Rgb8, images),
+        ("image_3", frame.right_rgb.concat(), Rgb8, images),
+        ("depth", sixteen(&|z| z), L16, truth),
+        ("disp", sixteen(&|z| if z > 0.0 { focal_baseline / z } else { 0.0 }), L16, truth),
+        ("instances", frame.instances.clone(), L8, truth),
     ];
     let index = frame.index;
-    pictures.par_iter().try_for_each(|(name, bytes, colour)| {
+    pictures.par_iter().try_for_each(|(name, bytes, colour, [width, height])| {
         let path = sequence.join(name).join(format!("{index:06}.png"));
-        image::save_buffer(&path, bytes, frame.width as u32, frame.height as u32, *colour)
+        image::save_buffer(&path, bytes, *width as u32, *height as u32, *colour)
             .map_err(|error| SynthError::Write { path, source: std::io::Error::other(error) })
     })?;
     write(&sequence.join(format!("instances/{index:06}.txt")), instance_list(frame).as_bytes())?;

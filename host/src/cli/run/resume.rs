@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 35] = [
+pub const FIXED_ARGUMENTS: [&str; 37] = [
     "path",
     "sequence",
     "dataset",
@@ -18,6 +18,8 @@ pub const FIXED_ARGUMENTS: [&str; 35] = [
     "rate",
     "when_late",
     "calibration",
+    "rectified",
+    "rectified_focal",
     "profile",
     "memory",
     "capacity",

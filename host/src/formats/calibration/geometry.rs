@@ -4,10 +4,57 @@ use super::{StereoCalibration, read_rig};
 use crate::formats::{FormatError, read_text};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::{Rectification, Sizing};
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Widest and highest image that raw pairs are rectified to: wider and higher ones cost time and show nothing that was not seen.
-const LARGEST_PX: [u32; 2] = [1_920, 1_088];
+/// Widest and highest image that raw pairs are rectified to unless a size is given: wider and higher ones cost time and show nothing that was
+/// not seen.
+pub const LARGEST_PX: [u32; 2] = [1_920, 1_088];
+
+/// How large raw pairs are rectified. Without a size it is the calibration's own, else all that both cameras see of one rectangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RectifiedSize {
+    /// Width, px; with `height_px` or not at all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub width_px: Option<u32>,
+    /// Height, px.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_px: Option<u32>,
+    /// Focal length, px, with a size only; the least that leaves no pixel without image when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focal_px: Option<f64>,
+}
+
+impl RectifiedSize {
+    /// Least side, px.
+    const LEAST_PX: u32 = 32;
+    /// Largest side, px.
+    const MOST_PX: u32 = 4_096;
+
+    /// The core's own, or what is wrong, in one sentence.
+    ///
+    /// # Errors
+    /// Sizes out of range, or one figure without the other.
+    pub fn sizing(&self) -> Result<Sizing, String> {
+        let sides = Self::LEAST_PX..=Self::MOST_PX;
+        match (self.width_px, self.height_px, self.focal_px) {
+            (None, None, None) => {
+                let [max_width, max_height] = LARGEST_PX;
+                Ok(Sizing::Automatic { max_width, max_height })
+            }
+            (Some(width), Some(height), _) if !(sides.contains(&width) && sides.contains(&height)) => {
+                Err(format!("the rectified size {width} x {height} px must lie within {} to {} px a side", Self::LEAST_PX, Self::MOST_PX))
+            }
+            (Some(_), Some(_), Some(focal_px)) if !(focal_px.is_finite() && focal_px > 0.0) => {
+                Err(format!("the rectified focal length {focal_px} px must be a positive number"))
+            }
+            (Some(width), Some(height), focal_px) => Ok(Sizing::Given { width, height, focal_px }),
+            (None, None, Some(_)) => Err("a rectified focal length needs a rectified size".to_owned()),
+            _ => Err("a rectified size needs width and height".to_owned()),
+        }
+    }
+}
 
 /// The cameras of a recording.
 #[derive(Clone, Debug)]
@@ -62,15 +109,17 @@ impl CameraGeometry {
     /// What is mapped of images of a size.
     ///
     /// # Errors
-    /// A raw calibration is for images of another size.
-    pub fn fitted(&self, size: (usize, usize)) -> Result<FittedGeometry, FormatError> {
+    /// A raw calibration is for images of another size, or cannot be rectified to the size that is asked for.
+    pub fn fitted(&self, size: (usize, usize), rectified: &RectifiedSize) -> Result<FittedGeometry, FormatError> {
         match self {
             Self::Rectified(rig) => Ok(FittedGeometry { rig: *rig, size, rectification: None }),
             Self::Raw { calibration, path } => {
                 calibration.fits(path, [size.0, size.1].map(|side| u32::try_from(side).unwrap_or(u32::MAX)))?;
-                let [max_width, max_height] = LARGEST_PX;
+                let sizing = rectified.sizing().map_err(|reason| {
+                    FormatError::content(path, reason, "Give --rectified WxH, and --rectified-focal PX with it, or neither")
+                })?;
                 let (rectification, rig) = calibration
-                    .rectify(Sizing::Automatic { max_width, max_height })
+                    .rectify(sizing)
                     .map_err(|problem| FormatError::content(path, problem.to_string(), "Check the calibration's numbers"))?;
                 let size = (rectification.width as usize, rectification.height as usize);
                 Ok(FittedGeometry { rig, size, rectification: Some(rectification) })

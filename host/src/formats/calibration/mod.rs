@@ -5,10 +5,10 @@ mod kitti;
 mod plain;
 mod raw;
 
-pub use geometry::{CameraGeometry, FittedGeometry, beside};
+pub use geometry::{CameraGeometry, FittedGeometry, LARGEST_PX, RectifiedSize, beside};
 pub use kitti::{KittiCalibration, Projection};
 pub use plain::read_rig;
-pub use raw::{LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M, StereoCalibration, to_toml};
+pub use raw::{LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M, StereoCalibration, to_kalibr, to_toml};
 
 use crate::formats::FormatError;
 use dynvox_core::geometry::{RigProblem, StereoRig};

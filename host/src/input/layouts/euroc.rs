@@ -27,6 +27,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
         name: super::folder::name_of(root),
         images: ImageFiles::Cameras(cameras),
         bits: options.bits,
+        rectified: options.rectified,
         cameras: CameraGeometry::read(&cameras_from, None)?,
         times: None,
         poses: None,

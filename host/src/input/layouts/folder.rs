@@ -30,6 +30,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
         name: name_of(path),
         images: images(path, action, options.stacking, cameras.center_px())?,
         bits: options.bits,
+        rectified: options.rectified,
         cameras,
         times: file("times.txt").map(|file| read_times(&file).map(|times| (file, times))).transpose()?,
         poses: file("poses.txt").map(|file| read_poses(&file).map(|read| (file, read.poses))).transpose()?,

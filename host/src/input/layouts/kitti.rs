@@ -20,6 +20,12 @@ pub fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, Inp
     let number = folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let calibration =
         KittiCalibration::read(&present(folder.join("calib.txt"), "Every sequence needs its calib.txt: copy it from the benchmark")?)?;
+    // A street written through a lens brings the calibration of its raw images.
+    let own = Some(folder.join("calibration.toml")).filter(|file| file.is_file() && options.calibration.is_empty());
+    let options = &OpenOptions {
+        calibration: own.map_or_else(|| options.calibration.clone(), |file| vec![file]),
+        ..options.clone()
+    };
     let has = |cameras: [&str; 2]| cameras.iter().all(|camera| folder.join(camera).is_dir());
     let (grey, colour) = (has(["image_0", "image_1"]), has(["image_2", "image_3"]));
     let mut notes = Vec::new();
@@ -57,6 +63,7 @@ pub fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, Inp
         name: format!("kitti-odometry-{number}"),
         images: ImageFiles::in_folders(&left_folder, &right_folder)?,
         bits: options.bits,
+        rectified: options.rectified,
         cameras: options.cameras_or(|| calibration.rig(left, right))?,
         times,
         poses,
@@ -91,6 +98,7 @@ pub fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, Inp
             &present(split.join("image_03").join(&name), action)?,
         )?,
         bits: options.bits,
+        rectified: options.rectified,
         cameras: options.cameras_or(|| calibration.rig(2, 3))?,
         times: None,
         poses: if poses.is_file() { Some((poses.clone(), read_poses(&poses)?.poses)) } else { None },

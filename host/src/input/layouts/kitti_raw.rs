@@ -48,6 +48,7 @@ fn open_drive(drive: &Path, calibration: &Path, prefix: &str, options: &OpenOpti
         name: format!("{prefix}-{}", name_of(drive)),
         images: ImageFiles::Cameras(cameras),
         bits: options.bits,
+        rectified: options.rectified,
         cameras: options.cameras_or(own)?,
         times: None,
         poses: None,

@@ -2,7 +2,7 @@
 
 use super::{CameraPair, Stacking, cityscapes, euroc, folder, kitti, kitti_raw};
 use crate::formats::FormatError;
-use crate::formats::calibration::CameraGeometry;
+use crate::formats::calibration::{CameraGeometry, RectifiedSize};
 use crate::input::source::{FrameSource, InputError};
 use dynvox_core::geometry::StereoRig;
 use std::path::{Path, PathBuf};
@@ -100,7 +100,7 @@ impl Layout {
 }
 
 /// What to open of a recording, and how.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct OpenOptions {
     /// The layout; guessed from the path where it is not said.
     pub layout: Option<Layout>,
@@ -114,6 +114,8 @@ pub struct OpenOptions {
     pub stacking: Option<Stacking>,
     /// Files of a calibration in place of the recording's own; none for that one.
     pub calibration: Vec<PathBuf>,
+    /// How large raw pairs are rectified.
+    pub rectified: RectifiedSize,
 }
 
 impl OpenOptions {

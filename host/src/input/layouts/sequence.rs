@@ -4,7 +4,7 @@ use super::lidar::LidarFiles;
 use super::names::{pictures_in, stamp_in_name, stem_of};
 use super::pairing::{CameraFiles, Pairing};
 use super::stacked::Stacking;
-use crate::formats::calibration::{CameraGeometry, FittedGeometry};
+use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
 use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
 use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState};
 use crate::input::stream::ASSUMED_HZ;
@@ -74,6 +74,8 @@ pub(super) struct Parts {
     /// Whether this is significant bits of 16-bit images; told from the data otherwise.
     pub bits: Option<u32>,
     pub cameras: CameraGeometry,
+    /// How large raw pairs are rectified.
+    pub rectified: RectifiedSize,
     /// Times (ns) and poses as read: one row for each image of the left folder or frame number, or `None` without a file.
     pub times: Option<(PathBuf, Vec<u64>)>,
     pub poses: Option<(PathBuf, Vec<Transform>)>,
@@ -95,7 +97,7 @@ impl Sequence {
         let first = &pairs.first().ok_or_else(|| InputError::Empty { path: PathBuf::from(&parts.name) })?[0];
         let size = picture_size(first).map_err(InputError::image)?;
         let image_size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
-        let geometry = parts.cameras.fitted(image_size)?;
+        let geometry = parts.cameras.fitted(image_size, &parts.rectified)?;
         notes.extend(raw_note(&parts.cameras, &geometry));
         let bits = match parts.bits {
             Some(bits) => Some(bits),

@@ -14,6 +14,7 @@ pub struct StreetFrames {
     street: Street,
     frames: usize,
     truth: Vec<Transform>,
+    rectification: Option<Rectification>,
 }
 
 impl StreetFrames {
@@ -24,6 +25,7 @@ impl StreetFrames {
         Ok(Self {
             truth: (0..frames).map(|index| street.t_world_camera(index)).collect(),
             frames: frames as usize,
+            rectification: street.rectification(),
             street,
         })
     }
@@ -55,7 +57,7 @@ impl FrameSource for StreetFrames {
     }
 
     fn rectification(&self) -> Option<&Rectification> {
-        None
+        self.rectification.as_ref()
     }
 
     fn time_s(&self, index: usize) -> f64 {
@@ -64,7 +66,7 @@ impl FrameSource for StreetFrames {
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let frame = self.street.frame(index as u32);
-        let (width, height) = (frame.width, frame.height);
+        let ((width, height), [image_width, image_height]) = ((frame.width, frame.height), frame.image_size);
         let failed = || InputError::Street { reason: format!("frame {index} has no pixels") };
         let moving = (0..frame.depth_m.len()).map(|pixel| frame.is_moving(pixel)).collect();
         let objects = objects_truth(&frame);
@@ -77,9 +79,9 @@ impl FrameSource for StreetFrames {
             })
         };
         Ok(StereoImages {
-            left: Image::new(width, height, frame.left_grey).ok_or_else(failed)?,
-            right: Image::new(width, height, frame.right_grey).ok_or_else(failed)?,
-            colour: Image::new(width, height, frame.left_rgb),
+            left: Image::new(image_width, image_height, frame.left_grey).ok_or_else(failed)?,
+            right: Image::new(image_width, image_height, frame.right_grey).ok_or_else(failed)?,
+            colour: Image::new(image_width, image_height, frame.left_rgb),
             depth: None,
             exact: exact(),
             objects: Some(objects),

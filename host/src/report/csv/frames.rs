@@ -19,6 +19,9 @@ struct FrameColumns {
     matches: u32,
     inliers: u32,
     residual_px: f64,
+    rig_offset_px: Option<f64>,
+    rig_offset_sigma_px: Option<f64>,
+    rig_offset_applied_px: f64,
     icp_points: Option<u32>,
     icp_pairs: Option<u32>,
     icp_residual_m: Option<f64>,
@@ -144,6 +147,7 @@ pub fn read_frame_digests(text: &str) -> Result<Vec<FrameDigests>, csv::Error> {
 fn frame_columns(row: &FrameRow) -> FrameColumns {
     let (matches, inliers, residual_px) = row.matches();
     let icp = row.report.icp.as_ref();
+    let known = Some(&row.report.self_calibration).filter(|rig| rig.known);
     FrameColumns {
         frame: row.frame,
         time_s: row.time_s,
@@ -154,6 +158,9 @@ fn frame_columns(row: &FrameRow) -> FrameColumns {
         matches,
         inliers,
         residual_px: rounded(residual_px, 4),
+        rig_offset_px: known.map(|rig| rounded(rig.offset_px, 4)),
+        rig_offset_sigma_px: known.map(|rig| rounded(rig.offset_sigma_px, 4)),
+        rig_offset_applied_px: rounded(row.report.self_calibration.applied_offset_px, 4),
         icp_points: icp.map(|icp: &IcpReport| icp.points),
         icp_pairs: icp.map(|icp| icp.pairs),
         icp_residual_m: icp.map(|icp| rounded(icp.residual_rms_m, 4)),

@@ -2,7 +2,7 @@
 
 use super::{Placement, StereoCalibration, lens, tree::Node};
 use crate::formats::FormatError;
-use dynvox_core::rectify::{LensModel, RawCamera};
+use dynvox_core::rectify::{LensModel, RawCamera, RawRig};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
 /// Reads both cameras.
@@ -50,4 +50,40 @@ pub fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
         }
     };
     lens::camera(node, pinhole, model, size)
+}
+
+/// The calibration as a `camchain.yaml`; `None` for a lens Kalibr does not have. A rectification that the calibration gives is left out: Kalibr
+/// knows the motion between the cameras alone.
+pub fn to_kalibr(calibration: &StereoCalibration) -> Option<String> {
+    let RawRig { r_right_left: r, t_right_left_m: t, .. } = calibration.raw_rig();
+    let mut text = String::from("cam0:\n");
+    text.push_str(&camera_keys(&calibration.left)?);
+    text.push_str("cam1:\n  T_cn_cnm1:\n");
+    for row in 0..3 {
+        text.push_str(&format!("  - [{}, {}, {}, {}]\n", r[(row, 0)], r[(row, 1)], r[(row, 2)], t[row]));
+    }
+    text.push_str("  - [0.0, 0.0, 0.0, 1.0]\n");
+    text.push_str(&camera_keys(&calibration.right)?);
+    Some(text)
+}
+
+fn camera_keys(camera: &RawCamera) -> Option<String> {
+    let ([fx, fy], [cx, cy]) = (camera.lens.focal_px(), camera.lens.center_px());
+    let list = |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    let (model, name, coefficients, before) = match *camera.lens.model() {
+        LensModel::RadialTangential { radial: [k1, k2, 0.0, 0.0, 0.0, 0.0], tangential: [p1, p2] } => {
+            ("pinhole", "radtan", vec![k1, k2, p1, p2], vec![])
+        }
+        LensModel::RadialTangential { .. } => return None,
+        LensModel::Equidistant { radial } => ("pinhole", "equidistant", radial.to_vec(), vec![]),
+        LensModel::DoubleSphere { xi, alpha } => ("ds", "none", vec![], vec![xi, alpha]),
+        LensModel::ExtendedUnified { alpha, beta } => ("eucm", "none", vec![], vec![alpha, beta]),
+    };
+    Some(format!(
+        "  camera_model: {model}\n  distortion_coeffs: [{}]\n  distortion_model: {name}\n  intrinsics: [{}]\n  resolution: [{}, {}]\n",
+        list(&coefficients),
+        list(&[before, vec![fx, fy, cx, cy]].concat()),
+        camera.width,
+        camera.height
+    ))
 }

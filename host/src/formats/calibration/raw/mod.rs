@@ -24,6 +24,7 @@ mod ros;
 mod tests;
 mod tree;
 
+pub use kalibr::to_kalibr;
 pub use own::to_toml;
 
 use crate::formats::{FormatError, read_text};

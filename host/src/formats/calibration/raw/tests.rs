@@ -1,7 +1,8 @@
 //! Each format contains_all the same rig; each way to damage a file is answered by a sentence.
 
 use super::*;
-use dynvox_core::rectify::LensModel;
+use crate::formats::calibration::{CameraGeometry, RectifiedSize};
+use dynvox_core::rectify::{Lens, LensModel, RawCamera};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -157,6 +158,63 @@ fn own_files_keep_every_bit() {
 }
 
 #[test]
+fn a_written_camchain_is_read_again() {
+    let models = [
+        LensModel::RadialTangential { radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0], tangential: [2e-4, -3e-4] },
+        LensModel::Equidistant { radial: [-0.013, 0.02, -0.012, 0.002] },
+        LensModel::DoubleSphere { xi: -0.18, alpha: 0.59 },
+        LensModel::ExtendedUnified { alpha: 0.6, beta: 1.1 },
+    ];
+    let plain = read(&[("camchain.yaml", KALIBR)]).unwrap();
+    for model in models {
+        let camera = |camera: RawCamera| RawCamera {
+            lens: Lens::new(camera.lens.focal_px(), camera.lens.center_px(), model).unwrap(),
+            ..camera
+        };
+        let calibration = StereoCalibration { left: camera(plain.left), right: camera(plain.right), ..plain };
+        assert_eq!(read(&[("camchain.yaml", &to_kalibr(&calibration).unwrap())]).unwrap(), calibration);
+    }
+    let rational = LensModel::RadialTangential { radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05], tangential: [0.0; 2] };
+    let lens = Lens::new([400.0; 2], [300.0; 2], rational).unwrap();
+    assert_eq!(to_kalibr(&StereoCalibration { left: RawCamera { lens, ..plain.left }, ..plain }), None, "Kalibr has no rational model");
+}
+
+#[test]
+fn bad_files_of_our_own_format_are_answered_by_a_sentence() {
+    let text = to_toml(&read(&[("calib_cam_to_cam.txt", KITTI)]).unwrap());
+    for end in (0..text.len().saturating_sub(60)).step_by(41) {
+        let message = refusal(&[("own.toml", &text[..end])]);
+        assert!(message.contains("own.toml") && message.contains(". "), "{message}");
+    }
+    let says = |from: &str, to: &str, words: &str| {
+        assert!(text.contains(from), "{from}: {text}");
+        let message = refusal(&[("own.toml", &text.replace(from, to))]);
+        assert!(message.contains(words), "{words}: {message}");
+    };
+    says("width_px", "widht_px", "not a calibration");
+    says("458.6", "nan", "focal length is not a positive number");
+    says("458.6", "0.0", "focal length is not a positive number");
+    says("367.2", "inf", "principal point is not finite");
+    says("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]", "not a rotation matrix");
+    says("baseline_m = 0.11", "baseline_m = 537.0", "Is it in millimetres?");
+    says("width_px = 752", "width_px = 1", "raw");
+}
+
+#[test]
+fn bad_files_of_kitti_are_answered_by_a_sentence() {
+    let says = |from: &str, to: &str, words: &str| {
+        assert!(KITTI.contains(from), "{from}");
+        let message = refusal(&[("calib_cam_to_cam.txt", &KITTI.replace(from, to))]);
+        assert!(message.contains(words), "{words}: {message}");
+    };
+    says("K_01", "K_0l", "K_01");
+    says("458.6", "nan", "finite");
+    says("458.6", "0.0", "focal length");
+    says("R_rect_00: 1 0 0 0 1 0 0 0 1", "R_rect_00: 1 0 0 0 0 0 0 0 1", "not a rotation matrix");
+    says("P_rect_01: 400 0 370 -44 ", "P_rect_01: 400 0 370 -440000 ", "Is it in millimetres?");
+}
+
+#[test]
 fn every_lens_of_kalibr_is_read() {
     let with = |model: &str, distortion: &str, intrinsics: &str, coefficients: &str| {
         KALIBR
@@ -241,4 +299,22 @@ fn images_of_another_size_do_not_fit() {
     let (_folder, paths) = written(&[("i.yml", &short[0]), ("e.yml", &sizeless)]);
     let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
     assert_eq!(StereoCalibration::read(&paths, Some([752, 480])).unwrap().left.width, 752, "told by the images");
+}
+
+#[test]
+fn the_rectified_size_is_the_calibrations_or_a_given_one() {
+    let (_folder, paths) = written(&[("calib_cam_to_cam.txt", KITTI)]);
+    let fitted = |rectified: RectifiedSize| CameraGeometry::read(&paths, None).unwrap().fitted((752, 480), &rectified);
+    let own = fitted(RectifiedSize::default()).unwrap();
+    assert_eq!((own.size, own.rig.focal_px), ((700, 400), 400.0));
+    let size = RectifiedSize { width_px: Some(320), height_px: Some(200), focal_px: None };
+    let given = fitted(size).unwrap();
+    assert!(given.size == (320, 200) && given.rig.focal_px < 458.6, "the least focal length without invalid pixels");
+    let closer = fitted(RectifiedSize { focal_px: Some(500.0), ..size }).unwrap();
+    assert_eq!((closer.size, closer.rig.focal_px), ((320, 200), 500.0));
+    let refused = |rectified: RectifiedSize| fitted(rectified).unwrap_err().to_string();
+    assert!(refused(RectifiedSize { height_px: None, ..size }).contains("needs width and height. Give --rectified WxH"));
+    assert!(refused(RectifiedSize { width_px: Some(8), ..size }).contains("8 x 200 px must lie within 32 to 4096"));
+    assert!(refused(RectifiedSize { focal_px: Some(f64::NAN), ..size }).contains("must be a positive number"));
+    assert!(refused(RectifiedSize { focal_px: Some(500.0), ..RectifiedSize::default() }).contains("needs a rectified size"));
 }
