@@ -176,8 +176,10 @@ fn pending(setup: &Setup<'_>, plan: &ReferencePlan, frame: &FrameContext<'_, '_>
         Reference::Exact => images.exact.as_ref().map(|exact| sample_exact_depth(&exact.depth_m, rig, &field)),
     };
     let disparity = mapper.disparity_q8();
+    // The map's metres are those of the scaled baseline: a disparity is compared as the calibrated rig would have it at that depth.
+    let baseline_scale = setup.config.rig_settings.baseline_scale as f32;
     let input_px = |u: usize, v: usize| {
-        let px = f32::from(disparity.get(u, v).unwrap_or_default()) / f32::from(DISPARITY_ONE_PX);
+        let px = f32::from(disparity.get(u, v).unwrap_or_default()) / f32::from(DISPARITY_ONE_PX) / baseline_scale;
         let depth_m = rig.focal_baseline_px_m() / f64::from(px);
         // Only what is fused is the map's input. Infinite where there is no disparity.
         if depth_m >= near_m && depth_m <= far_m { px } else { 0.0 }
