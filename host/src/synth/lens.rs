@@ -110,7 +110,7 @@ pub struct RigError {
 }
 
 impl RigError {
-    /// Whether there is none.
+    /// Whether the rig stands as calibrated.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }

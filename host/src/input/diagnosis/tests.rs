@@ -124,7 +124,7 @@ fn single_real_pairs_give_no_false_alarm() {
     let Some(folder) = data("kitti-stereo-2012/training") else { return };
     for name in ["000027_10.png", "000151_10.png", "000174_10.png"] {
         let [left, right] = ["image_0", "image_1"].map(|camera| read_picture(&folder.join(camera).join(name)).unwrap().to_8_bit(None).grey);
-        let findings = judge(&[Pair::of(&left, &right)]);
+        let findings = diagnose(&[Pair::of(&left, &right)]);
         assert!(findings.is_empty(), "{name}: {findings:?}");
     }
 }
