@@ -73,10 +73,8 @@ fn weighed(matches: &[&PatchMatch], width_px: f64, (shift_px, slope): (f64, f64)
         sum_ur += weight * u * one.rows_px;
     }
     let determinant = sum * sum_uu - sum_u * sum_u;
-    if !(determinant > sum * sum * SPAN_MIN_PX * SPAN_MIN_PX) {
-        return None;
-    }
-    Some(((sum_uu * sum_r - sum_u * sum_ur) / determinant, (sum * sum_ur - sum_u * sum_r) / determinant))
+    let spans = determinant > sum * sum * SPAN_MIN_PX * SPAN_MIN_PX;
+    spans.then(|| ((sum_uu * sum_r - sum_u * sum_ur) / determinant, (sum * sum_ur - sum_u * sum_r) / determinant))
 }
 
 #[cfg(test)]
