@@ -204,7 +204,7 @@ impl RunArgs {
 
     fn open(&self, settings: &Settings, stop: &StopRequest) -> anyhow::Result<Box<dyn FrameSource>> {
         let dataset: Box<dyn FrameSource> = match &self.path {
-            Some(path) if stream::is_stream(path) => stream::open(self, stop)?,
+            Some(path) if stream::is_stream(path) => stream::open(self, settings.rectified_size(), stop)?,
             _ if self.rate.is_some() || self.when_late.is_some() => bail!("--rate and --when-late are for a stream: `dynvox run -`"),
             Some(path) => input::open(path, &self.options(settings))?,
             None if self.dataset.is_some() || self.sequence.is_some() => {

@@ -2,7 +2,7 @@
 
 use super::RunArgs;
 use crate::cli::egomotion::EgomotionChoice;
-use crate::formats::calibration::CameraGeometry;
+use crate::formats::calibration::{CameraGeometry, RectifiedSize};
 use crate::input::depth::DepthChoice;
 use crate::input::masks::MaskChoice;
 use crate::input::stream::netpbm::NetpbmPairs;
@@ -21,7 +21,7 @@ pub fn is_stream(path: &Path) -> bool {
 }
 
 /// The stereo pairs on standard input.
-pub fn open(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Box<dyn FrameSource>> {
+pub fn open(args: &RunArgs, rectified: RectifiedSize, stop: &StopRequest) -> anyhow::Result<Box<dyn FrameSource>> {
     if args.calibration.is_empty() {
         bail!("a stream has no calibration beside it. Give one with --calibration FILE");
     }
@@ -41,6 +41,7 @@ pub fn open(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Box<dyn FrameS
     let options = StreamOptions {
         name: "stream".to_owned(),
         cameras: CameraGeometry::read(&args.calibration, None).map_err(InputError::from)?,
+        rectified,
         rate_hz: args.rate,
         when_late: args.when_late.unwrap_or_default(),
     };

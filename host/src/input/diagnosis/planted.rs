@@ -2,7 +2,7 @@
 
 use super::tests::data;
 use super::*;
-use crate::input::source::{AvailableMasks, LidarScan, StereoImages};
+use crate::input::source::{AvailableMasks, LidarScan, StereoImages, StreamState};
 use crate::input::{OpenOptions, StreetFrames, open};
 use crate::synth::StreetConfig;
 use dynvox_core::geometry::StereoRig;
@@ -56,6 +56,10 @@ fn resampled(from: &Image<u8>, at: impl Fn(f64, f64) -> [f64; 2]) -> Image<u8> {
 impl FrameSource for Spoilt<'_> {
     fn name(&self) -> &str {
         self.source.name()
+    }
+
+    fn stream(&self) -> Option<StreamState> {
+        None
     }
 
     fn len(&self) -> usize {

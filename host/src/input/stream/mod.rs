@@ -14,7 +14,7 @@ pub use queue::WhenLate;
 
 use super::source::{FrameMasks, FrameSource, InputError, LidarScan, StereoImages, StopRequest, StreamState};
 use crate::formats::Decoded;
-use crate::formats::calibration::{CameraGeometry, FittedGeometry};
+use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::Rectification;
 use queue::{Arrived, Queue};
@@ -35,6 +35,8 @@ pub struct StreamOptions {
     pub name: String,
     /// The cameras.
     pub cameras: CameraGeometry,
+    /// How large raw pairs are rectified.
+    pub rectified: RectifiedSize,
     /// Frames a second, where known: frames then bear time stamps by their number. Without it [`ASSUMED_HZ`] is assumed.
     pub rate_hz: Option<f64>,
     /// What becomes of frames that come while the mapper is busy.
@@ -86,7 +88,7 @@ impl Stream {
         let first = queue.pop(&stop).ok_or(InputError::PastEnd { frames: 0 })?;
         let pair = first.pair?;
         let image_size = (pair[0].grey.width(), pair[0].grey.height());
-        let geometry = options.cameras.fitted(image_size)?;
+        let geometry = options.cameras.fitted(image_size, &options.rectified)?;
         let rate = match options.rate_hz {
             Some(rate_hz) => format!("a stream of {rate_hz} frames a second"),
             None => format!("a stream: {ASSUMED_HZ} frames a second are assumed; --rate says otherwise"),

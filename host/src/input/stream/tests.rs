@@ -59,6 +59,7 @@ fn options(when_late: WhenLate) -> StreamOptions {
     StreamOptions {
         name: "stream".into(),
         cameras: CameraGeometry::Rectified(rig),
+        rectified: RectifiedSize::default(),
         rate_hz: None,
         when_late,
     }
