@@ -4,7 +4,7 @@
 //! `cargo run --release -p dynvox --example render_map -- KITTI-ODOMETRY 06 OUT [apply|off]`
 
 use dynvox::input::{FrameSource, OpenOptions, open};
-use dynvox_core::geometry::{ColumnCorrection, DisparityCorrection, StereoRig, Transform};
+use dynvox_core::geometry::{DisparityCorrection, StereoRig, Transform};
 use dynvox_core::mapper::BudgetOptions;
 use dynvox_core::rectify::self_calibration::SelfCalibrationMode;
 use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, memory::SLAB_ALIGN};
@@ -30,8 +30,7 @@ fn main() -> anyhow::Result<()> {
         let name = source.stem(index).unwrap_or_else(|| format!("{index:06}"));
         let path: PathBuf = Path::new(out).join(format!("{name}.png"));
         let Some(depth_m) = mapper.raycast(t_world_camera, &Serial)?.depth_m() else { continue };
-        let column = correction.for_rig(&source.rig());
-        let disparity = |(at, &depth_m): (usize, &f32)| disparity_q8(&source.rig(), &column, at % width, depth_m);
+        let disparity = |(at, &depth_m): (usize, &f32)| disparity_q8(&source.rig(), &correction, at % width, depth_m);
         let pixels: Vec<u8> = depth_m.pixels().iter().enumerate().map(disparity).flat_map(u16::to_ne_bytes).collect();
         image::save_buffer(&path, &pixels, width as u32, height as u32, image::ExtendedColorType::L16)?;
     }
@@ -52,11 +51,12 @@ fn map(source: &dyn FrameSource, mapper: &mut Mapper<'_>) -> anyhow::Result<(Vec
 }
 
 /// The disparity the images themselves have where the map is so far away, 1/256 px.
-fn disparity_q8(rig: &StereoRig, correction: &ColumnCorrection, column: usize, depth_m: f32) -> u16 {
+fn disparity_q8(rig: &StereoRig, correction: &DisparityCorrection, column: usize, depth_m: f32) -> u16 {
     if depth_m <= 0.0 {
         return 0;
     }
-    let corrected = (rig.focal_baseline_px_m() / f64::from(depth_m)) as f32;
-    let uncorrected = column as f32 - correction.uncorrected(column as f32 - corrected);
-    (uncorrected * 256.0 + 0.5) as u16
+    let corrected_px = rig.focal_baseline_px_m() / f64::from(depth_m);
+    let share = (column as f64 - corrected_px - rig.center_u_px) / rig.center_u_px;
+    let added_px = correction.offset_px + correction.slope_px * share + correction.quartic_px * share.powi(4);
+    ((corrected_px - added_px) * 256.0 + 0.5) as u16
 }

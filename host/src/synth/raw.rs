@@ -45,7 +45,7 @@ pub fn calibration(config: &StreetConfig, rig: &StereoRig) -> Result<Option<Ster
     };
     // The middle at the scale of the ideal images.
     let plain = lens(rig.focal_px, [0.0; 2])?;
-    let focal_px = rig.focal_px * rig.focal_px / plain.middle_focal_px();
+    let focal_px = rig.focal_px * rig.focal_px / middle_focal_px(&plain);
     let plain = lens(focal_px, [0.0; 2])?;
     let rotations = ROTATIONS_RAD.map(rotation);
     let extents = rotations.map(|r| extent(&plain, &r, config, rig));
@@ -75,6 +75,18 @@ pub fn calibration(config: &StreetConfig, rig: &StereoRig) -> Result<Option<Ster
     }))
 }
 
+/// Pixels per radian on the optical axis, mean of both directions.
+fn middle_focal_px(lens: &Lens) -> f64 {
+    const STEP: f64 = 1e-5;
+    let column = |x: f64| lens.project([x, 0.0, 1.0]).map_or(0.0, |[u, _]| u);
+    0.5 * (1.0 + ASPECT) * (column(STEP) - column(-STEP)) / (2.0 * STEP)
+}
+
+/// The ray of a pixel of the ideal images, at depth 1.
+fn ray(rig: &StereoRig, [u, v]: [f64; 2]) -> Vector3<f64> {
+    Vector3::new((u - rig.center_u_px) / rig.focal_px, (v - rig.center_v_px) / rig.focal_px, 1.0)
+}
+
 fn rotation(rotation_rad: [f64; 3]) -> Matrix3<f64> {
     Matrix3::from(Transform::new(rotation_rad, [0.0; 3]).rotation_matrix()).transpose()
 }
@@ -87,7 +99,7 @@ fn extent(lens: &Lens, r_rectified_raw: &Matrix3<f64>, config: &StreetConfig, ri
         let share = f64::from(step) / f64::from(SIDE_POINTS);
         let [u, v] = [last[0] * share, last[1] * share];
         for [u, v] in [[u, 0.0], [u, last[1]], [0.0, v], [last[0], v]] {
-            let pixel = lens.project((r_rectified_raw.transpose() * Vector3::from(rig.ray(u, v))).into())?;
+            let pixel = lens.project((r_rectified_raw.transpose() * ray(rig, [u, v])).into())?;
             for axis in 0..2 {
                 low[axis] = low[axis].min(pixel[axis]);
                 high[axis] = high[axis].max(pixel[axis]);
@@ -132,7 +144,7 @@ impl CameraView {
         let tangents = |[u, v]: [f64; 2]| {
             let ray = match raw {
                 Some(camera) => camera.r_rectified_raw * Vector3::from(camera.raw.lens.unproject([u, v])?),
-                None => Vector3::from(rig.ray(u, v)),
+                None => ray(rig, [u, v]),
             };
             (ray.z > 0.05).then(|| off.seen([ray.x / ray.z, ray.y / ray.z]))
         };

@@ -87,7 +87,6 @@ fn raw_images_rectify_to_what_the_ideal_rig_sees() {
             colour: None,
         };
         let rectified = rectifier.rectify(&raw, &mut images, &Serial).unwrap();
-        assert!(rectifier.invalid().is_none(), "{lens:?}: every rectified pixel is covered");
         for (camera, ours, theirs) in [("left", rectified.left, &ideal.left_grey), ("right", rectified.right, &ideal.right_grey)] {
             let ours = ours.rows().flatten().copied().collect::<Vec<u8>>();
             let by = moved(&ours, theirs, [0, 0]);
