@@ -186,32 +186,32 @@ fn bad_files_of_our_own_format_are_answered_by_a_sentence() {
         let message = refusal(&[("own.toml", &text[..end])]);
         assert!(message.contains("own.toml") && message.contains(". "), "{message}");
     }
-    let says = |from: &str, to: &str, words: &str| {
+    let contains = |from: &str, to: &str, words: &str| {
         assert!(text.contains(from), "{from}: {text}");
         let message = refusal(&[("own.toml", &text.replace(from, to))]);
         assert!(message.contains(words), "{words}: {message}");
     };
-    says("width_px", "widht_px", "not a calibration");
-    says("458.6", "nan", "focal length is not a positive number");
-    says("458.6", "0.0", "focal length is not a positive number");
-    says("367.2", "inf", "principal point is not finite");
-    says("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]", "not a rotation matrix");
-    says("baseline_m = 0.11", "baseline_m = 537.0", "Is it in millimetres?");
-    says("width_px = 752", "width_px = 1", "raw");
+    contains("width_px", "widht_px", "not a calibration");
+    contains("458.6", "nan", "focal length is not a positive number");
+    contains("458.6", "0.0", "focal length is not a positive number");
+    contains("367.2", "inf", "principal point is not finite");
+    contains("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]", "not a rotation matrix");
+    contains("baseline_m = 0.11", "baseline_m = 537.0", "Is it in millimetres?");
+    contains("width_px = 752", "width_px = 1", "raw");
 }
 
 #[test]
 fn bad_files_of_kitti_are_answered_by_a_sentence() {
-    let says = |from: &str, to: &str, words: &str| {
+    let contains = |from: &str, to: &str, words: &str| {
         assert!(KITTI.contains(from), "{from}");
         let message = refusal(&[("calib_cam_to_cam.txt", &KITTI.replace(from, to))]);
         assert!(message.contains(words), "{words}: {message}");
     };
-    says("K_01", "K_0l", "K_01");
-    says("458.6", "nan", "finite");
-    says("458.6", "0.0", "focal length");
-    says("R_rect_00: 1 0 0 0 1 0 0 0 1", "R_rect_00: 1 0 0 0 0 0 0 0 1", "not a rotation matrix");
-    says("P_rect_01: 400 0 370 -44 ", "P_rect_01: 400 0 370 -440000 ", "Is it in millimetres?");
+    contains("K_01", "K_0l", "K_01");
+    contains("458.6", "nan", "finite");
+    contains("458.6", "0.0", "focal length");
+    contains("R_rect_00: 1 0 0 0 1 0 0 0 1", "R_rect_00: 1 0 0 0 0 0 0 0 1", "not a rotation matrix");
+    contains("P_rect_01: 400 0 370 -44 ", "P_rect_01: 400 0 370 -440000 ", "Is it in millimetres?");
 }
 
 #[test]
