@@ -1,6 +1,7 @@
 //! `dynvox calibration`.
 
 use super::capacity::ImageSize;
+use super::rectified::RectifiedArgs;
 use crate::formats::calibration::{RectifiedSize, StereoCalibration, to_toml};
 use anyhow::Context;
 use dynvox_core::geometry::StereoRig;
@@ -16,12 +17,8 @@ pub struct CalibrationArgs {
     /// Size of the raw images, where the files do not say it
     #[arg(long, value_name = "WxH")]
     image: Option<ImageSize>,
-    /// Size raw pairs are rectified to [default: the calibration's own, else all that both cameras see, at most 1920x1088]
-    #[arg(long, value_name = "WxH")]
-    rectified: Option<ImageSize>,
-    /// Focal length raw pairs are rectified to, px [default: the least that leaves no pixel without image]
-    #[arg(long, value_name = "PX", requires = "rectified")]
-    rectified_focal: Option<f64>,
+    #[command(flatten)]
+    rectified: RectifiedArgs,
     /// Write the calibration as dynvox's own TOML, as `--calibration` takes it
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
@@ -32,14 +29,8 @@ pub fn run(args: &CalibrationArgs) -> anyhow::Result<()> {
     let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
     let image = args.image.map(|ImageSize(width, height)| [width, height].map(side));
     let calibration = StereoCalibration::read(&files, image)?;
-    let size = args.rectified.map(|ImageSize(width, height)| [width, height].map(side));
-    let rectified = RectifiedSize {
-        width_px: size.map(|[width, _]| width),
-        height_px: size.map(|[_, height]| height),
-        focal_px: args.rectified_focal,
-    };
-    let sizing =
-        rectified.sizing().map_err(|reason| anyhow::anyhow!("{reason}. Give --rectified WxH, and --rectified-focal PX with it"))?;
+    let sizing = args.rectified.over(RectifiedSize::default()).sizing();
+    let sizing = sizing.map_err(|reason| anyhow::anyhow!("{reason}. Give --rectified WxH, and --rectified-focal PX with it"))?;
     let shown = args.files.first().map(|path| path.display().to_string()).unwrap_or_default();
     let (rectification, rig) = calibration.rectify(sizing).map_err(|problem| {
         anyhow::anyhow!("{shown} cannot be rectified: {problem}. Give another --rectified size, or check the calibration's numbers")

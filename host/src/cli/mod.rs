@@ -19,6 +19,7 @@ mod evaluate;
 mod fixtures;
 mod inspect;
 mod output;
+mod rectified;
 mod run;
 mod settings;
 mod signals;

@@ -5,9 +5,10 @@ mod resume;
 mod saved;
 mod stream;
 
-use super::capacity::{CapacityArgs, ImageSize};
+use super::capacity::CapacityArgs;
 use super::egomotion::EgomotionChoice;
-use super::settings::Settings;
+use super::rectified::RectifiedArgs;
+use super::settings::{Settings, on_or_off};
 use crate::input::depth::{self, DepthChoice};
 use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
 use crate::input::masks::{self, MaskChoice};
@@ -61,12 +62,8 @@ pub struct RunArgs {
     /// has a file), of rectified ones KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
     #[arg(long, value_name = "FILE")]
     calibration: Vec<PathBuf>,
-    /// Size raw pairs are rectified to [default: the calibration's own, else all that both cameras see, at most 1920x1088]
-    #[arg(long, value_name = "WxH")]
-    rectified: Option<ImageSize>,
-    /// Focal length raw pairs are rectified to, px [default: the least that leaves no pixel without image]
-    #[arg(long, value_name = "PX", requires = "rectified")]
-    rectified_focal: Option<f64>,
+    #[command(flatten)]
+    rectified: RectifiedArgs,
     #[command(flatten)]
     bounds: CapacityArgs,
     /// Threads; the result does not depend on them [default: as many as the machine has, at most 4]
@@ -223,14 +220,6 @@ fn rate_hz(text: &str) -> Result<f64, String> {
     rate.ok_or_else(|| "must be a number above 0".to_owned())
 }
 
-fn on_or_off(text: &str) -> Result<bool, String> {
-    match text {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err("must be on or off".to_owned()),
-    }
-}
-
 /// Examines the images of a recording: what is doubtful about them.
 fn examined(args: &RunArgs, dataset: &dyn FrameSource, indices: &[usize]) -> anyhow::Result<Vec<String>> {
     if args.path.is_none() {
@@ -257,9 +246,7 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
     if threads == 0 || args.stride == 0 || args.frames == Some(0) {
         bail!("--threads, --stride and --frames must be at least 1. Give a larger number");
     }
-    if let Some(size) = args.rectified {
-        settings.set_rectified_size(size, args.rectified_focal);
-    }
+    settings.set_rectified_size(args.rectified.over(settings.rectified_size()));
     let dataset = args.open(&settings, stop)?;
     let (profile, capacity) = args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;
     settings.fit(&capacity);

@@ -1,6 +1,5 @@
 //! Settings: defaults, then the file of `--config`, then each `--set key=value`. Unknown keys are errors that name the key.
 
-use super::capacity::ImageSize;
 use crate::formats::calibration::RectifiedSize;
 use crate::synth::StreetConfig;
 use anyhow::{Context, bail};
@@ -147,14 +146,9 @@ impl Settings {
         self.rectify
     }
 
-    /// Rectifies raw pairs to a size and, where it is given, a focal length.
-    pub fn set_rectified_size(&mut self, ImageSize(width, height): ImageSize, focal_px: Option<f64>) {
-        let side = |side: usize| Some(u32::try_from(side).unwrap_or(u32::MAX));
-        self.rectify = RectifiedSize {
-            width_px: side(width),
-            height_px: side(height),
-            focal_px: focal_px.or(self.rectify.focal_px),
-        };
+    /// Sets how large raw pairs are rectified.
+    pub fn set_rectified_size(&mut self, size: RectifiedSize) {
+        self.rectify = size;
     }
 
     /// The street's configuration.
@@ -166,6 +160,15 @@ impl Settings {
     pub fn to_toml(&self, with_street: bool) -> anyhow::Result<String> {
         let street = if with_street { self.street.clone() } else { None };
         Ok(toml::to_string(&Self { street, ..self.clone() })?)
+    }
+}
+
+/// The value of a switch on the command line.
+pub fn on_or_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("must be on or off".to_owned()),
     }
 }
 
