@@ -9,6 +9,7 @@ use super::capacity::CapacityArgs;
 use super::egomotion::EgomotionChoice;
 use super::rectified::RectifiedArgs;
 use super::settings::{Settings, on_or_off};
+use crate::input::bags::Topics;
 use crate::input::depth::{self, DepthChoice};
 use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
 use crate::input::masks::{self, MaskChoice};
@@ -46,6 +47,9 @@ pub struct RunArgs {
     /// Significant bits of 16-bit images, 8 to 16; told from the largest value of some of them otherwise
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=16))]
     bits: Option<u32>,
+    /// Topics of both cameras in a recording of ROS [default: told by their names]
+    #[arg(long, value_name = "LEFT,RIGHT")]
+    topics: Option<Topics>,
     /// Both images of a pair lie in one, the left one left [default: told from the calibration]
     #[arg(long)]
     side_by_side: bool,
@@ -186,6 +190,7 @@ impl RunArgs {
             cameras: self.images,
             bits: self.bits,
             stacking: self.stacking(),
+            topics: self.topics.clone(),
             calibration: self.calibration.clone(),
             rectified: settings.rectified_size(),
         }
@@ -387,10 +392,6 @@ fn print_header(plan: &Plan) {
     let (name, threads) = (plan.dataset.name(), counted(plan.threads, "thread"));
     let frames = plan.frames.count().map_or_else(|| "a stream".to_owned(), |count| format!("{count} frames"));
     eprintln!("{name}: {frames} of {width} x {height} px, profile {}, {threads}", plan.profile);
-    for note in plan.dataset.notes() {
-        eprintln!("note: {note}");
-    }
-    for warning in &plan.warnings {
-        eprintln!("warning: {warning}");
-    }
+    plan.dataset.notes().iter().for_each(|note| eprintln!("note: {note}"));
+    plan.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
 }

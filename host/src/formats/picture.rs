@@ -41,6 +41,16 @@ pub enum Picture {
 }
 
 impl Picture {
+    /// Width and height, px.
+    pub fn size(&self) -> (usize, usize) {
+        match self {
+            Self::Grey(image) => (image.width(), image.height()),
+            Self::Colour(image) => (image.width(), image.height()),
+            Self::DeepGrey(image) => (image.width(), image.height()),
+            Self::DeepColour(image) => (image.width(), image.height()),
+        }
+    }
+
     /// The largest sample of a 16-bit picture; `None` of an 8-bit one.
     pub fn largest_sample(&self) -> Option<u16> {
         match self {

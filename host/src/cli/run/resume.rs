@@ -7,12 +7,13 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 37] = [
+pub const FIXED_ARGUMENTS: [&str; 38] = [
     "path",
     "sequence",
     "dataset",
     "images",
     "bits",
+    "topics",
     "side_by_side",
     "top_bottom",
     "rate",

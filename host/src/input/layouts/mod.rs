@@ -21,6 +21,7 @@ mod street;
 mod tests;
 
 pub use open::{Found, Layout, OpenOptions, open, sequences_at, survey};
+pub(super) use pairing::nearest_stamps;
 pub use sequence::Sequence;
 pub use stacked::Stacking;
 pub use street::StreetFrames;

@@ -3,6 +3,7 @@
 use super::{CameraPair, Stacking, cityscapes, euroc, folder, kitti, kitti_raw};
 use crate::formats::FormatError;
 use crate::formats::calibration::{CameraGeometry, RectifiedSize};
+use crate::input::bags::{self, Topics};
 use crate::input::source::{FrameSource, InputError};
 use dynvox_core::geometry::StereoRig;
 use std::path::{Path, PathBuf};
@@ -29,6 +30,8 @@ pub enum Layout {
     Cityscapes,
     /// EuRoC and TUM VI: `mav0/{cam0,cam1}/data`, `data.csv`.
     Euroc,
+    /// ROS 2: an MCAP file, or the folder of a recording with one.
+    Mcap,
     /// Two folders of images, one with prefixes or suffixes, or images that hold both cameras; and `calib.txt`.
     Folder,
 }
@@ -43,6 +46,7 @@ impl Layout {
             Self::Kitti360 => "kitti-360",
             Self::Cityscapes => "cityscapes",
             Self::Euroc => "euroc",
+            Self::Mcap => "mcap",
             Self::Folder => "folder",
         }
     }
@@ -56,6 +60,7 @@ impl Layout {
             Self::Kitti360 => "KITTI-360: image_00 and image_01 of each drive, times of timestamps.txt".to_owned(),
             Self::Cityscapes => "Cityscapes: left and right images of each sequence".to_owned(),
             Self::Euroc => "EuRoC or TUM VI: mav0/cam0 and mav0/cam1, times of data.csv".to_owned(),
+            Self::Mcap => "ROS 2: an MCAP file, stamps and calibration of its messages".to_owned(),
             Self::Folder => folder::describe(path),
         }
     }
@@ -64,6 +69,12 @@ impl Layout {
     pub fn guess(path: &Path) -> Result<Self, InputError> {
         if !path.exists() {
             return Err(InputError::Absent { path: path.to_path_buf() });
+        }
+        if bags::file_at(path).is_some() {
+            return Ok(Self::Mcap);
+        }
+        if let Some(action) = bags::conversion(path) {
+            return Err(InputError::bag(path, format!("it is a recording of ROS in another format than MCAP. {action}")));
         }
         if path.is_file() {
             return Err(InputError::File { path: path.to_path_buf() });
@@ -112,6 +123,8 @@ pub struct OpenOptions {
     pub bits: Option<u32>,
     /// How both images of a pair lie in one file; told from the calibration where it is not said.
     pub stacking: Option<Stacking>,
+    /// Topics of the left and the right camera in a recording of ROS; told by their names where they are not said.
+    pub topics: Option<Topics>,
     /// Files of a calibration in place of the recording's own; none for that one.
     pub calibration: Vec<PathBuf>,
     /// How large raw pairs are rectified.
@@ -144,6 +157,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>, 
         Layout::Kitti360 => Box::new(kitti_raw::open_360(path, options)?),
         Layout::Cityscapes => Box::new(cityscapes::open(path, options)?),
         Layout::Euroc => Box::new(euroc::open(path, options)?),
+        Layout::Mcap => Box::new(bags::open(path, options)?),
         Layout::Folder => Box::new(folder::open(path, options)?),
     })
 }
@@ -165,7 +179,7 @@ pub fn sequences_at(path: &Path, layout: Layout) -> Result<Vec<String>, InputErr
         Layout::KittiRaw => kitti_raw::drives(path),
         Layout::Kitti360 => kitti_raw::drives_360(path).map_or(Ok(Vec::new()), |drives| kitti::sequences(&drives)),
         Layout::Cityscapes => cityscapes::names(path),
-        Layout::Euroc | Layout::Folder => Ok(Vec::new()),
+        Layout::Euroc | Layout::Mcap | Layout::Folder => Ok(Vec::new()),
     }
 }
 

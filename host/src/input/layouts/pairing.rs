@@ -101,7 +101,7 @@ fn equal_keys(left: &[String], right: &[String]) -> Vec<(usize, usize)> {
 }
 
 /// For each left stamp the nearest right one within half a frame, where it in turn is the nearest of that.
-fn nearest_stamps(left_ns: &[u64], right_ns: &[u64]) -> Vec<(usize, usize)> {
+pub fn nearest_stamps(left_ns: &[u64], right_ns: &[u64]) -> Vec<(usize, usize)> {
     let limit_ns = median_interval_ns(left_ns).max(median_interval_ns(right_ns)) / 2;
     let nearest = |stamp: u64, others: &[u64]| {
         let after = others.partition_point(|&other| other < stamp);

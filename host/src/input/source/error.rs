@@ -156,6 +156,14 @@ pub enum InputError {
         /// What is wrong.
         reason: String,
     },
+    /// A recording of ROS that cannot be used.
+    #[error("{path} cannot be used: {reason}")]
+    Bag {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        reason: String,
+    },
     /// A stream that broke.
     #[error(
         "image {image} of the stream cannot be used: {reason}. Let the program that writes it end after an image; with ffmpeg: -f image2pipe -c:v pgm"
@@ -217,6 +225,11 @@ impl InputError {
             FormatError::Content { path, reason, .. } => Self::Image { path, reason },
             other => Self::Format(other),
         }
+    }
+
+    /// A recording of ROS that cannot be used; the reason says what to do.
+    pub fn bag(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Bag { path: path.to_path_buf(), reason: reason.into() }
     }
 
     /// Masks that cannot be used.

@@ -94,6 +94,15 @@ impl StereoCalibration {
         calibration.checked(first)
     }
 
+    /// Of a left and a right `CameraInfo`, as the texts `camera_calibration` writes. `path` names their source in errors.
+    ///
+    /// # Errors
+    /// As [`StereoCalibration::read`].
+    pub fn of_camera_infos(path: &Path, texts: &[String; 2]) -> Result<Self, FormatError> {
+        let trees = texts.iter().map(|text| Tree::of_yaml(text, path)).collect::<Result<Vec<_>, _>>()?;
+        Self::from_trees(&trees, None)?.checked(path)
+    }
+
     fn from_trees(trees: &[Tree], image_size: Option<[u32; 2]>) -> Result<Self, FormatError> {
         let roots: Vec<Node<'_>> = trees.iter().map(Tree::root).collect();
         let first = roots.first().copied();

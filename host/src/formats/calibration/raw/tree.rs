@@ -27,6 +27,11 @@ impl Tree {
         Ok(Self { path: path.to_path_buf(), value })
     }
 
+    /// YAML that lies in memory.
+    pub fn of_yaml(text: &str, path: &Path) -> Result<Self, FormatError> {
+        Ok(Self { path: path.to_path_buf(), value: from_yaml(text, path)? })
+    }
+
     /// Lines `key: word word ...`.
     pub fn of_lines(text: &str, path: &Path) -> Self {
         let line = |line: &str| {

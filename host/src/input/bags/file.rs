@@ -1,0 +1,162 @@
+//! Reading an MCAP file through its index, a chunk at a time.
+
+use super::cdr::{CameraInfo, stamp_ns};
+use super::{Entry, images};
+use crate::formats::Picture;
+use crate::input::source::InputError;
+use mcap::sans_io::indexed_reader::{IndexedReadEvent, IndexedReader, IndexedReaderOptions};
+use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader};
+use mcap::{McapError, Summary};
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Longest record or chunk, bytes: beyond it a length is damaged.
+const LONGEST: usize = 1 << 30;
+
+/// A file and its index.
+pub struct BagFile {
+    path: PathBuf,
+    summary: Summary,
+}
+
+/// A topic and the type of its messages: `sensor_msgs/msg/Image`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topic {
+    pub name: String,
+    pub kind: String,
+}
+
+impl BagFile {
+    /// Reads the index.
+    pub fn open(path: &Path) -> Result<Self, InputError> {
+        let broken = |reason: String| {
+            let shown = path.display();
+            InputError::bag(
+                path,
+                format!("it is truncated or has no index ({reason}). Repair it with `mcap recover {shown} -o repaired.mcap`"),
+            )
+        };
+        let mut file = File::open(path).map_err(crate::input::source::read_failed(path))?;
+        let summary = summary(&mut file).map_err(|error| broken(error.to_string()))?.ok_or_else(|| broken("no summary".to_owned()))?;
+        if summary.chunk_indexes.is_empty() {
+            return Err(broken("no chunk is listed".to_owned()));
+        }
+        Ok(Self { path: path.to_path_buf(), summary })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its topics in CDR, by name.
+    pub fn topics(&self) -> Vec<Topic> {
+        let channels = self.summary.channels.values().filter(|channel| channel.message_encoding == "cdr");
+        let kind = |schema: &str| schema.replace("/msg/", "/");
+        let mut topics: Vec<Topic> = channels
+            .filter_map(|channel| Some(Topic { name: channel.topic.clone(), kind: kind(&channel.schema.as_ref()?.name) }))
+            .collect();
+        topics.sort_by(|a, b| a.name.cmp(&b.name));
+        topics.dedup();
+        topics
+    }
+
+    /// Hands each message of some topics, logged from `from_ns` to `to_ns`, to `take` with its topic and time, until that returns false.
+    fn messages(
+        &self,
+        topics: &[&str],
+        (from_ns, to_ns): (u64, u64),
+        take: &mut dyn FnMut(&str, u64, &[u8]) -> bool,
+    ) -> Result<(), InputError> {
+        let damaged = |error: McapError| InputError::bag(&self.path, format!("it is damaged: {error}. Record or copy it anew"));
+        let failed = |error: std::io::Error| damaged(McapError::Io(error));
+        let options = IndexedReaderOptions::new()
+            .include_topics(topics.iter().copied())
+            .starting_at(from_ns)
+            .ending_at(to_ns)
+            .with_record_length_limit(LONGEST);
+        let mut reader = IndexedReader::new_with_options(&self.summary, options).map_err(damaged)?;
+        let mut file = File::open(&self.path).map_err(failed)?;
+        let mut chunk = Vec::new();
+        while let Some(event) = reader.next_event() {
+            match event.map_err(damaged)? {
+                IndexedReadEvent::ReadChunkRequest { offset, length } => {
+                    file.seek(SeekFrom::Start(offset)).map_err(failed)?;
+                    chunk.clear();
+                    let read = file.by_ref().take(length as u64).read_to_end(&mut chunk).map_err(failed)?;
+                    if read < length {
+                        return Err(damaged(McapError::UnexpectedEof));
+                    }
+                    reader.insert_chunk_record_data(offset, &chunk).map_err(damaged)?;
+                }
+                IndexedReadEvent::Message { header, data } => {
+                    let Some(channel) = self.summary.channels.get(&header.channel_id) else { continue };
+                    if !take(&channel.topic, header.log_time, data) {
+                        return Ok(());
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Every image of a topic by the time it was taken.
+    pub fn entries(&self, topic: &str) -> Result<Vec<Entry>, InputError> {
+        let mut entries = Vec::new();
+        self.messages(&[topic], (0, u64::MAX), &mut |_, log_ns, data| {
+            entries.extend(stamp_ns(data).map(|stamp_ns| Entry { log_ns, stamp_ns }));
+            true
+        })?;
+        entries.sort_by_key(|entry: &Entry| entry.stamp_ns);
+        entries.dedup_by_key(|entry| entry.stamp_ns);
+        Ok(entries)
+    }
+
+    /// The first calibration of a topic.
+    pub fn camera_info(&self, topic: &str) -> Result<CameraInfo, InputError> {
+        let mut info = None;
+        self.messages(&[topic], (0, u64::MAX), &mut |_, _, data| {
+            info = CameraInfo::read(data);
+            false
+        })?;
+        info.ok_or_else(|| {
+            InputError::bag(&self.path, format!("{topic} has no whole CameraInfo. Give the calibration with --calibration FILE"))
+        })
+    }
+
+    /// The two images of a pair.
+    pub fn pair(&self, topics: &[String; 2], pair: &[Entry; 2]) -> Result<[Picture; 2], InputError> {
+        let [left, right] = [0, 1].map(|side| self.picture(&topics[side], &pair[side]));
+        Ok([left?, right?])
+    }
+
+    fn picture(&self, topic: &str, entry: &Entry) -> Result<Picture, InputError> {
+        let compressed = self.topics().iter().any(|known| known.name == topic && known.kind.ends_with("CompressedImage"));
+        let mut found = None;
+        self.messages(&[topic], (entry.log_ns, entry.log_ns), &mut |_, _, data| {
+            if stamp_ns(data) != Some(entry.stamp_ns) {
+                return true;
+            }
+            found = Some(images::picture(data, compressed));
+            false
+        })?;
+        let found = found.unwrap_or_else(|| Err("the message is gone".to_owned()));
+        let at = || PathBuf::from(format!("{} {topic} at {} ns", self.path.display(), entry.stamp_ns));
+        found.map_err(|reason| InputError::Image { path: at(), reason })
+    }
+}
+
+fn summary(file: &mut File) -> Result<Option<Summary>, McapError> {
+    let mut reader = SummaryReader::new();
+    while let Some(event) = reader.next_event() {
+        match event? {
+            SummaryReadEvent::ReadRequest(need) => {
+                let read = file.read(reader.insert(need.min(LONGEST)))?;
+                reader.notify_read(read);
+            }
+            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to)?),
+        }
+    }
+    Ok(reader.finish())
+}

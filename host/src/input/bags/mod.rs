@@ -1,0 +1,210 @@
+//! Recordings of ROS 2 as MCAP files: `sensor_msgs/Image`, `CompressedImage` and `CameraInfo` in CDR.
+//!
+//! Opening reads the file once, chunk by chunk, for the time stamp of every image and the first calibration of each camera. A frame is then
+//! read by its time through the file's index. Memory: one chunk of the file at a time, 16 bytes for each image.
+
+mod cdr;
+mod file;
+mod images;
+mod topics;
+
+#[cfg(test)]
+mod tests;
+
+pub use topics::Topics;
+
+use super::layouts::{OpenOptions, nearest_stamps};
+use super::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, StereoImages, StreamState};
+use crate::formats::calibration::{CameraGeometry, FittedGeometry, StereoCalibration};
+use crate::formats::{Decoded, significant_bits};
+use cdr::CameraInfo;
+use dynvox_core::geometry::StereoRig;
+use dynvox_core::rectify::Rectification;
+use file::BagFile;
+use std::path::{Path, PathBuf};
+
+/// What converts the files of other recorders.
+const CONVERT: &str = "Convert it with `mcap convert";
+
+/// An image in the file.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    /// When it was recorded: where it is found.
+    log_ns: u64,
+    /// When it was taken.
+    stamp_ns: u64,
+}
+
+/// The stereo pairs of an MCAP file.
+pub struct Bag {
+    name: String,
+    file: BagFile,
+    topics: [String; 2],
+    pairs: Vec<[Entry; 2]>,
+    image_size: (usize, usize),
+    bits: Option<u32>,
+    geometry: FittedGeometry,
+    notes: Vec<String>,
+}
+
+/// The MCAP file at a path: itself, or the one in the folder of a recording.
+pub fn file_at(path: &Path) -> Option<PathBuf> {
+    let is_mcap = |path: &Path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
+    if path.is_file() {
+        return is_mcap(path).then(|| path.to_path_buf());
+    }
+    if !path.join("metadata.yaml").is_file() {
+        return None;
+    }
+    let mut files: Vec<PathBuf> = path.read_dir().ok()?.flatten().map(|entry| entry.path()).filter(|path| is_mcap(path)).collect();
+    files.sort();
+    files.into_iter().next()
+}
+
+/// The command that makes an MCAP file of a recording of another kind, if it is one.
+pub fn conversion(path: &Path) -> Option<String> {
+    let other = |path: &Path| path.extension().is_some_and(|ending| ending == "db3" || ending == "bag");
+    let found = if path.is_file() {
+        Some(path.to_path_buf()).filter(|path| other(path))
+    } else {
+        path.join("metadata.yaml")
+            .is_file()
+            .then(|| path.read_dir().ok()?.flatten().map(|entry| entry.path()).find(|path| other(path)))
+            .flatten()
+    };
+    let found = found?;
+    let (from, to) = (found.display(), found.with_extension("mcap"));
+    Some(format!("{CONVERT} {from} {to}` (github.com/foxglove/mcap) and give the result", to = to.display()))
+}
+
+/// Opens the file.
+///
+/// # Errors
+/// It is truncated or has no index, its topics cannot be told, or there is no calibration.
+pub fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
+    let path = file_at(path).ok_or_else(|| InputError::File { path: path.to_path_buf() })?;
+    let file = BagFile::open(&path)?;
+    let topics = topics::choose(&file, options.topics.as_ref())?;
+    let entries = [0, 1].map(|side| file.entries(&topics[side])).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let stamps = |side: usize| entries[side].iter().map(|entry| entry.stamp_ns).collect::<Vec<_>>();
+    let found = nearest_stamps(&stamps(0), &stamps(1));
+    let pairs: Vec<[Entry; 2]> = found.iter().map(|&(left, right)| [entries[0][left], entries[1][right]]).collect();
+    let first = pairs.first().ok_or_else(|| InputError::bag(&path, format!("no image of {} has a partner of {}", topics[0], topics[1])))?;
+    let images = file.pair(&topics, first)?;
+    let image_size = images[0].size();
+    let mut notes = vec![format!("{} (left) and {} (right), paired by time stamp", topics[0], topics[1])];
+    if pairs.len() < entries[0].len().max(entries[1].len()) {
+        let [left, right] = [0, 1].map(|side| entries[side].len() - pairs.len());
+        notes.push(format!("{left} left and {right} right images have no partner: skipped"));
+    }
+    let bits = options.bits.or_else(|| images[0].largest_sample().map(significant_bits));
+    let geometry = cameras(&file, &topics, options, &mut notes)?.fitted(image_size, &options.rectified)?;
+    let name = path.file_stem().map_or_else(|| "bag".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    Ok(Bag { name, file, topics, pairs, image_size, bits, geometry, notes })
+}
+
+/// The cameras as they are given, else by the bag's `CameraInfo`.
+fn cameras(file: &BagFile, topics: &[String; 2], options: &OpenOptions, notes: &mut Vec<String>) -> Result<CameraGeometry, InputError> {
+    if !options.calibration.is_empty() {
+        return Ok(CameraGeometry::read(&options.calibration, None)?);
+    }
+    let mut infos = Vec::new();
+    for topic in topics {
+        let info = topics::info_of(file, topic).ok_or_else(|| {
+            InputError::bag(file.path(), format!("there is no CameraInfo for {topic}. Give the calibration with --calibration FILE"))
+        })?;
+        infos.push(file.camera_info(&info)?);
+        notes.push(format!("calibration of {info}"));
+    }
+    let [left, right] = infos.as_slice() else { return Err(InputError::bag(file.path(), "two calibrations are needed")) };
+    if topics.iter().all(|topic| topic.contains("rect")) || [left, right].iter().all(|info| info.is_undistorted()) {
+        return rectified(file.path(), left, right).map(CameraGeometry::Rectified);
+    }
+    let texts = [left, right].map(CameraInfo::as_yaml);
+    let calibration = Box::new(StereoCalibration::of_camera_infos(file.path(), &texts)?);
+    Ok(CameraGeometry::Raw { calibration, path: file.path().to_path_buf() })
+}
+
+/// The rig of two projection matrices.
+fn rectified(path: &Path, left: &CameraInfo, right: &CameraInfo) -> Result<StereoRig, InputError> {
+    let rig = StereoRig {
+        focal_px: left.projection[0],
+        center_u_px: left.projection[2],
+        center_v_px: left.projection[6],
+        baseline_m: (left.projection[3] - right.projection[3]) / left.projection[0],
+    };
+    rig.validate().map(|()| rig).map_err(|_| {
+        InputError::bag(path, format!("its CameraInfo says {rig:?}, which is no stereo rig. Give the calibration with --calibration FILE"))
+    })
+}
+
+impl FrameSource for Bag {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn len(&self) -> usize {
+        self.pairs.len()
+    }
+
+    fn stream(&self) -> Option<StreamState> {
+        None
+    }
+
+    fn size(&self) -> (usize, usize) {
+        self.geometry.size
+    }
+
+    fn masks(&self) -> AvailableMasks {
+        AvailableMasks::Absent
+    }
+
+    fn rig(&self) -> StereoRig {
+        self.geometry.rig
+    }
+
+    fn rectification(&self) -> Option<&Rectification> {
+        self.geometry.rectification.as_ref()
+    }
+
+    fn stamp_ns(&self, index: usize) -> Option<u64> {
+        self.pairs.get(index).map(|[left, _]| left.stamp_ns)
+    }
+
+    fn time_s(&self, index: usize) -> f64 {
+        self.stamp_ns(index).map_or(0.0, |stamp_ns| stamp_ns as f64 / 1e9)
+    }
+
+    fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
+        let pair = self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?;
+        let [left, right]: [Decoded; 2] = self.file.pair(&self.topics, pair)?.map(|picture| picture.to_8_bit(self.bits));
+        for image in [&left, &right] {
+            let ((found_width, found_height), (width, height)) = ((image.grey.width(), image.grey.height()), self.image_size);
+            if (found_width, found_height) != (width, height) {
+                let path = format!("{} frame {index}", self.file.path().display()).into();
+                return Err(InputError::Size { path, found_width, found_height, width, height });
+            }
+        }
+        Ok(StereoImages {
+            left: left.grey,
+            right: right.grey,
+            colour: left.colour,
+            depth: None,
+            exact: None,
+            objects: None,
+            masks: FrameMasks::default(),
+        })
+    }
+
+    fn has_lidar(&self, _: usize) -> bool {
+        false
+    }
+
+    fn lidar(&self, _: usize) -> Result<Option<LidarScan>, InputError> {
+        Ok(None)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}

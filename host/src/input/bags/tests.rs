@@ -1,0 +1,64 @@
+//! Messages that are cut short or of another kind are refused, and pictures are what was in them.
+
+use super::cdr::{CameraInfo, RawImage, stamp_ns};
+use super::images::picture;
+
+/// CDR text.
+fn text(bytes: &mut Vec<u8>, text: &str) {
+    align(bytes, 4);
+    bytes.extend((text.len() as u32 + 1).to_le_bytes());
+    bytes.extend(text.as_bytes());
+    bytes.push(0);
+}
+
+fn align(bytes: &mut Vec<u8>, to: usize) {
+    while !(bytes.len() - 4).is_multiple_of(to) {
+        bytes.push(0);
+    }
+}
+
+fn image(width: u32, height: u32, encoding: &str, step: u32, data: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0, 1, 0, 0];
+    bytes.extend([7u32, 5, 0].iter().take(2).flat_map(|number| number.to_le_bytes()));
+    text(&mut bytes, "cam");
+    align(&mut bytes, 4);
+    bytes.extend([height, width].iter().flat_map(|number| number.to_le_bytes()));
+    text(&mut bytes, encoding);
+    bytes.push(0);
+    align(&mut bytes, 4);
+    bytes.extend(step.to_le_bytes());
+    bytes.extend((data.len() as u32).to_le_bytes());
+    bytes.extend(data);
+    bytes
+}
+
+#[test]
+fn pictures_of_every_encoding_are_what_was_in_them() {
+    let grey = |encoding: &str, step: u32, data: &[u8]| picture(&image(2, 2, encoding, step, data), false).unwrap().to_8_bit(Some(16));
+    assert_eq!(grey("mono8", 3, &[1, 2, 9, 3, 4, 9]).grey.pixels(), [1, 2, 3, 4], "rows may be padded");
+    assert_eq!(grey("mono16", 4, &[0, 1, 0, 2, 0, 3, 0, 4]).grey.pixels(), [1, 2, 3, 4]);
+    let pixels = [10, 20, 30, 40, 50, 60, 1, 2, 3, 4, 5, 6];
+    assert_eq!(grey("rgb8", 6, &pixels).colour.unwrap().pixels()[1], [40, 50, 60]);
+    assert_eq!(grey("bgr8", 6, &pixels).colour.unwrap().pixels()[1], [60, 50, 40]);
+    for (encoding, data) in
+        [("rggb", [200, 100, 100, 50]), ("bggr", [50, 100, 100, 200]), ("grbg", [100, 200, 50, 100]), ("gbrg", [100, 50, 200, 100])]
+    {
+        let colour = grey(&format!("bayer_{encoding}8"), 2, &data).colour.unwrap();
+        assert!(colour.pixels().iter().all(|rgb| *rgb == [200, 100, 50]), "{encoding}: {:?}", colour.pixels());
+    }
+    let refused = |message: &[u8]| picture(message, false).unwrap_err();
+    assert!(refused(&image(2, 2, "yuv422", 4, &[0; 8])).contains("its encoding is yuv422"));
+    assert!(refused(&image(2, 2, "mono8", 2, &[0; 3])).contains("fewer bytes than 2 x 2 pixels"));
+    assert!(refused(&image(u32::MAX, 2, "mono8", 2, &[0; 4])).contains("fewer bytes"));
+}
+
+#[test]
+fn messages_cut_at_any_byte_are_refused_without_a_panic() {
+    let whole = image(4, 3, "mono8", 4, &[5; 12]);
+    assert_eq!(stamp_ns(&whole), Some(7_000_000_005));
+    assert_eq!(RawImage::read(&whole).unwrap().data.len(), 12);
+    for len in 0..whole.len() {
+        assert!(picture(&whole[..len], false).is_err(), "{len}");
+        let _ = CameraInfo::read(&whole[..len]);
+    }
+}
