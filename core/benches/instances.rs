@@ -1,4 +1,4 @@
-//! What objects add to a frame at KITTI size on one thread: CPU time of the stage `instances` and of the whole step, with 0, 1, 4 and 8 cars
+//! What objects add to a frame at KITTI size on one thread: CPU time of the stages `instances` and `segmentation` and of the whole step, with 0, 1, 4 and 8 cars
 //! detected in the same pictures. A street of textured boxes is rendered from a camera in motion; the cars map_frames along with it, 8 to 15 m away, so
 //! that in every frame measured every car detected is tracked, followed by its own matches and fused (the bench fails where one is not). Poses
 //! are given: undetected cars must not lead the camera astray.
@@ -154,27 +154,30 @@ fn render(frame: usize) -> Frame {
     }
 }
 
-/// One thread; sums the time of the stage `instances`.
+/// One thread; sums the times of the stages `instances` and `segmentation`.
 #[derive(Default)]
-struct Timed(Mutex<Duration>);
+struct Timed(Mutex<[Duration; 2]>);
 
 impl Executor for Timed {
     fn stage<R>(&self, stage: Stage, work: impl FnOnce() -> R) -> R {
         let begin = ThreadTime::now();
         let result = work();
-        if stage == Stage::Instances {
-            *self.0.lock().unwrap() += begin.elapsed();
+        if let Some(which) = [Stage::Instances, Stage::Segmentation].iter().position(|one| *one == stage) {
+            self.0.lock().unwrap()[which] += begin.elapsed();
         }
         result
     }
 }
 
-/// Drives past, `count` cars detected; CPU time of the stage and of the step, summed over the frames measured.
-fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize) -> [Duration; 2] {
-    let mut mapper = Mapper::new(&Capacity::ONBOARD, &Config::for_rig(RIG), slab).unwrap();
-    let mut spent = [Duration::ZERO; 2];
+/// Drives past, `count` cars detected or, with `by_motion`, all found by their motion; CPU time of the two stages and of the step, summed over
+/// the frames measured.
+fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize, by_motion: bool) -> [Duration; 3] {
+    let mut config = Config::for_rig(RIG);
+    config.tracking.segmentation.enabled = by_motion;
+    let mut mapper = Mapper::new(&Capacity::ONBOARD, &config, slab).unwrap();
+    let mut spent = [Duration::ZERO; 3];
     for (at, frame) in frames.iter().enumerate() {
-        let detections: Vec<Detection<'_>> = frame.cars.iter().take(count).map(Car::detection).collect();
+        let detections: Vec<Detection<'_>> = frame.cars.iter().take(if by_motion { 0 } else { count }).map(Car::detection).collect();
         let [left, right] = frame.pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
         let seen = StereoFrame {
             t_world_camera: Some(frame.t_world_camera),
@@ -184,9 +187,13 @@ fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize) -> [Duration; 2] 
         let (timed, begin) = (Timed::default(), ThreadTime::now());
         let report = mapper.step(&seen, &timed).unwrap();
         if at >= BEGINNING {
-            spent[1] += begin.elapsed();
-            spent[0] += timed.0.into_inner().unwrap();
-            assert_eq!(report.instances.objects.fused as usize, count, "frame {at}: {:?}", report.instances);
+            spent[2] += begin.elapsed();
+            spent.iter_mut().zip(timed.0.into_inner().unwrap()).for_each(|(sum, time)| *sum += time);
+            if by_motion {
+                assert!(report.instances.segmentation.instances >= 4, "frame {at}: {:?}", report.instances);
+            } else {
+                assert_eq!(report.instances.objects.fused as usize, count, "frame {at}: {:?}", report.instances);
+            }
         }
     }
     spent
@@ -196,11 +203,17 @@ fn bench(criterion: &mut Criterion) {
     let frames: Vec<Frame> = (0..BEGINNING + MEASURED).map(render).collect();
     let mut slab = vec![0u8; Capacity::ONBOARD.bytes() + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
-    for (what, count) in [("instances", 0), ("instances", 1), ("instances", 4), ("instances", 8), ("step", 0), ("step", 8)] {
+    let all = [("instances", 0), ("instances", 1), ("instances", 4), ("instances", 8), ("segmentation", 8), ("step", 0), ("step", 8)];
+    for (what, count) in all {
         criterion.bench_function(&format!("{what}/{count} cars"), |bencher| {
             bencher.iter_custom(|times| {
-                let runs = (0..times).map(|_| map_frames(&frames, &mut slab[start..], count));
-                runs.map(|[instances, step]| if what == "step" { step } else { instances }).sum::<Duration>() / MEASURED as u32
+                let runs = (0..times).map(|_| map_frames(&frames, &mut slab[start..], count, what == "segmentation"));
+                let of = |[instances, segmentation, step]: [Duration; 3]| match what {
+                    "step" => step,
+                    "segmentation" => segmentation,
+                    _ => instances,
+                };
+                runs.map(of).sum::<Duration>() / MEASURED as u32
             });
         });
     }

@@ -100,10 +100,10 @@ impl Mapper<'_> {
         let located = executor.stage(Stage::Egomotion, || localization.locate(frame, scene_flow.status, &mask, executor));
         // (B) Moving objects that no detector found, and (D) the objects' motions.
         let search = GuidedMatching { matcher: &self.scene_flow, disparity_q8 };
-        let mut tracked = executor.stage(Stage::Instances, || {
-            let assigned = assigned.segment_motion(&rig, &located.camera, disparity_q8);
-            assigned.estimate_motions(&rig, &located.camera, Some(search), &mut self.estimator)
-        });
+        let segment_motion = || assigned.segment_motion(&rig, &located.camera, disparity_q8, Some(search));
+        let assigned = executor.stage(Stage::Segmentation, segment_motion);
+        let estimate_motions = || assigned.estimate_motions(&rig, &located.camera, Some(search), &mut self.estimator);
+        let mut tracked = executor.stage(Stage::Instances, estimate_motions);
         // (E) The static map, without what moves or may move, and the objects' maps; unless the pose is extrapolated.
         let fused = located.origin != PoseOrigin::Held && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
         let mut map = StaticMap { config, disparity_q8, background: &mut self.background, depth_m: self.depth_m };

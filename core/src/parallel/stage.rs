@@ -18,6 +18,8 @@ pub enum Stage {
     Egomotion,
     /// What moves or could: detections, tracks, motions, volumes of objects.
     Instances,
+    /// Moving objects found by their motion.
+    Segmentation,
     /// Blocks made and marked visible.
     Allocate,
     /// Depth and colour averaged into voxels.
@@ -30,12 +32,13 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in pipeline order.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Rectify,
         Self::Stereo,
         Self::SceneFlow,
         Self::Egomotion,
         Self::Instances,
+        Self::Segmentation,
         Self::Allocate,
         Self::Fuse,
         Self::Prune,
@@ -50,6 +53,7 @@ impl Stage {
             Self::SceneFlow => "scene_flow",
             Self::Egomotion => "egomotion",
             Self::Instances => "instances",
+            Self::Segmentation => "segmentation",
             Self::Allocate => "allocate",
             Self::Fuse => "fuse",
             Self::Prune => "prune",

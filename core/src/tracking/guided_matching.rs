@@ -93,7 +93,7 @@ pub(crate) fn step_px(width: i32, height: i32) -> i32 {
 }
 
 /// Where a pixel of the current left image is in all four.
-fn expected(rig: &StereoRig, [u, v]: [i32; 2], disparity_px: f64, t_previous_current: &Transform) -> Option<Match> {
+pub(super) fn expected(rig: &StereoRig, [u, v]: [i32; 2], disparity_px: f64, t_previous_current: &Transform) -> Option<Match> {
     let current_left = [u as f32, v as f32];
     let current_right = [(f64::from(u) - disparity_px) as f32, v as f32];
     let current = rig.triangulate(&rig.observation(current_left, current_right))?;

@@ -44,9 +44,16 @@ impl<'t, 's> Assigned<'t, '_, 's> {
         self.tracker.egomotion_mask(self.matches.refined)
     }
 
-    /// Adds instances of what moves and no detector found, if that is asked for ([`super::SegmentationConfig`]).
-    pub(crate) fn segment_motion(self, rig: &StereoRig, camera: &CameraMotion, disparity_q8: View<'_, u16>) -> Self {
-        self.tracker.segment_motion(rig, camera, &self.matches, disparity_q8);
+    /// Adds instances of what moves and no detector found, if that is asked for ([`super::SegmentationConfig`]). `search` is where more
+    /// matches are searched for on objects that have few.
+    pub(crate) fn segment_motion(
+        self,
+        rig: &StereoRig,
+        camera: &CameraMotion,
+        disparity_q8: View<'_, u16>,
+        search: Option<GuidedMatching<'_, '_>>,
+    ) -> Self {
+        self.tracker.segment_motion(rig, camera, &self.matches, disparity_q8, search);
         self
     }
 

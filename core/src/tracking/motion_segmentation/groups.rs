@@ -60,6 +60,11 @@ impl Candidate {
         }
     }
 
+    /// Whether it is the first member of its group, at that position.
+    pub fn is_first(&self, index: usize) -> bool {
+        self.parent as usize == index
+    }
+
     /// The same at another position.
     pub fn at(self, index: usize) -> Self {
         Self { parent: index as u32, ..self }
@@ -116,7 +121,7 @@ impl Extent {
     }
 
     /// How far the other one is away, m; 0 where they overlap.
-    fn gap(&self, other: &Self) -> f64 {
+    pub fn gap(&self, other: &Self) -> f64 {
         let mut squared = 0.0;
         for axis in 0..3 {
             let at = |values: &[f64; 3]| values.get(axis).copied().unwrap_or(0.0);
@@ -132,13 +137,31 @@ impl Extent {
 pub(super) struct Group {
     /// From the 5th to the 95th percentile of its members.
     pub extent: Extent,
+    /// Median depth of its members, m.
+    pub depth_m: f64,
     /// Median against the static prediction, in the current camera's axes, m.
     pub motion_m: Vector3<f64>,
     pub members: u32,
     /// Position of its first member.
-    first: u32,
+    pub first: u32,
     /// Error of one member's motion along the depth, one sigma, m.
     pub depth_sigma_m: f64,
+}
+
+impl Group {
+    /// Whether it moves, and is not too large for an object.
+    pub fn is_plausible(&self, config: &SegmentationConfig) -> bool {
+        let Extent { low, high } = &self.extent;
+        let is_small = low.iter().zip(high).zip(EXTENT_MAX_M).all(|((low, high), most)| high - low <= most);
+        is_small && self.motion_m.norm() > f64::from(config.motion_min_m) + MOTION_PER_SQUARED_DEPTH * self.depth_m * self.depth_m
+    }
+
+    /// Whether it has members enough as well.
+    pub fn passes(&self, config: &SegmentationConfig) -> bool {
+        let is_far = self.depth_m > f64::from(config.sparse_from_m);
+        let least = if is_far { config.far_members_min } else { config.members_min };
+        self.members >= u32::from(least) && self.is_plausible(config)
+    }
 }
 
 /// Joins neighbours: afterwards `parent` of each candidate names the first member of its group.
@@ -188,7 +211,7 @@ pub(super) fn select<'m>(
         if candidate.parent != first {
             continue;
         }
-        let Some(group) = describe(model.config, candidates, first, values) else { continue };
+        let Some(group) = measure(candidates, first, values).filter(|group| group.passes(model.config)) else { continue };
         *refused += u32::from(groups.push(group).is_err());
     }
     let mut counts = [[0u32; 2]; GROUPS_MAX];
@@ -249,18 +272,14 @@ fn from_ordered(bits: u32) -> f32 {
     f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits })
 }
 
-/// A group's median motion and extent, if it has enough members, moves and is not too large.
-fn describe(config: &SegmentationConfig, candidates: &[Candidate], first: u32, values: &mut [f32]) -> Option<Group> {
+/// The median motion and the extent of a group that `first` is the first member of, if it has three members.
+pub(super) fn measure(candidates: &[Candidate], first: u32, values: &mut [f32]) -> Option<Group> {
     let count = candidates.iter().filter(|candidate| candidate.parent == first).count();
     if count < 3 {
         return None;
     }
     let mut members = Members { candidates, first, count, values };
     let depth_m = members.percentile(500, |member| member.point_m[2])?;
-    let least = if depth_m > f64::from(config.sparse_from_m) { config.far_members_min } else { config.members_min };
-    if count < usize::from(least) {
-        return None;
-    }
     let motion_m = Vector3::new(
         members.percentile(500, |member| member.motion_m[0])?,
         members.percentile(500, |member| member.motion_m[1])?,
@@ -272,9 +291,7 @@ fn describe(config: &SegmentationConfig, candidates: &[Candidate], first: u32, v
         let of = |member: &Candidate| member.point_m.get(axis).copied().unwrap_or(0.0);
         (*low, *high) = (members.percentile(50, of)?, members.percentile(950, of)?);
     }
-    let is_small = extent.low.iter().zip(&extent.high).zip(EXTENT_MAX_M).all(|((low, high), most)| high - low <= most);
-    let moves = motion_m.norm() > f64::from(config.motion_min_m) + MOTION_PER_SQUARED_DEPTH * depth_m * depth_m;
-    (is_small && moves).then_some(Group { extent, motion_m, members: count as u32, first, depth_sigma_m })
+    Some(Group { extent, depth_m, motion_m, members: count as u32, first, depth_sigma_m })
 }
 
 /// Merges groups of one motion that lie close together: a near car has several.

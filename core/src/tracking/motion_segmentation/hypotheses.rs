@@ -63,6 +63,12 @@ impl Hypothesis {
         extent
     }
 
+    /// Where it is supposed to be in the next frame's camera, and how it moves there.
+    pub fn predicted(&self, t_world_camera: &Transform) -> (Extent, Vector3<f64>) {
+        let moved = Self { center_m: (self.center() + Vector3::from(self.motion_m)).into(), ..*self };
+        (moved.extent(t_world_camera), t_world_camera.inverse().rotate(Vector3::from(self.motion_m)))
+    }
+
     pub fn is_confirmed(&self) -> bool {
         self.confirmed > 0
     }

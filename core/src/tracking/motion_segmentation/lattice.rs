@@ -11,10 +11,14 @@ use crate::{
 pub(super) const CELL_PX: usize = 4;
 /// How far a mask reaches beyond the extent of a group's members, m: to the side, above and below, along the depth.
 const MARGIN_M: [f64; 3] = [0.9, 0.9, 1.6];
+/// How long an object is along the depth at least, m: of a car that comes, the members are on its front.
+const LENGTH_M: f64 = 4.5;
+/// Disparities of neighbouring cells of one object differ by less, px: those of the side of a car 2 m beside the camera by 1.1.
+const STEP_PX: f64 = 1.2;
 /// Beyond that, by what depth errs, m for each m^2 of squared depth.
 const DEPTH_MARGIN: f64 = 0.0012;
 /// What is lower above the ground belongs to it, m.
-const CLEARANCE_M: f64 = 0.2;
+const CLEARANCE_M: f64 = 0.12;
 
 /// The lattice of a frame.
 pub(super) struct Lattice<'a> {
@@ -36,11 +40,27 @@ impl<'a> Lattice<'a> {
         [within(column, self.disparity_q8.width()), within(row, self.disparity_q8.height())]
     }
 
+    /// Disparity of a pixel, px.
+    pub fn disparity_px(&self, [u, v]: [usize; 2]) -> Option<f64> {
+        let q8 = self.disparity_q8.get(u, v).filter(|q8| *q8 > 0)?;
+        Some(f64::from(q8) / f64::from(DISPARITY_ONE_PX))
+    }
+
+    /// The pixels in the middle of the marked cells.
+    pub fn marked(&self, cells: &[u8], pixels: &PixelBox) -> impl Iterator<Item = [usize; 2]> {
+        let cell = |px: i32| usize::try_from(px).unwrap_or(0) / CELL_PX;
+        let (columns, rows) =
+            (cell(pixels.left)..cell(pixels.left + pixels.width - 1) + 1, cell(pixels.top)..cell(pixels.top + pixels.height - 1) + 1);
+        let is_marked = move |row: usize, column: usize| cells.get(row * self.columns + column).is_some_and(|cell| *cell > 0);
+        let in_row =
+            move |row: usize| columns.clone().filter(move |column| is_marked(row, *column)).map(move |column| self.pixel(column, row));
+        rows.flat_map(in_row)
+    }
+
     /// The point of a cell, in the camera, m.
     fn point(&self, column: usize, row: usize) -> Option<[f64; 3]> {
         let [u, v] = self.pixel(column, row);
-        let q8 = self.disparity_q8.get(u, v).filter(|q8| *q8 > 0)?;
-        let per_px = self.rig.baseline_m * f64::from(DISPARITY_ONE_PX) / f64::from(q8);
+        let per_px = self.rig.baseline_m / self.disparity_px([u, v])?;
         let [x, y] = [u as f64 - self.rig.center_u_px, v as f64 - self.rig.center_v_px];
         Some([x * per_px, y * per_px, self.rig.focal_px * per_px])
     }
@@ -75,10 +95,14 @@ impl<'a> Lattice<'a> {
             let at = *queue.get(next)? as usize;
             next += 1;
             let (column, row) = (at % self.columns, at / self.columns);
+            let disparity_px = self.disparity_px(self.pixel(column, row))?;
+            let is_next = |column: usize, row: usize| {
+                self.disparity_px(self.pixel(column, row)).is_some_and(|other_px| libm::fabs(other_px - disparity_px) < STEP_PX)
+            };
             let around = [(column.wrapping_sub(1), row), (column + 1, row), (column, row.wrapping_sub(1)), (column, row + 1)];
             for (column, row) in around.into_iter().filter(|&(column, row)| bounds.contains(column, row)) {
                 let cell = cells.get_mut(row * self.columns + column)?;
-                if *cell == 0 && can_be_own(column, row, &reach) {
+                if *cell == 0 && is_next(column, row) && can_be_own(column, row, &reach) {
                     *cell = 1;
                     *queue.get_mut(queued)? = (row * self.columns + column) as u32;
                     queued += 1;
@@ -167,10 +191,12 @@ impl Bounds {
 /// An extent with its margins.
 fn widened(extent: &Extent) -> Extent {
     let depth_m = extent.center().z;
+    let length_m = extent.high[2] - extent.low[2];
     let mut reach = *extent;
     for (axis, ((low, high), margin_m)) in reach.low.iter_mut().zip(&mut reach.high).zip(MARGIN_M).enumerate() {
         let margin_m = margin_m + if axis == 2 { DEPTH_MARGIN * depth_m * depth_m } else { 0.0 };
-        (*low, *high) = (*low - margin_m, *high + margin_m);
+        let behind_m = if axis == 2 && length_m + margin_m < LENGTH_M { LENGTH_M - length_m } else { margin_m };
+        (*low, *high) = (*low - margin_m, *high + behind_m);
     }
     reach
 }

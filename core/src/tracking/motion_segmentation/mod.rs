@@ -6,13 +6,15 @@
 //! 1. matches whose residual against the camera's motion is too large for its covariance are *candidates* (`residual`);
 //! 2. candidates that lie together and move alike form groups; a group must have enough members and motion, and nearly all matches
 //!    within its box must be candidates (`groups`): of wrong matches and of poorly known depth that is not so;
-//! 3. a group that agrees with one of the frames before is an object, and is predicted over frames without one (`hypotheses`);
-//! 4. its mask grows from its extent over the disparity image, above the ground (`lattice`, `ground`).
+//! 3. where candidates are few, and where an object of the frame before must be, patches are searched for by projection (`patches`);
+//! 4. a group that agrees with one of the frames before is an object, and is predicted over frames without one (`hypotheses`);
+//! 5. its mask grows from its extent over the disparity image, above the ground (`lattice`, `ground`).
 //!
 //! Matches assigned to an instance of the detector are left out: an object is not found twice.
 //!
 //! Memory: 44 bytes for each of 1,024 candidates, a byte a match, 5 bytes for each 4 x 4 px of the image, 88 bytes for each of 64
-//! hypotheses. Time: a triangulation and projection a match, a comparison for each pair of candidates, and the cells of each mask.
+//! hypotheses, 72 for each of 32 supposed objects. Time: a triangulation and projection a match, a comparison for each pair of candidates,
+//! the cells of each mask, and at most 384 patches a frame.
 //!
 //! # What can go wrong
 //!
@@ -25,6 +27,7 @@ mod ground;
 mod groups;
 mod hypotheses;
 mod lattice;
+mod patches;
 mod residual;
 #[cfg(test)]
 mod tests;
@@ -32,7 +35,7 @@ mod tests;
 pub use config::SegmentationConfig;
 
 use super::{
-    CameraMotion, Class, FrameMatches, Tracker,
+    CameraMotion, Class, FrameMatches, GuidedMatching, Tracker,
     match_assignment::{MatchOwner, OwnerCode},
 };
 use crate::{
@@ -44,13 +47,17 @@ use crate::{
     state::Visitor,
 };
 use ground::Ground;
-use groups::{CANDIDATES_MAX, Candidate};
+use groups::{CANDIDATES_MAX, Candidate, GROUPS_MAX, Group};
 use hypotheses::{HYPOTHESES_MAX, Hypotheses, Hypothesis};
 use lattice::{CELL_PX, Lattice};
+use patches::{PATCHES_MAX, PatchMemory, PatchSearch, SEEDS_MAX, Seed};
 use residual::StaticModel;
 
 /// Score of an instance found by its motion.
 const SCORE: f32 = 0.9;
+
+/// Variance of a sparse match, at whole pixels, against that of a refined one.
+const SPARSE_VARIANCE: f64 = 4.0;
 
 /// What motion segmentation found in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,6 +85,9 @@ pub(super) struct MotionSegmenter<'s> {
     values: &'s mut [f32],
     cells: &'s mut [u8],
     queue: &'s mut [u32],
+    seeds: &'s mut [Seed],
+    seed_count: usize,
+    patches: &'s mut [Candidate],
     hypotheses: Hypotheses<'s>,
 }
 
@@ -94,6 +104,8 @@ impl<'s> MotionSegmenter<'s> {
             + region_bytes::<f32>(CANDIDATES_MAX)
             + region_bytes::<u8>(cells(capacity))
             + region_bytes::<u32>(cells(capacity))
+            + region_bytes::<Seed>(SEEDS_MAX)
+            + region_bytes::<Candidate>(PATCHES_MAX)
             + region_bytes::<Hypothesis>(HYPOTHESES_MAX)
     }
 
@@ -105,28 +117,77 @@ impl<'s> MotionSegmenter<'s> {
             values: carver.alloc("segmentation.value", CANDIDATES_MAX),
             cells: carver.alloc("segmentation.cell", cells(capacity)),
             queue: carver.alloc("segmentation.queue", cells(capacity)),
+            seeds: carver.alloc("segmentation.seed", SEEDS_MAX),
+            seed_count: 0,
+            patches: carver.alloc("segmentation.patch", PATCHES_MAX),
             hypotheses: Hypotheses::new(carver.alloc("segmentation.hypothesis", HYPOTHESES_MAX)),
         }
     }
 
     /// Visits what outlives a frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { candidates: _, is_candidate: _, values: _, cells: _, queue: _, hypotheses } = self;
+        let Self {
+            candidates: _,
+            is_candidate: _,
+            values: _,
+            cells: _,
+            queue: _,
+            seeds: _,
+            seed_count: _,
+            patches: _,
+            hypotheses,
+        } = self;
         hypotheses.visit(visitor);
     }
 
-    /// Groups what contradicts the static model and continues the hypotheses.
-    fn observe(&mut self, model: &StaticModel<'_>, camera: &CameraMotion, matches: &[Match], codes: &[OwnerCode]) -> SegmentationReport {
+    /// Groups what contradicts the static model and continues the hypotheses. With `search`, the places that have too few matches are searched
+    /// for more. `match_owners` are those of the refined and of the sparse matches.
+    fn observe(
+        &mut self,
+        model: &StaticModel<'_>,
+        camera: &CameraMotion,
+        matches: &FrameMatches<'_>,
+        match_owners: [&[OwnerCode]; 2],
+        search: Option<PatchSearch<'_, '_>>,
+    ) -> SegmentationReport {
         let mut report = SegmentationReport::default();
-        let free = || matches.iter().zip(codes).map(|(m, code)| (m, code.get() == MatchOwner::None));
+        let [match_owner, sparse_owner] = match_owners;
+        let len = self.collect(model, matches.refined, match_owner, 1.0, &mut report);
+        let Some(candidates) = self.candidates.get_mut(..len) else { return report };
+        groups::join(candidates, model.rig.focal_px);
+        let free = matches.refined.iter().zip(match_owner).zip(&*self.is_candidate).filter(|((_, match_owner), _)| is_free(**match_owner));
+        let marked = free.map(|((m, _), mark)| (m, *mark > 0));
+        let mut groups = groups::select(model, candidates, marked, self.values, &mut report.refused);
+        if let Some(search) = search {
+            self.seed_count = 0;
+            self.seed_predicted(camera);
+            self.seed_small_groups(model.config, len);
+            let len = self.collect(model, matches.sparse, sparse_owner, SPARSE_VARIANCE, &mut SegmentationReport::default());
+            groups::join(self.candidates.get_mut(..len).unwrap_or_default(), model.rig.focal_px);
+            self.seed_small_groups(model.config, len);
+            self.verify(model, search, &mut groups, &mut report);
+        }
+        report.groups = groups.len() as u32;
+        report.refused += self.hypotheses.update(model.config, &groups, &camera.t_world_camera);
+        report
+    }
+
+    /// Collects the candidates among matches whose variance is `variance` times that of refined ones; how many they are.
+    fn collect(
+        &mut self,
+        model: &StaticModel<'_>,
+        matches: &[Match],
+        match_owner: &[OwnerCode],
+        variance: f64,
+        report: &mut SegmentationReport,
+    ) -> usize {
         let (mut len, mut stride, mut count) = (0, 1, 0usize);
-        for ((m, is_free), mark) in free().zip(self.is_candidate.iter_mut()) {
+        let (least, far_m) = (variance * f64::from(model.config.candidate_chi_square), f64::from(model.config.far_m));
+        for ((m, match_owner), mark) in matches.iter().zip(match_owner).zip(self.is_candidate.iter_mut()) {
             *mark = 0;
-            let residual = if is_free { model.residual(m) } else { None };
-            report.matches += u32::from(is_free);
-            let far_m = f64::from(model.config.far_m);
-            let contradicts = |found: &residual::Residual| found.chi_square > f64::from(model.config.candidate_chi_square);
-            let Some(residual) = residual.filter(|found| contradicts(found) && found.point_m.z < far_m) else { continue };
+            let residual = if is_free(*match_owner) { model.residual(m) } else { None };
+            report.matches += u32::from(is_free(*match_owner));
+            let Some(residual) = residual.filter(|found| found.chi_square > least && found.point_m.z < far_m) else { continue };
             *mark = 1;
             count += 1;
             if !(count - 1).is_multiple_of(stride) {
@@ -146,13 +207,58 @@ impl<'s> MotionSegmenter<'s> {
             }
         }
         report.candidates = count as u32;
-        let Some(candidates) = self.candidates.get_mut(..len) else { return report };
-        groups::join(candidates, model.rig.focal_px);
-        let marked = free().zip(&*self.is_candidate).filter(|((_, is_free), _)| *is_free).map(|((m, _), mark)| (m, *mark > 0));
-        let groups = groups::select(model, candidates, marked, self.values, &mut report.refused);
-        report.groups = groups.len() as u32;
-        report.refused += self.hypotheses.update(model.config, &groups, &camera.t_world_camera);
-        report
+        len
+    }
+
+    /// Supposes an object; one beyond the bound is not searched for.
+    fn seed(&mut self, seed: Seed) {
+        if let Some(slot) = self.seeds.get_mut(self.seed_count) {
+            *slot = seed;
+            self.seed_count += 1;
+        }
+    }
+
+    /// Supposes each followed group where its motion takes it.
+    fn seed_predicted(&mut self, camera: &CameraMotion) {
+        for index in 0..self.hypotheses.all().len() {
+            let Some(hypothesis) = self.hypotheses.all().get(index).copied() else { break };
+            let (extent, motion_m) = hypothesis.predicted(&camera.t_world_camera);
+            self.seed(Seed::new(&extent, motion_m));
+        }
+    }
+
+    /// Supposes an object at each group of three candidates or more that moves.
+    fn seed_small_groups(&mut self, config: &SegmentationConfig, len: usize) {
+        for first in 0..len {
+            let Some(candidates) = self.candidates.get(..len) else { return };
+            if candidates.get(first).is_none_or(|candidate| !candidate.is_first(first)) {
+                continue;
+            }
+            let group = groups::measure(candidates, first as u32, self.values).filter(|group| group.is_plausible(config));
+            if let Some(group) = group {
+                self.seed(Seed::new(&group.extent, group.motion_m));
+            }
+        }
+    }
+
+    /// Adds the groups of supposed objects that are there, where none was found.
+    fn verify(
+        &mut self,
+        model: &StaticModel<'_>,
+        mut search: PatchSearch<'_, '_>,
+        groups: &mut heapless::Vec<Group, GROUPS_MAX>,
+        report: &mut SegmentationReport,
+    ) {
+        let Self { seeds, seed_count, cells, queue, patches, values, .. } = self;
+        let mut memory = PatchMemory { cells, queue, members: patches, values };
+        for seed in seeds.iter().take(*seed_count) {
+            if groups.iter().any(|group| seed.is_at(group)) {
+                continue;
+            }
+            if let Some(group) = search.verify(model, seed, &mut memory) {
+                report.refused += u32::from(groups.push(group).is_err());
+            }
+        }
     }
 
     /// Grows the mask of the confirmed hypothesis at that position; the pixels it lies in.
@@ -160,6 +266,11 @@ impl<'s> MotionSegmenter<'s> {
         let hypothesis = self.hypotheses.all().get(index).filter(|hypothesis| hypothesis.is_confirmed())?;
         lattice.grow(&hypothesis.extent(&camera.t_world_camera), ground, self.cells, self.queue)
     }
+}
+
+/// Whether a match belongs to no instance.
+fn is_free(match_owner: OwnerCode) -> bool {
+    match_owner.get() == MatchOwner::None
 }
 
 /// Keeps every second candidate; how many those are.
@@ -183,14 +294,17 @@ impl Tracker<'_> {
         camera: &CameraMotion,
         matches: &FrameMatches<'_>,
         disparity_q8: View<'_, u16>,
+        search: Option<GuidedMatching<'_, '_>>,
     ) {
         let config = self.config;
         let Some(t_current_previous) = camera.t_current_previous.filter(|_| config.dynamic && config.segmentation.enabled) else { return };
         let bias_px = [config.motion.bias_px, config.motion.lens_px].map(f64::from);
         let model = StaticModel::new(&config.segmentation, rig, &t_current_previous, bias_px);
-        let mut report = self.segmenter.observe(&model, camera, matches.refined, self.refined_owner);
         let lattice = Lattice::new(rig, disparity_q8);
         let ground = Ground::find(&lattice);
+        let search = search.map(|search| PatchSearch::new(search, &t_current_previous, &lattice, ground.as_ref()));
+        let match_owners = [&*self.refined_owner, &*self.sparse_owner];
+        let mut report = self.segmenter.observe(&model, camera, matches, match_owners, search);
         let first = self.instances.all().len();
         let mut index = 0;
         while index < self.segmenter.hypotheses.all().len() {

@@ -5,7 +5,7 @@ use crate::{
     geometry::Transform,
     memory::SLAB_ALIGN,
     random::Random,
-    tracking::{Detection, TrackReport, TrackingConfig, stages::Detected},
+    tracking::{Detection, FrameMatches, TrackReport, TrackingConfig, stages::Detected},
 };
 use std::{vec, vec::Vec};
 
@@ -129,7 +129,8 @@ impl World {
                 let camera = self.camera(frame);
                 let detected: Detected<'_, '_> = tracker.detect(frame, &detections, [WIDTH, HEIGHT]);
                 let assigned = detected.assign_matches(FrameMatches { refined: &matches, sparse: &[] });
-                let tracked = assigned.segment_motion(&RIG, &camera, disparity_q8).estimate_motions(&RIG, &camera, None, &mut estimator);
+                let tracked =
+                    assigned.segment_motion(&RIG, &camera, disparity_q8, None).estimate_motions(&RIG, &camera, None, &mut estimator);
                 let report = tracked.commit().segmentation;
                 (tracker.tracks().collect(), report)
             })
@@ -226,7 +227,7 @@ fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
         let shown = if frame < 4 { &world } else { &static_world };
         let (camera, matches) = (shown.camera(frame), shown.matches(frame));
         let codes = vec![OwnerCode::default(); matches.len()];
-        segmenter.observe(&model(&camera), &camera, &matches, &codes);
+        segmenter.observe(&model(&camera), &camera, &FrameMatches { refined: &matches, sparse: &[] }, [&codes, &[]], None);
         confirmed.push(segmenter.hypotheses.all().iter().filter(|hypothesis| hypothesis.is_confirmed()).count());
     }
     assert_eq!(confirmed, [0, 1, 1, 1, 1, 1, 0, 0]);
