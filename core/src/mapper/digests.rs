@@ -72,7 +72,7 @@ impl ObjectDigests {
     }
 
     /// One by one, by id.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &ObjectDigest> + Clone {
+    pub fn iter(&self) -> impl Iterator<Item = &ObjectDigest> + Clone {
         self.0.iter().filter(|object| object.id != 0)
     }
 }

@@ -127,7 +127,7 @@ impl Capacity {
         [("tiny", Self::TINY), ("small", Self::SMALL), ("onboard", Self::ONBOARD), ("desktop", Self::DESKTOP)];
 
     /// Pixels of the largest image.
-    pub(crate) const fn pixels(&self) -> usize {
+    pub const fn pixels(&self) -> usize {
         self.image_width * self.image_height
     }
 }

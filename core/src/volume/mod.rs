@@ -116,7 +116,7 @@ impl<'s> Volume<'s> {
     }
 
     /// Digest of the coordinates and contents of all blocks, in any order they were made: the wrapping sum of theirs.
-    pub(crate) fn digest(&self) -> u64 {
+    pub fn digest(&self) -> u64 {
         self.digest
     }
 
