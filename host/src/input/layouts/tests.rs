@@ -202,7 +202,7 @@ fn images_of_another_size_and_truncated_ones_are_refused_by_name() {
     assert!(dataset.frame(0).is_ok());
     let message = |at| dataset.frame(at).unwrap_err().to_string();
     assert!(message(1).contains("image_1/000001.png is 41 x 32 px, but the sequence began with 40 x 32"), "{}", message(1));
-    assert!(message(2).contains("image_0/000002.png cannot be read") && message(2).contains("--frames"), "{}", message(2));
+    assert!(message(2).contains("image_0/000002.png cannot be read") && message(2).contains("--skip-bad-frames"), "{}", message(2));
 }
 
 #[test]
