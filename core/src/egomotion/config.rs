@@ -43,7 +43,7 @@ impl Default for EgomotionConfig {
 
 impl EgomotionConfig {
     /// Notes what is wrong with the settings.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         require(problems, (1..=10_000).contains(&self.samples), "egomotion.samples", "must be in 1..=10000");
         require(problems, (0.5..1.0).contains(&self.confidence), "egomotion.confidence", "must be at least 0.5 and below 1");

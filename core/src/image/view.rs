@@ -61,7 +61,7 @@ impl<'a, T> View<'a, T> {
     /// let part = View::new(&pixels, 4, 3).unwrap().part(1, 1, 2, 2).unwrap();
     /// assert_eq!((part.row(0), part.row(1)), (&[5, 6][..], &[9, 10][..]));
     /// ```
-    pub(crate) fn part(&self, left: usize, top: usize, width: usize, height: usize) -> Option<Self> {
+    pub fn part(&self, left: usize, top: usize, width: usize, height: usize) -> Option<Self> {
         let within = left.checked_add(width)? <= self.width && top.checked_add(height)? <= self.height;
         let first = top.checked_mul(self.stride)?.checked_add(left)?;
         if within { Self::with_stride(self.data.get(first..)?, width, height, self.stride) } else { None }
@@ -78,7 +78,7 @@ impl<'a, T> View<'a, T> {
     }
 
     /// Row `v`; empty beyond the image.
-    pub(crate) fn row(&self, v: usize) -> &'a [T] {
+    pub fn row(&self, v: usize) -> &'a [T] {
         if v >= self.height {
             return &[];
         }
@@ -91,7 +91,7 @@ impl<'a, T> View<'a, T> {
     }
 
     /// The pixels from the first on, and how many items apart rows are.
-    pub(crate) fn strided(&self) -> (&'a [T], usize) {
+    pub fn strided(&self) -> (&'a [T], usize) {
         (self.data, self.stride)
     }
 
@@ -134,17 +134,17 @@ impl<'a, T> ViewMut<'a, T> {
     }
 
     /// Width, px.
-    pub(crate) fn width(&self) -> usize {
+    pub fn width(&self) -> usize {
         self.width
     }
 
     /// The pixels, row by row.
-    pub(crate) fn pixels_mut(&mut self) -> &mut [T] {
+    pub fn pixels_mut(&mut self) -> &mut [T] {
         self.data
     }
 
     /// The same image, read-only.
-    pub(crate) fn as_view(&self) -> View<'_, T> {
+    pub fn as_view(&self) -> View<'_, T> {
         View { data: self.data, width: self.width, height: self.height, stride: self.width }
     }
 }

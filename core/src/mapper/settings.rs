@@ -41,7 +41,7 @@ impl Default for MapperConfig {
 
 impl MapperConfig {
     /// Notes what is wrong with the settings.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         require(problems, self.fuse_every >= 1, "mapper.fuse_every", "must be 1 or more");
     }
 }

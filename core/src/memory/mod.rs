@@ -11,5 +11,4 @@ mod slab;
 pub use capacity::Capacity;
 pub use footprint::{Footprint, Region};
 pub(crate) use one_shot::OneShot;
-pub(crate) use slab::region_bytes;
-pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError};
+pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, region_bytes};

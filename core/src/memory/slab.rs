@@ -90,7 +90,7 @@ impl core::error::Error for SlabError {}
 /// ```
 /// assert_eq!(dynvox_core::memory::region_bytes::<u16>(33), 128);
 /// ```
-pub(crate) const fn region_bytes<T>(count: usize) -> usize {
+pub const fn region_bytes<T>(count: usize) -> usize {
     (count * size_of::<T>()).next_multiple_of(SLAB_ALIGN)
 }
 
@@ -136,7 +136,7 @@ impl<'s> Carver<'s> {
     }
 
     /// Records regions without memory: every region is empty.
-    pub(crate) fn without_slab() -> Self {
+    pub fn without_slab() -> Self {
         Self { rest: None, footprint: Footprint::default(), name: None, failure: None }
     }
 
@@ -193,7 +193,7 @@ impl<'s> Carver<'s> {
     /// carver.group("volumes", |carver| (carver.alloc::<u8>("a", 64).len(), carver.alloc::<u8>("b", 64).len()));
     /// assert_eq!(carver.footprint().region("volumes").unwrap().bytes, 128);
     /// ```
-    pub(crate) fn group<R>(&mut self, name: &'static str, alloc: impl FnOnce(&mut Self) -> R) -> R {
+    pub fn group<R>(&mut self, name: &'static str, alloc: impl FnOnce(&mut Self) -> R) -> R {
         self.name = Some(name);
         let made = alloc(self);
         self.name = None;

@@ -60,7 +60,7 @@ impl ObjectsConfig {
     }
 
     /// Adds what is wrong with the settings.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         let voxel = positive(self.voxel_size_m) && (0.001..=10.0).contains(&self.voxel_size_m);
         require(problems, voxel, "objects.voxel_size_m", "must be from 0.001 to 10 m");

@@ -44,7 +44,7 @@ impl Default for SceneFlowConfig {
 
 impl SceneFlowConfig {
     /// Notes what is wrong with the settings.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         require(problems, (1..=2000).contains(&self.response_min), "scene_flow.response_min", "must be in 1..=2000");
         require(problems, (16..=500).contains(&self.search_radius_px), "scene_flow.search_radius_px", "must be in 16..=500");

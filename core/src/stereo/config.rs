@@ -112,7 +112,7 @@ impl StereoConfig {
     }
 
     /// Notes everything that is wrong.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         let mut check = |satisfied, key, rule| require(problems, satisfied, key, rule);
         let positive = |value: f32| value.is_finite() && value > 0.0;
         check((10..=DISPARITY_LIMIT).contains(&self.disparity_max), "stereo.disparity_max", "must be within 10..=255 px");

@@ -98,7 +98,7 @@ impl TrackingConfig {
     }
 
     /// Notes what is wrong with the settings.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         let share = |value: f32| (0.0..=1.0).contains(&value);
         require(problems, positive(self.frame_interval_s), "tracking.frame_interval_s", "must be above 0");

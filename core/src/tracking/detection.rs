@@ -35,7 +35,7 @@ pub struct Detection<'a> {
 
 impl Detection<'_> {
     /// Digest of all its fields.
-    pub(crate) fn digest(&self) -> u64 {
+    pub fn digest(&self) -> u64 {
         let mut digest = Digest::default();
         digest.u64(u64::from(self.score.to_bits()) << 32 | u64::from(self.class.code()));
         digest.u64(u64::from(self.left as u32) << 32 | u64::from(self.top as u32));

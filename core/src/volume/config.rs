@@ -91,7 +91,7 @@ impl Default for VolumeConfig {
 
 impl VolumeConfig {
     /// Notes everything wrong with the figures.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         require(
             problems,

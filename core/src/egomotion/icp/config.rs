@@ -53,7 +53,7 @@ impl Default for IcpConfig {
 
 impl IcpConfig {
     /// Notes what is wrong with the settings.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         let share = |value: f32| (0.0..=1.0).contains(&value);
         require(problems, (1..=MAX_LEVELS).contains(&self.levels), "icp.levels", "must be in 1..=4");

@@ -47,7 +47,7 @@ impl RigConfig {
     pub(crate) const CORRECTION_MAX_PX: f64 = 5.0;
 
     /// Notes what is wrong with the settings.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         require(problems, (0.5..=2.0).contains(&self.baseline_scale), "rig.baseline_scale", "must be in 0.5..=2");
         let DisparityCorrection { offset_px, slope_px, quartic_px } = self.disparity_correction;
         for (key, part) in [

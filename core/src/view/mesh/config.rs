@@ -18,7 +18,7 @@ impl Default for MeshConfig {
 
 impl MeshConfig {
     /// Notes everything wrong with the figures.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         require(problems, self.min_weight >= 1, "mesh.min_weight", "must be from 1 to 255");
     }
 }

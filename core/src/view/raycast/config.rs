@@ -30,7 +30,7 @@ impl Default for RaycastConfig {
 
 impl RaycastConfig {
     /// Notes everything wrong with the figures.
-    pub(crate) fn validate(&self, problems: &mut Problems) {
+    pub fn validate(&self, problems: &mut Problems) {
         require(problems, self.near_m.is_finite() && self.near_m > 0.0, "raycast.near_m", "must be above 0");
         require(problems, self.far_m.is_finite() && self.far_m > self.near_m, "raycast.far_m", "must be above raycast.near_m");
         require(problems, self.min_weight >= 1, "raycast.min_weight", "must be from 1 to 255");
