@@ -9,7 +9,7 @@ use dynvox_core::{
     image::View,
     objects::{ObjectSink, RetiredObject},
     view::Raycaster,
-    volume::{BlockStore, EvictedBlock, ObservationWeight, LoadedBlock},
+    volume::{BlockStore, EvictedBlock, LoadedBlock, ObservationWeight},
 };
 
 /// Frames taken.
