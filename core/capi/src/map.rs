@@ -6,7 +6,7 @@ use crate::{
     handle::with,
 };
 use core::{ffi::c_void, ops::Range};
-use dynvox_core::{Serial, image::View};
+use dynvox_core::{Serial, image::View, view::Triangle};
 
 /// A rendered view of the map: buffers of the caller, any may be null. The view has the size of the frames; its rows follow each other
 /// without padding.
@@ -82,20 +82,29 @@ pub unsafe extern "C" fn dynvox_triangles(
     count: *mut u64,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
-    unsafe {
-        with(mapper, |mapper, _| {
-            let sink = sink.ok_or(DynvoxStatus::Null)?;
-            let count = if count.is_null() { None } else { Some(output(count)?) };
-            let triangles = mapper.triangles(&mut |triangle| {
-                let triangle = DynvoxTriangle::from(triangle);
-                sink(context, &raw const triangle);
-            });
-            if let Some(count) = count {
-                count.write(triangles);
-            }
-            Ok(())
-        })
+    unsafe { with(mapper, |mapper, _| hand_over((sink, context, count), |mut sink| Ok(mapper.triangles(&mut sink)))) }
+}
+
+/// Hands every triangle of `mesh` to a caller's sink, with its context, and writes how many there were to the count, which may be null.
+///
+/// # Safety
+/// The count is null or points to a number.
+pub(crate) unsafe fn hand_over(
+    (sink, context, count): (DynvoxTriangleSink, *mut c_void, *mut u64),
+    mesh: impl FnOnce(&mut dyn FnMut(Triangle)) -> Result<u64, DynvoxStatus>,
+) -> Result<(), DynvoxStatus> {
+    let sink = sink.ok_or(DynvoxStatus::Null)?;
+    // SAFETY: only looked at.
+    let count = if count.is_null() { None } else { Some(unsafe { output(count)? }) };
+    let triangles = mesh(&mut |triangle| {
+        let triangle = DynvoxTriangle::from(triangle);
+        sink(context, &raw const triangle);
+    })?;
+    if let Some(count) = count {
+        // SAFETY: not null and aligned, as checked; of the right type, as promised.
+        unsafe { count.write(triangles) };
     }
+    Ok(())
 }
 
 /// Evicts every block of the static map into `store`, which holds the entire map then. Writes the number of stored blocks to `stored` and

@@ -1,9 +1,10 @@
 //! Tracks and reconstructed objects.
 
 use crate::{
-    DynvoxMapper, DynvoxPose, DynvoxStatus, DynvoxTriangle, DynvoxTriangleSink,
+    DynvoxMapper, DynvoxPose, DynvoxStatus, DynvoxTriangleSink,
     given::{items_mut, output},
     handle::with,
+    map::hand_over,
 };
 use core::ffi::c_void;
 use dynvox_core::tracking::{MotionState, TrackReport};
@@ -139,18 +140,11 @@ pub unsafe extern "C" fn dynvox_object_triangles(
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, _| {
-            let sink = sink.ok_or(DynvoxStatus::Null)?;
-            let count = if count.is_null() { None } else { Some(output(count)?) };
-            let of_track = mapper.objects().filter(|(summary, _)| summary.id == track_id);
-            let (_, object) = of_track.max_by_key(|(summary, _)| summary.segment_id).ok_or(DynvoxStatus::Unknown)?;
-            let triangles = object.volume().triangles(&mapper.config().mesh, &mut |triangle| {
-                let triangle = DynvoxTriangle::from(triangle);
-                sink(context, &raw const triangle);
-            });
-            if let Some(count) = count {
-                count.write(triangles);
-            }
-            Ok(())
+            hand_over((sink, context, count), |mut sink| {
+                let of_track = mapper.objects().filter(|(summary, _)| summary.id == track_id);
+                let (_, object) = of_track.max_by_key(|(summary, _)| summary.segment_id).ok_or(DynvoxStatus::Unknown)?;
+                Ok(object.volume().triangles(&mapper.config().mesh, &mut sink))
+            })
         })
     }
 }

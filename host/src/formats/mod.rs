@@ -5,6 +5,7 @@
 
 pub mod calibration;
 mod capacity;
+mod draft;
 mod error;
 mod image;
 mod opencv_xml;
@@ -19,6 +20,7 @@ mod rows;
 mod tests;
 
 pub use capacity::CapacityTable;
+pub use draft::DraftFolder;
 pub use error::{FormatError, read_text};
 pub use image::{Image, luma};
 pub use opencv_xml::read_opencv_depth;

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dynvox_core::geometry::Transform;
 use image::ExtendedColorType::{L8, L16, Rgb8};
@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::frame::SynthFrame;
 use super::street::{Street, SynthError};
+use crate::formats::DraftFolder;
 use crate::formats::calibration::{to_kalibr, to_toml};
 
 /// The calibration of raw images, in dynvox's own format.
@@ -36,24 +37,13 @@ pub fn write_kitti(street: &Street, folder: &Path, mut progress: impl FnMut(u32,
     if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
         return Err(SynthError::NotEmpty(folder.to_path_buf()));
     }
-    let name = folder.file_name().map_or_else(|| "synth".into(), |name| name.to_string_lossy().into_owned());
-    let draft = Draft(folder.with_file_name(format!(".{name}.partial-{}", std::process::id())));
-    write_all(street, &draft.0, &mut progress)?;
+    let draft = DraftFolder::of(folder);
+    write_all(street, draft.path(), &mut progress)?;
     // An empty folder of that name may be in the way.
     if folder.is_dir() {
         fs::remove_dir(folder).map_err(at(folder))?;
     }
-    fs::rename(&draft.0, folder).map_err(at(folder))
-}
-
-/// A folder that goes when it is dropped, unless it was renamed.
-struct Draft(PathBuf);
-
-impl Drop for Draft {
-    fn drop(&mut self) {
-        // Gone already when all went well.
-        let _ = fs::remove_dir_all(&self.0);
-    }
+    draft.rename(folder).map_err(at(folder))
 }
 
 fn at(path: &Path) -> impl FnOnce(std::io::Error) -> SynthError {

@@ -20,7 +20,7 @@ const NEIGHBOUR_MIN_PX: f64 = 12.0;
 /// The same of disparities, px and as a share.
 const DISPARITY_MIN_PX: f64 = 1.0;
 const DISPARITY_SHARE: f64 = 0.06;
-/// How far motions of neighbours may differ, m, and by metre of depth.
+/// How far motions on one object may differ, m, and by metre of depth.
 const MOTION_M: f64 = 0.15;
 const MOTION_PER_DEPTH: f64 = 0.02;
 /// A group's motion beyond the least one, m for each m^2 of squared depth.
@@ -81,11 +81,16 @@ impl Candidate {
         {
             return false;
         }
-        let side_m = MOTION_M + MOTION_PER_DEPTH * depth_m;
+        let side_m = motion_tolerance_m(depth_m);
         let along_m = side_m + f64::from(self.depth_sigma_m) + f64::from(other.depth_sigma_m);
         let [[x, y, z], [x2, y2, z2]] = [self.motion_m, other.motion_m];
         apart(x, x2) < side_m && apart(y, y2) < side_m && apart(z, z2) < along_m
     }
+}
+
+/// How far motions on one object may differ, along the image's axes, m.
+pub(super) fn motion_tolerance_m(depth_m: f64) -> f64 {
+    MOTION_M + MOTION_PER_DEPTH * depth_m
 }
 
 fn larger(a: f64, b: f64) -> f64 {

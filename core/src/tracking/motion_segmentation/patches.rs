@@ -10,7 +10,7 @@
 use super::{
     SegmentationConfig,
     ground::Ground,
-    groups::{Candidate, Extent, Group, measure},
+    groups::{Candidate, Extent, Group, measure, motion_tolerance_m},
     lattice::Lattice,
     residual::StaticModel,
 };
@@ -31,9 +31,6 @@ const SEARCHES_MAX: usize = 384;
 const REACH_M: f64 = 0.3;
 /// The same along the depth, m for each m^2 of squared depth.
 const REACH_PER_SQUARED_DEPTH: f64 = 0.001;
-/// How far a patch's motion may differ from the supposed one, m, and by metre of depth.
-const MOTION_M: f64 = 0.15;
-const MOTION_PER_DEPTH: f64 = 0.02;
 
 /// An object that is supposed to be there: its extent in the current camera, and its motion against the static prediction.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -142,7 +139,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
         let is_static = |chi_square: f64| chi_square <= f64::from(config.candidate_chi_square);
         let back = Transform::from_translation((-motion_m).into());
         if let Some((m, residual)) = found(&(self.t_previous_current * back)) {
-            let side_m = MOTION_M + MOTION_PER_DEPTH * residual.point_m.z;
+            let side_m = motion_tolerance_m(residual.point_m.z);
             let off = residual.motion_m - motion_m;
             let is_as_supposed =
                 libm::fabs(off.x) < side_m && libm::fabs(off.y) < side_m && libm::fabs(off.z) < side_m + 2.0 * residual.depth_sigma_m;

@@ -14,9 +14,9 @@ mod tests;
 pub use topics::Topics;
 
 use super::layouts::{OpenOptions, nearest_stamps};
-use super::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, StereoImages, StreamState};
+use super::source::{FrameSource, InputError, LidarScan, StereoImages, StreamState, require_size};
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, StereoCalibration};
-use crate::formats::{Decoded, significant_bits};
+use crate::formats::significant_bits;
 use cdr::CameraInfo;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::Rectification;
@@ -155,10 +155,6 @@ impl FrameSource for Bag {
         self.geometry.size
     }
 
-    fn masks(&self) -> AvailableMasks {
-        AvailableMasks::Absent
-    }
-
     fn rig(&self) -> StereoRig {
         self.geometry.rig
     }
@@ -177,23 +173,9 @@ impl FrameSource for Bag {
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let pair = self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?;
-        let [left, right]: [Decoded; 2] = self.file.pair(&self.topics, pair)?.map(|picture| picture.to_8_bit(self.bits));
-        for image in [&left, &right] {
-            let ((found_width, found_height), (width, height)) = ((image.grey.width(), image.grey.height()), self.image_size);
-            if (found_width, found_height) != (width, height) {
-                let path = format!("{} frame {index}", self.file.path().display()).into();
-                return Err(InputError::Size { path, found_width, found_height, width, height });
-            }
-        }
-        Ok(StereoImages {
-            left: left.grey,
-            right: right.grey,
-            colour: left.colour,
-            depth: None,
-            exact: None,
-            objects: None,
-            masks: FrameMasks::default(),
-        })
+        let pair = self.file.pair(&self.topics, pair)?.map(|picture| picture.to_8_bit(self.bits));
+        require_size(&pair, self.image_size, |_| format!("{} frame {index}", self.file.path().display()).into())?;
+        Ok(StereoImages::of_pair(pair))
     }
 
     fn has_lidar(&self, _: usize) -> bool {

@@ -38,10 +38,15 @@ impl<'d> RectifiedSource<'d> {
     /// A frame's pair; `None` where an image is empty.
     pub fn pair(&mut self, index: usize) -> Result<Option<[Image<u8>; 2]>, InputError> {
         let frame = self.source.frame(index)?;
+        self.rectify([frame.left, frame.right])
+    }
+
+    /// A pair of the source, already decoded; `None` where an image is empty.
+    pub fn rectify(&mut self, pair: [Image<u8>; 2]) -> Result<Option<[Image<u8>; 2]>, InputError> {
         if self.rectification.is_none() {
-            return Ok(Some([frame.left, frame.right]));
+            return Ok(Some(pair));
         }
-        let (Some(left), Some(right)) = (frame.left.view(), frame.right.view()) else { return Ok(None) };
+        let [Some(left), Some(right)] = pair.each_ref().map(Image::view) else { return Ok(None) };
         let pair = Pair { left, right, colour: None };
         let rectified = self.with_rectifier(|rectifier, images| {
             let pair = rectifier.rectify(&pair, images, &Serial)?;

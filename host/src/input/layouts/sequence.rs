@@ -6,7 +6,7 @@ use super::pairing::{CameraFiles, Pairing};
 use super::stacked::Stacking;
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
 use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
-use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState};
+use crate::input::source::{AvailableMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState, require_size};
 use crate::input::stream::ASSUMED_HZ;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
@@ -152,12 +152,7 @@ impl Sequence {
                 reason: format!("it cannot be cut into two equal images {}", stacking.name()),
             })?,
         };
-        for (path, image) in [left, right].into_iter().zip(&images) {
-            let ((found_width, found_height), (width, height)) = ((image.grey.width(), image.grey.height()), self.image_size);
-            if (found_width, found_height) != (width, height) {
-                return Err(InputError::Size { path: path.clone(), found_width, found_height, width, height });
-            }
-        }
+        require_size(&images, self.image_size, |side| if side == 0 { left.clone() } else { right.clone() })?;
         Ok(images)
     }
 }
@@ -267,16 +262,8 @@ impl FrameSource for Sequence {
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
-        let [left, right] = self.images(self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?)?;
-        Ok(StereoImages {
-            left: left.grey,
-            right: right.grey,
-            colour: left.colour,
-            depth: None,
-            exact: None,
-            objects: self.objects.get(index).cloned(),
-            masks: FrameMasks::default(),
-        })
+        let pair = self.images(self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?)?;
+        Ok(StereoImages { objects: self.objects.get(index).cloned(), ..StereoImages::of_pair(pair) })
     }
 
     fn has_lidar(&self, index: usize) -> bool {

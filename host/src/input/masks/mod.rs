@@ -21,7 +21,7 @@ mod tests;
 
 pub use choice::{MaskChoice, attach};
 pub use pairs::{LabelPair, label_pairs};
-pub use save::save_masks;
+pub use save::{save_masks, save_masks_in_order};
 
 use crate::formats::{FormatError, Image, read_png_u16};
 use crate::input::source::{FrameMasks, InputError, StereoImages};

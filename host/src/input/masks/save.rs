@@ -9,14 +9,33 @@ use std::path::Path;
 ///
 /// # Errors
 /// A file cannot be written, or there are more masks than a picture has values.
-pub fn save_masks(folder: &Path, stem: &str, (width, height): (usize, usize), masks: &[InstanceMask]) -> Result<(), InputError> {
+pub fn save_masks(folder: &Path, stem: &str, size: (usize, usize), masks: &[InstanceMask]) -> Result<(), InputError> {
     let mut order: Vec<(u16, &InstanceMask)> = (1..).zip(masks).collect();
+    order.sort_by(|(_, a), (_, b)| a.score.total_cmp(&b.score));
+    save(folder, stem, size, masks, &order)
+}
+
+/// As [`save_masks`]; where masks overlap, the later one is on top.
+///
+/// # Errors
+/// As of [`save_masks`].
+pub fn save_masks_in_order(folder: &Path, stem: &str, size: (usize, usize), masks: &[InstanceMask]) -> Result<(), InputError> {
+    save(folder, stem, size, masks, &(1..).zip(masks).collect::<Vec<_>>())
+}
+
+/// Writes masks, drawn with their values in `order`.
+fn save(
+    folder: &Path,
+    stem: &str,
+    (width, height): (usize, usize),
+    masks: &[InstanceMask],
+    order: &[(u16, &InstanceMask)],
+) -> Result<(), InputError> {
     if order.len() < masks.len() {
         return Err(InputError::masks(folder, format!("{} masks in a frame are more than a picture has values", masks.len())));
     }
-    order.sort_by(|(_, a), (_, b)| a.score.total_cmp(&b.score));
     let mut labels = vec![0u16; width * height];
-    for (label, mask) in order {
+    for &(label, mask) in order {
         let rows = (mask.pixels.top.max(0)..).take(mask.pixels.height.max(0) as usize).take_while(|v| (*v as usize) < height);
         for v in rows {
             let pixels = labels.get_mut(v as usize * width..(v as usize + 1) * width).unwrap_or_default();

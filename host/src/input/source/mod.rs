@@ -20,7 +20,7 @@ pub use scaled::Scaled;
 pub use stop::StopRequest;
 pub use truth::{ObjectsTruth, TrueObject};
 
-use crate::formats::Image;
+use crate::formats::{Decoded, Image};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
 use std::path::PathBuf;
@@ -42,6 +42,36 @@ pub struct StereoImages {
     pub objects: Option<ObjectsTruth>,
     /// Instance masks of the left image; empty until a source of masks is laid over this one.
     pub masks: FrameMasks,
+}
+
+impl StereoImages {
+    /// A decoded pair, with nothing beside its pictures.
+    pub(super) fn of_pair([left, right]: [Decoded; 2]) -> Self {
+        Self {
+            left: left.grey,
+            right: right.grey,
+            colour: left.colour,
+            depth: None,
+            exact: None,
+            objects: None,
+            masks: FrameMasks::default(),
+        }
+    }
+}
+
+/// Requires both images of a pair, left and right at the paths, to have the sequence's size.
+pub(super) fn require_size(
+    pair: &[Decoded; 2],
+    (width, height): (usize, usize),
+    path: impl Fn(usize) -> PathBuf,
+) -> Result<(), InputError> {
+    for (side, image) in pair.iter().enumerate() {
+        let (found_width, found_height) = (image.grey.width(), image.grey.height());
+        if (found_width, found_height) != (width, height) {
+            return Err(InputError::Size { path: path(side), found_width, found_height, width, height });
+        }
+    }
+    Ok(())
 }
 
 /// Exact values of a frame, from its renderer.

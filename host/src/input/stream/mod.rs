@@ -12,7 +12,7 @@ mod tests;
 
 pub use queue::WhenLate;
 
-use super::source::{FrameMasks, FrameSource, InputError, LidarScan, StereoImages, StopRequest, StreamState};
+use super::source::{FrameSource, InputError, LidarScan, StereoImages, StopRequest, StreamState, require_size};
 use crate::formats::Decoded;
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
 use dynvox_core::geometry::StereoRig;
@@ -176,23 +176,9 @@ impl FrameSource for Stream {
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
-        let [left, right] = self.pair(index)?;
-        for image in [&left, &right] {
-            let ((found_width, found_height), (width, height)) = ((image.grey.width(), image.grey.height()), self.image_size);
-            if (found_width, found_height) != (width, height) {
-                let path = format!("frame {index} of the {}", self.options.name).into();
-                return Err(InputError::Size { path, found_width, found_height, width, height });
-            }
-        }
-        Ok(StereoImages {
-            left: left.grey,
-            right: right.grey,
-            colour: left.colour,
-            depth: None,
-            exact: None,
-            objects: None,
-            masks: FrameMasks::default(),
-        })
+        let pair = self.pair(index)?;
+        require_size(&pair, self.image_size, |_| format!("frame {index} of the {}", self.options.name).into())?;
+        Ok(StereoImages::of_pair(pair))
     }
 
     fn has_lidar(&self, _: usize) -> bool {
