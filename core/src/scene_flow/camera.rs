@@ -3,7 +3,7 @@
 use super::{
     features::{DESCRIPTOR, Features, table},
     filter::{COLUMN_SUMS, Responses, filter},
-    suppression::{Candidate, Field, suppress},
+    suppression::{Candidate, Field, SCRATCH_ROWS, suppress},
 };
 use crate::{
     image::{InvalidPixels, View},
@@ -58,6 +58,9 @@ pub(super) struct Names {
     pub candidate: &'static str,
 }
 
+/// Rows that the filters work on, and then suppression.
+const WORKING_ROWS: usize = if COLUMN_SUMS > SCRATCH_ROWS { COLUMN_SUMS } else { SCRATCH_ROWS };
+
 /// Features of the sparse pass: its peaks are at most a sixth as dense.
 const fn sparse(capacity: &Capacity) -> usize {
     capacity.features / 4
@@ -78,7 +81,7 @@ impl<'s> Camera<'s> {
             + region_bytes::<u32>(4 * table(capacity))
             + region_bytes::<u16>(pixels)
             + 2 * region_bytes::<i16>(pixels)
-            + region_bytes::<i16>(COLUMN_SUMS * capacity.image_width)
+            + region_bytes::<i16>(WORKING_ROWS * capacity.image_width)
             + region_bytes::<Candidate>(capacity.features)
     }
 
@@ -101,7 +104,7 @@ impl<'s> Camera<'s> {
             gradient: carver.alloc(names.gradient, pixels),
             blob: carver.alloc(names.blob, pixels),
             corner: carver.alloc(names.corner, pixels),
-            sums: carver.alloc(names.sums, COLUMN_SUMS * capacity.image_width),
+            sums: carver.alloc(names.sums, WORKING_ROWS * capacity.image_width),
             candidates: carver.alloc(names.candidate, capacity.features),
         }
     }
