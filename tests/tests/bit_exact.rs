@@ -2,7 +2,7 @@
 
 use dynvox::fixtures::{self, Blessing, FixtureError, Verdict};
 use dynvox::run::Threads;
-use dynvox_core::{Capacity, Executor, Serial};
+use dynvox_core::{Capacity, Executor, Serial, parallel::Vectors};
 use dynvox_tests::Clip;
 use std::path::Path;
 
@@ -45,6 +45,25 @@ fn the_fixtures_give_the_digests_on_file_on_one_two_and_eight_threads() {
         verify(&|| fixtures::verify(&fixture, &Serial));
         for threads in [1, 2, 8] {
             verify(&|| fixtures::verify(&fixture, &Threads::new(threads).expect("a pool")));
+        }
+    }
+}
+
+/// One thread with the vector instructions it is given.
+struct Level(Vectors);
+
+impl Executor for Level {
+    fn vectors(&self) -> Vectors {
+        self.0
+    }
+}
+
+#[test]
+fn the_fixtures_give_the_digests_on_file_at_every_level_of_vector_instructions() {
+    for fixture in fixtures::all(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures"))).expect("there are fixtures") {
+        for vectors in Vectors::available() {
+            let verdict = fixtures::verify(&fixture, &Level(vectors)).expect("the fixture is whole");
+            assert_eq!(verdict.differences, [], "{} with {} kernels", fixture.display(), vectors.name());
         }
     }
 }

@@ -6,10 +6,13 @@
 
 mod bands;
 mod stage;
+mod vectors;
 
 pub use bands::each;
 pub(crate) use bands::{BANDS, Bands, zip2, zip3};
 pub use stage::Stage;
+pub(crate) use vectors::Level;
+pub use vectors::Vectors;
 
 /// Runs work for the core.
 ///
@@ -52,6 +55,12 @@ pub trait Executor: Sync {
     /// Runs one stage. A host overrides this to take its time; no clock enters the core.
     fn stage<R>(&self, _stage: Stage, work: impl FnOnce() -> R) -> R {
         work()
+    }
+
+    /// Vector instructions that kernels may use. A host that asked its processor for more than the target's machines all have overrides
+    /// this; no bit depends on it.
+    fn vectors(&self) -> Vectors {
+        Vectors::BASELINE
     }
 }
 

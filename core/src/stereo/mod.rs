@@ -61,6 +61,7 @@ mod matcher;
 mod median;
 mod prior;
 mod report;
+mod sad;
 mod smooth;
 mod speckle;
 mod support;

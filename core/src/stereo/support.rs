@@ -7,10 +7,14 @@
 //! Memory: two bytes a candidate, four rows of descriptors. Time: candidates x disparities x 4 descriptor distances, and once more for
 //! those that pass the other tests.
 
+use crate::part::{part, part_mut};
+use core::ops::RangeInclusive;
+
 use super::{
     StereoConfig,
     config::DISPARITY_LIMIT,
-    descriptor::{Descriptor, Gradients, MARGIN, distance_of_four, texture},
+    descriptor::{Descriptor, Gradients, MARGIN, texture},
+    sad::{Comparison, Kernels, LANES, UNTEXTURED, eight},
 };
 
 /// No match at this candidate.
@@ -53,12 +57,47 @@ impl Rows<'_> {
         let (west, east) = (u.checked_sub(CORNER)?, u + CORNER);
         Some([*self.above.get(west)?, *self.above.get(east)?, *self.below.get(west)?, *self.below.get(east)?])
     }
+
+    /// What each column from `first` on costs, eight at a time. Those beyond the row, which have no descriptors, mean nothing.
+    #[inline(always)]
+    fn costs(&self, point: &[Descriptor; 4], first: usize, costs: &mut [i16], kernels: &impl Kernels) {
+        let mut spare = [UNTEXTURED; 4];
+        let [north_west, north_east, south_west, south_east] = &mut spare;
+        for (i, costs) in costs.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let (west, east) = (first - CORNER + i * LANES, first + CORNER + i * LANES);
+            let columns = [
+                eight(self.above, west, north_west),
+                eight(self.above, east, north_east),
+                eight(self.below, west, south_west),
+                eight(self.below, east, south_east),
+            ];
+            *costs = kernels.costs(point, columns);
+        }
+    }
+}
+
+/// The matching of rows of candidates, as work that compares descriptors.
+pub(super) struct MatchRows<'m, 'a> {
+    /// What is read.
+    pub matching: SupportMatching<'a>,
+    /// The first row of candidates.
+    pub first: usize,
+    /// Receives disparities, or [`NO_MATCH`]: as many rows as it holds.
+    pub grid: &'m mut [i16],
+    /// Four descriptor rows.
+    pub scratch: &'m mut [Descriptor],
+}
+
+impl Comparison for MatchRows<'_, '_> {
+    #[inline(always)]
+    fn run(self, kernels: &impl Kernels) {
+        self.matching.match_rows(self.first, self.grid, self.scratch, kernels);
+    }
 }
 
 impl SupportMatching<'_> {
-    /// Matches the rows of candidates that begin at candidate row `first` into `grid`, as many as it holds. `scratch` is four
-    /// descriptor rows.
-    pub fn match_rows(&self, first: usize, grid: &mut [i16], scratch: &mut [Descriptor]) {
+    #[inline(always)]
+    fn match_rows(&self, first: usize, grid: &mut [i16], scratch: &mut [Descriptor], kernels: &impl Kernels) {
         let (width, step) = (self.left.width, self.config.candidate_step);
         grid.fill(NO_MATCH);
         let Some((left, right)) = scratch.split_at_mut_checked(2 * width) else { return };
@@ -71,12 +110,13 @@ impl SupportMatching<'_> {
                 && self.right.describe_row(above, r0)
                 && self.right.describe_row(v + CORNER, r1);
             if ready {
-                self.match_row(&Rows { above: l0, below: l1 }, &Rows { above: r0, below: r1 }, out);
+                self.match_row(&Rows { above: l0, below: l1 }, &Rows { above: r0, below: r1 }, out, kernels);
             }
         }
     }
 
-    fn match_row(&self, left: &Rows<'_>, right: &Rows<'_>, out: &mut [i16]) {
+    #[inline(always)]
+    fn match_row(&self, left: &Rows<'_>, right: &Rows<'_>, out: &mut [i16], kernels: &impl Kernels) {
         let (first, end) = (MARGIN + CORNER, self.left.width.saturating_sub(MARGIN + CORNER));
         let most = usize::from(self.config.disparity_max);
         let tolerance = usize::from(self.config.consistency_threshold);
@@ -85,38 +125,40 @@ impl SupportMatching<'_> {
             if u < first || u >= end {
                 continue;
             }
-            let Some(x) = self.best(left.corners(u), right, first.max(u.saturating_sub(most)), u) else { continue };
-            let Some(back) = self.best(right.corners(x), left, x, (end - 1).min(x + most)) else { continue };
+            let Some(x) = self.best(left.corners(u), right, first.max(u.saturating_sub(most))..=u, kernels) else { continue };
+            let Some(back) = self.best(right.corners(x), left, x..=(end - 1).min(x + most), kernels) else { continue };
             if back.abs_diff(u) <= tolerance {
                 *out = (u - x) as i16;
             }
         }
     }
 
-    /// The column in `first..=last` of the other image that looks like `point`, if one does and no other nearly as much.
-    fn best(&self, point: Option<[Descriptor; 4]>, other: &Rows<'_>, first: usize, last: usize) -> Option<usize> {
+    /// The column among these of the other image that looks like `point`, if one does and no other nearly as much.
+    #[inline(always)]
+    fn best(
+        &self,
+        point: Option<[Descriptor; 4]>,
+        other: &Rows<'_>,
+        columns: RangeInclusive<usize>,
+        kernels: &impl Kernels,
+    ) -> Option<usize> {
         let point = point?;
         if point.iter().any(|corner| texture(corner) < u32::from(self.config.support_texture)) {
             return None;
         }
-        // At most 64 x 255 = 16,320, so that costs fit i16, whose minimum is one instruction everywhere.
-        let mut costs = [i16::MAX; DISPARITY_LIMIT as usize + 1];
-        let costs = costs.get_mut(..(last + 1).checked_sub(first)?)?;
-        if costs.len() < MIN_CHOICE {
+        let first = *columns.start();
+        let count = (columns.end() + 1).checked_sub(first)?;
+        if count < MIN_CHOICE {
             return None;
         }
-        let west = first - CORNER..=last - CORNER;
-        let east = first + CORNER..=last + CORNER;
-        let (above_west, above_east) = (other.above.get(west.clone())?, other.above.get(east.clone())?);
-        let (below_west, below_east) = (other.below.get(west)?, other.below.get(east)?);
-        let corners = above_west.iter().zip(above_east).zip(below_west.iter().zip(below_east));
-        for (cost, ((e, f), (g, h))) in costs.iter_mut().zip(corners) {
-            *cost = distance_of_four(&point, [e, f, g, h]) as i16;
-        }
-        self.distinct(costs).map(|i| first + i)
+        // At most 64 x 255 = 16,320, so that costs fit i16, whose minimum is one instruction everywhere.
+        let mut costs = [i16::MAX; DISPARITY_LIMIT as usize + 1];
+        other.costs(&point, first, part_mut(&mut costs, ..count.next_multiple_of(LANES)), kernels);
+        self.distinct(part(&costs, ..count)).map(|i| first + i)
     }
 
     /// Position of the least cost, if it passes the ratio test.
+    #[inline(always)]
     fn distinct(&self, costs: &[i16]) -> Option<usize> {
         let least = |costs: &[i16]| costs.iter().fold(i16::MAX, |a, &b| a.min(b));
         let best = least(costs);

@@ -6,7 +6,7 @@
 
 use crate::observe::{STAGES, StageTime};
 use cpu_time::ThreadTime;
-use dynvox_core::{Executor, Stage};
+use dynvox_core::{Executor, Stage, parallel::Vectors};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 pub struct Threads {
     pool: Option<rayon::ThreadPool>,
     count: usize,
+    vectors: Vectors,
     wall_ns: [AtomicU64; STAGES],
     cpu_ns: [AtomicU64; STAGES],
 }
@@ -32,6 +33,7 @@ impl Threads {
         Ok(Self {
             pool,
             count: count.max(1),
+            vectors: Vectors::detect(),
             wall_ns: Default::default(),
             cpu_ns: Default::default(),
         })
@@ -111,6 +113,10 @@ impl Executor for Threads {
             ns.fetch_add(nanoseconds(begin.elapsed()), Ordering::Relaxed);
         }
         result
+    }
+
+    fn vectors(&self) -> Vectors {
+        self.vectors
     }
 }
 

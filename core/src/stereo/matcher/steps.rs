@@ -9,16 +9,17 @@ use crate::{
         StereoConfig, StereoReport,
         config::DISPARITY_LIMIT,
         delaunay::{SupportPoint, Triangulation},
-        dense::{DenseBand, DenseMatching, NONE, WORKING_ONE_PX},
+        dense::{DenseBand, DenseMatching, MatchBand, NONE, WORKING_ONE_PX},
         descriptor::Gradients,
         filter_support, gaps,
         gaps::Filling,
         gradient, invalid, median, prior,
         prior::{CellGrid, DisparitySet, PlaneCost},
+        sad::compare,
         smooth, speckle,
         speckle::Scratch,
         support,
-        support::{NO_MATCH, SupportMatching},
+        support::{MatchRows, NO_MATCH, SupportMatching},
     },
 };
 
@@ -50,7 +51,7 @@ impl StereoMatcher<'_> {
         let bands = Bands::of(rows);
         let matching = SupportMatching { config, left, right };
         let jobs = zip3(bands.first(), bands.split_mut(self.support, columns), Bands::of(BANDS).split_mut(self.rows, ROWS * self.width));
-        each(executor, jobs, |(first, grid, scratch)| matching.match_rows(first, grid, scratch));
+        each(executor, jobs, |(first, grid, scratch)| compare(executor.vectors(), MatchRows { matching, first, grid, scratch }));
         let grid = part(self.support, ..columns * rows);
         report.candidates = grid.len() as u32;
         report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
@@ -107,7 +108,7 @@ impl StereoMatcher<'_> {
             if let Some(band) = band {
                 prior::rasterise_planes(left_mesh, config.plane_slope_max, band.first, width, band.left);
                 prior::rasterise_planes(right_mesh, config.plane_slope_max, band.first, width, band.right);
-                matching.match_band(band);
+                compare(executor.vectors(), MatchBand { matching: &matching, band });
             }
         });
         for [matched, inconsistent] in jobs.iter().flatten().map(|band| band.counts) {
