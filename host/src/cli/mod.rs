@@ -10,6 +10,7 @@ macro_rules! outln {
     ($($text:tt)*) => { $crate::cli::output::print(format_args!("{}\n", format_args!($($text)*))) };
 }
 
+mod bench;
 mod budget;
 mod calibration;
 mod capacity;
@@ -52,6 +53,7 @@ Examples:
   dynvox evaluate masks masks/motion ~/tracking/instances/0003   IoU of masks that a run saved
   dynvox sweep street ~/kitti:06 --out sweep    prune weights, frame rates and scales on one page
   dynvox synth --out street --set street.frames=50
+  dynvox bench ~/kitti --sequence 06 --frames 60    CPU time of every stage, on one thread and on two
   dynvox fixtures new pinned --from ~/my-rig --memory 32MiB   digests of your own rig, for your CI
   dynvox diff out/a out/b                       the first frame and stage in which two runs diverge
 
@@ -86,6 +88,8 @@ enum Command {
     Synth(synth::SynthArgs),
     /// Name the first frame and stage in which two runs diverge
     Diff(diff::DiffArgs),
+    /// Take the CPU time of every stage: on one thread, and what bounds it on two
+    Bench(bench::BenchArgs),
     /// Replay small clips against the digests on file
     Fixtures(fixtures::FixturesArgs),
 }
@@ -107,6 +111,7 @@ pub fn main() -> ExitCode {
         Some(Command::Sweep(args)) => sweep::run(&args),
         Some(Command::Synth(args)) => synth::run(&args),
         Some(Command::Diff(args)) => return diff::main(&args),
+        Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Fixtures(args)) => fixtures::run(&args),
     };
     match done.and_then(|()| output::finish()) {

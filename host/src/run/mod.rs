@@ -1,5 +1,6 @@
 //! Runs the core on a data set: owns the slab, feeds the frames, takes the times, checks limits, writes checkpoints.
 
+mod bench;
 mod checkpoint;
 mod disk_store;
 mod ending;
@@ -13,11 +14,13 @@ mod record;
 mod resident;
 mod session;
 pub mod settings;
+mod spans;
 mod state;
 pub mod store;
 mod threads;
 mod view;
 
+pub use bench::{Bench, StageBench, bench};
 pub use checkpoint::{Checkpoint, CheckpointPlan, ResumeError, RunManifest};
 pub use disk_store::{BLOCKS_FILE, DiskStore, MAP_FILE, MeshOutput, Streaming};
 pub use ending::{Incomplete, IncompleteCause, SkippedFrame, SkippedFrames};
@@ -26,7 +29,8 @@ pub use execute::run;
 pub use folder::{FolderError, RunFolder, SNAPSHOT_FILE, write_whole};
 pub use plan::{FrameNumbers, HOST_OVERHEAD_BYTES, Plan, frame_interval_s};
 pub use progress::Progress;
-pub use reader::{AHEAD, ReadFrame, read_ahead};
+pub use reader::{AHEAD, ReadFrame, read_ahead, stereo_frame};
 pub use record::{RunHeader, RunRecord, StageStatistics};
 pub use resident::resident_bytes;
+pub use spans::{Cost, Spans};
 pub use threads::Threads;

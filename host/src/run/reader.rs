@@ -1,6 +1,8 @@
 //! Decodes frames ahead of the mapper on a thread of its own, at most [`AHEAD`] of them.
 
 use crate::input::{FrameSource, InputError, StereoImages};
+use dynvox_core::StereoFrame;
+use dynvox_core::tracking::Detection;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 /// Frames decoded and not yet taken.
@@ -18,6 +20,16 @@ pub struct ReadFrame {
     pub time_s: f64,
     /// What was decoded, or why nothing was.
     pub images: Result<StereoImages, InputError>,
+}
+
+/// The mapper's input as it was decoded; `None` where an image is empty.
+pub fn stereo_frame<'f>(images: &'f StereoImages, detections: &'f [Detection<'f>]) -> Option<StereoFrame<'f>> {
+    Some(StereoFrame {
+        colour: images.colour.as_ref().and_then(|colour| colour.view()),
+        disparity_q8: images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()),
+        detections,
+        ..StereoFrame::pair(images.left.view()?, images.right.view()?)
+    })
 }
 
 /// Runs `consume` with the frames of the source that `frames` numbers, decoded ahead in order. Reading ends after an error, or after one that

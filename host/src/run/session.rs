@@ -5,7 +5,7 @@ use super::disk_store::{BLOCKS_FILE, DiskStore};
 use super::error::{RunError, refused, step_reason};
 use super::state::RunState;
 use super::view::LiveMap;
-use super::{FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes};
+use super::{FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes, stereo_frame};
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{EndContext, FrameContext, FrameRow, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy, from_first};
 use dynvox_core::geometry::Transform;
@@ -102,16 +102,8 @@ impl<'p, 's> Session<'p, 's> {
         images: &'f StereoImages,
         detections: &'f [Detection<'f>],
     ) -> Option<StereoFrame<'f>> {
-        Some(StereoFrame {
-            left: images.left.view()?,
-            right: images.right.view()?,
-            colour: images.colour.as_ref().and_then(|colour| colour.view()),
-            class: None,
-            disparity_q8: images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()),
-            t_world_camera: self.poses.as_ref().and_then(|poses| poses.get(position).copied()),
-            time_ns: stamp_ns,
-            detections,
-        })
+        let t_world_camera = self.poses.as_ref().and_then(|poses| poses.get(position).copied());
+        Some(StereoFrame { time_ns: stamp_ns, t_world_camera, ..stereo_frame(images, detections)? })
     }
 
     /// Maps the remaining frames. What ends the run early is returned once a frame is mapped; before, it is an error.

@@ -1,0 +1,168 @@
+//! Work and span of the core's stages: what they cost on one thread, and what bounds them on more.
+//!
+//! Everything runs on one thread, and its CPU time is taken apart at every `join`: so a loaded machine, or one with fewer processors,
+//! gives the same answer as an idle one. What threads themselves cost (waking, moving memory from cache to cache) is not in it.
+
+use cpu_time::ThreadTime;
+use dynvox_core::{Executor, Stage, parallel::Vectors};
+use std::cell::Cell;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// What a piece of work costs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// CPU time of all of it.
+    pub work: Duration,
+    /// CPU time of the longest chain in it that must run one after the other: what it takes on ever so many threads.
+    pub span: Duration,
+    /// What it takes on two threads at least: where two branches may run at once, half of their work or the span of either, whichever
+    /// is most.
+    pub two_threads: Duration,
+}
+
+impl Cost {
+    /// Of work on one thread.
+    fn serial(work: Duration) -> Self {
+        Self { work, span: work, two_threads: work }
+    }
+
+    /// Of one after the other.
+    fn then(self, next: Self) -> Self {
+        Self {
+            work: self.work + next.work,
+            span: self.span + next.span,
+            two_threads: self.two_threads + next.two_threads,
+        }
+    }
+
+    /// Of both at once.
+    fn beside(self, other: Self) -> Self {
+        let (work, span) = (self.work + other.work, self.span.max(other.span));
+        Self { work, span, two_threads: span.max(work / 2) }
+    }
+}
+
+/// Runs the core's work on one thread and takes its costs.
+pub struct Spans {
+    state: Mutex<State>,
+    vectors: Vectors,
+}
+
+#[derive(Default)]
+struct State {
+    /// Of the work since the last fork.
+    cost: Cost,
+    stages: [Cost; Stage::ALL.len()],
+}
+
+thread_local! {
+    /// The thread's clock when the state last changed. All work runs on the thread that measures.
+    static SINCE: Cell<ThreadTime> = Cell::new(ThreadTime::now());
+}
+
+impl State {
+    /// Charges the time since the last call, and gives what was charged since the last fork; what follows begins at nothing.
+    fn take(&mut self) -> Cost {
+        let since = SINCE.get();
+        let now = ThreadTime::now();
+        SINCE.set(now);
+        let spent = now.duration_since(since);
+        std::mem::take(&mut self.cost).then(Cost::serial(spent))
+    }
+}
+
+impl Spans {
+    /// For kernels of these vector instructions.
+    pub fn new(vectors: Vectors) -> Self {
+        Self { state: Mutex::default(), vectors }
+    }
+
+    /// The cost of `work`, and of its stages in the order of [`Stage::ALL`].
+    pub fn measure<R>(&self, work: impl FnOnce() -> R) -> (R, Cost, [Cost; Stage::ALL.len()]) {
+        self.state().stages = Default::default();
+        let (result, cost) = self.apart(work);
+        let stages = self.state().stages;
+        (result, cost, stages)
+    }
+
+    /// Does `work` and takes what it costs out of what is charged.
+    fn apart<R>(&self, work: impl FnOnce() -> R) -> (R, Cost) {
+        let before = self.state().take();
+        let result = work();
+        let cost = self.state().take();
+        self.state().cost = before;
+        (result, cost)
+    }
+
+    /// No work panics while the state is locked.
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Executor for Spans {
+    fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
+    where
+        A: FnOnce() -> RA + Send,
+        B: FnOnce() -> RB + Send,
+        RA: Send,
+        RB: Send,
+    {
+        let (a, cost_a) = self.apart(a);
+        let (b, cost_b) = self.apart(b);
+        let mut state = self.state();
+        state.cost = state.cost.then(cost_a.beside(cost_b));
+        (a, b)
+    }
+
+    fn stage<R>(&self, stage: Stage, work: impl FnOnce() -> R) -> R {
+        let (result, cost) = self.apart(work);
+        let mut state = self.state();
+        state.cost = state.cost.then(cost);
+        if let Some(sum) = state.stages.get_mut(stage as usize) {
+            *sum = sum.then(cost);
+        }
+        result
+    }
+
+    fn vectors(&self) -> Vectors {
+        self.vectors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Burns CPU time on this thread.
+    fn burn(ms: u64) {
+        let begin = ThreadTime::now();
+        let mut sum = 0u64;
+        while begin.elapsed() < Duration::from_millis(ms) {
+            sum = std::hint::black_box(sum.wrapping_mul(31).wrapping_add(7));
+        }
+    }
+
+    #[test]
+    fn branches_add_up_to_work_and_the_longer_one_to_the_span() {
+        let spans = Spans::new(Vectors::BASELINE);
+        let fork = || {
+            burn(4);
+            spans.join(|| burn(10), || spans.stage(Stage::SceneFlow, || spans.join(|| burn(6), || burn(2))));
+        };
+        let ((), cost, stages) = spans.measure(|| spans.stage(Stage::Stereo, fork));
+        let ms = |duration: Duration| duration.as_secs_f64() * 1e3;
+        let near = |duration, expected: f64| assert!((ms(duration) - expected).abs() < 2.0, "{} for {expected} ms", ms(duration));
+        near(cost.work, 22.0);
+        near(cost.span, 14.0);
+        near(cost.two_threads, 14.0);
+        let flow = stages[Stage::SceneFlow as usize];
+        near(flow.work, 8.0);
+        near(flow.span, 6.0);
+        assert_eq!(stages[Stage::Fuse as usize], Cost::default());
+        let (_, again, _) = spans.measure(|| spans.join(|| burn(5), || spans.join(|| burn(5), || burn(4))));
+        near(again.span, 5.0);
+        near(again.two_threads, 7.0);
+    }
+}
