@@ -71,7 +71,7 @@ pub(crate) use egomotion_mask::{CameraMotion, EgomotionMask};
 pub(crate) use guided_matching::GuidedMatching;
 pub use instance_at::InstanceAt;
 pub(crate) use match_assignment::FrameMatches;
-pub use motion_segmentation::{SegmentationConfig, SegmentationReport};
+pub use motion_segmentation::{Ground, SegmentationConfig, SegmentationReport};
 #[cfg(test)]
 pub(crate) use motion_state::MotionEvidence;
 pub use motion_state::MotionState;

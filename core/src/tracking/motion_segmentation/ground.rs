@@ -4,6 +4,7 @@
 //! points below the horizon. Integer votes: the order of points does not matter.
 
 use super::lattice::Lattice;
+use crate::{geometry::StereoRig, image::View};
 
 /// Slopes that are tried: -0.06 to 0.06.
 const SLOPES: i32 = 6;
@@ -19,16 +20,32 @@ const SIDE_M: f64 = 6.0;
 /// Fewest votes for a ground.
 const VOTES_MIN: u32 = 40;
 
-/// The ground.
+/// The ground plane under a disparity image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ground {
+pub struct Ground {
     height_m: f64,
     slope: f64,
 }
 
 impl Ground {
+    /// The ground of a disparity image, in 1/256 px; `None` where too few of its pixels agree.
+    ///
+    /// ```
+    /// use dynvox_core::{geometry::StereoRig, image::View, tracking::Ground};
+    ///
+    /// // A plane 1.5 m below the camera: disparities grow with the rows below the horizon.
+    /// let rig = StereoRig { focal_px: 300.0, center_u_px: 160.0, center_v_px: 40.0, baseline_m: 0.5 };
+    /// let row = |v: usize| (256.0 * rig.baseline_m * (v as f64 - 40.0).max(0.0) / 1.5) as u16;
+    /// let disparity_q8: Vec<u16> = (0..320 * 120).map(|at| row(at / 320)).collect();
+    /// let ground = Ground::of(&rig, View::new(&disparity_q8, 320, 120).unwrap()).unwrap();
+    /// assert!((ground.above_m([0.0, 0.5, 10.0]) - 1.0).abs() < 0.1);
+    /// ```
+    pub fn of(rig: &StereoRig, disparity_q8: View<'_, u16>) -> Option<Self> {
+        Self::find(&Lattice::new(rig, disparity_q8))
+    }
+
     /// The ground under most lattice points; `None` where too few agree.
-    pub fn find(lattice: &Lattice<'_>) -> Option<Self> {
+    pub(super) fn find(lattice: &Lattice<'_>) -> Option<Self> {
         let mut best: Option<(u32, Self)> = None;
         for step in -SLOPES..=SLOPES {
             let slope = SLOPE_STEP * f64::from(step);
@@ -54,7 +71,7 @@ impl Ground {
         best.map(|(_, ground)| ground)
     }
 
-    /// How far a point is above it, m.
+    /// How far a point of the left camera's frame is above it, m.
     pub fn above_m(&self, [_, y, z]: [f64; 3]) -> f64 {
         self.height_m + self.slope * z - y
     }

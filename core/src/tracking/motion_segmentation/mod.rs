@@ -33,6 +33,7 @@ mod residual;
 mod tests;
 
 pub use config::SegmentationConfig;
+pub use ground::Ground;
 
 use super::{
     CameraMotion, Class, FrameMatches, GuidedMatching, Tracker,
@@ -46,7 +47,6 @@ use crate::{
     scene_flow::Match,
     state::Visitor,
 };
-use ground::Ground;
 use groups::{CANDIDATES_MAX, Candidate, GROUPS_MAX, Group};
 use hypotheses::{HYPOTHESES_MAX, Hypotheses, Hypothesis};
 use lattice::{CELL_PX, Lattice};
