@@ -63,7 +63,7 @@ const HOST: Layers = &[
     ("slab", &[]),
     ("formats", &[]),
     ("synth", &["formats"]),
-    ("input", &["formats", "synth"]),
+    ("input", &["formats", "slab", "synth"]),
     ("evaluate", &["formats", "input"]),
     ("observe", &["evaluate", "formats", "input", "slab"]),
     ("run", &["evaluate", "formats", "input", "observe", "slab"]),

@@ -1,8 +1,8 @@
 //! `dynvox run`.
 
+mod instances;
 mod results;
 mod resume;
-mod saved;
 mod stream;
 
 use super::capacity::CapacityArgs;
@@ -12,7 +12,6 @@ use super::settings::{Settings, on_or_off};
 use crate::input::bags::Topics;
 use crate::input::depth::{self, DepthChoice};
 use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
-use crate::input::masks::{self, MaskChoice};
 use crate::input::stream::WhenLate;
 use crate::input::{self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking, StopRequest};
 use crate::observe::Reference;
@@ -23,6 +22,7 @@ use crate::run::{
     SNAPSHOT_FILE, Streaming,
 };
 use anyhow::bail;
+use instances::InstancesArgs;
 use std::path::{Path, PathBuf};
 
 const MIB: u64 = 1 << 20;
@@ -89,13 +89,8 @@ pub struct RunArgs {
     /// and not disparity), disparity:DIR, depth:DIR, or exact (the synthetic street)
     #[arg(long, default_value = "elas", value_name = "SOURCE")]
     depth: DepthChoice,
-    /// Source of instance masks: auto (files where the data set has them, and motion), motion (moving objects are found by their motion
-    /// alone), none, files:DIR (PNG and list), mots:DIR or FILE (KITTI-MOTS), mnc:DIR, exact or noisy[:SEED] (the synthetic street)
-    #[arg(long, default_value = "auto", value_name = "SOURCE")]
-    instances: MaskChoice,
-    /// Save every frame's instance masks to a new folder, for --instances files:DIR; those found by motion go to DIR/motion
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["snapshot_every", "scale"])]
-    save_instances: Option<PathBuf>,
+    #[command(flatten)]
+    masks: InstancesArgs,
     /// Whether objects are masked out of the static map and reconstructed separately; off fuses everything into one map [default: on]
     #[arg(long, value_name = "on|off", value_parser = on_or_off)]
     dynamic: Option<bool>,
@@ -216,7 +211,7 @@ impl RunArgs {
         };
         let dataset = depth::attach(dataset, &self.depth)?;
         let dataset = if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) };
-        Ok(masks::attach(dataset, &self.instances)?)
+        Ok(self.masks.attach(dataset)?)
     }
 }
 
@@ -259,7 +254,7 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
     if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &frames) {
         settings.set_frame_interval_s(interval_s);
     }
-    if let Some(finds_motion) = args.instances.finds_motion() {
+    if let Some(finds_motion) = args.masks.instances.finds_motion() {
         settings.set_motion_segmentation(finds_motion);
     }
     if let Some(dynamic) = args.dynamic {
@@ -331,7 +326,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     plan.checkpoints = args.snapshot_every.map(|every| resume::checkpoints(&plan, every)).transpose()?;
     let target = args.out.clone().unwrap_or_else(|| RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name()));
     let folder = RunFolder::begin(&target, args.overwrite)?;
-    let saved = args.save_instances.as_deref().map(saved::begin).transpose()?;
+    let saved = args.masks.save_instances.as_deref().map(instances::begin).transpose()?;
     plan.save_instances = saved.as_ref().map(|saved| saved.path().to_path_buf());
     if !args.silent() {
         print_header(&plan);

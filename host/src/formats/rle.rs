@@ -7,8 +7,15 @@
 /// # Errors
 /// What is wrong, as the rest of a sentence.
 pub fn runs(text: &str, width: usize, height: usize) -> Result<Vec<(usize, usize)>, String> {
+    runs_of_counts(&counts(text)?, width, height)
+}
+
+/// The same of counts that are not in characters.
+///
+/// # Errors
+/// What is wrong, as the rest of a sentence.
+pub fn runs_of_counts(counts: &[i64], width: usize, height: usize) -> Result<Vec<(usize, usize)>, String> {
     let pixels = width * height;
-    let counts = counts(text)?;
     let (mut runs, mut at) = (Vec::new(), 0usize);
     for (number, &count) in counts.iter().enumerate() {
         let count = usize::try_from(count).map_err(|_| format!("run {} has a length below 0", number + 1))?;

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 38] = [
+pub const FIXED_ARGUMENTS: [&str; 39] = [
     "path",
     "sequence",
     "dataset",
@@ -30,6 +30,7 @@ pub const FIXED_ARGUMENTS: [&str; 38] = [
     "scale",
     "depth",
     "instances",
+    "instances_every",
     "save_instances",
     "dynamic",
     "egomotion",

@@ -4,7 +4,6 @@ use super::RunArgs;
 use crate::cli::egomotion::EgomotionChoice;
 use crate::formats::calibration::{CameraGeometry, RectifiedSize};
 use crate::input::depth::DepthChoice;
-use crate::input::masks::MaskChoice;
 use crate::input::stream::netpbm::NetpbmPairs;
 use crate::input::stream::{Stream, StreamOptions};
 use crate::input::{FrameSource, InputError, StopRequest};
@@ -25,14 +24,13 @@ pub fn open(args: &RunArgs, rectified: RectifiedSize, stop: &StopRequest) -> any
     if args.calibration.is_empty() {
         bail!("a stream has no calibration beside it. Give one with --calibration FILE");
     }
-    let own_masks = matches!(args.instances, MaskChoice::Auto | MaskChoice::None | MaskChoice::Motion);
     let of_recordings = [
         ("--snapshot-every", args.snapshot_every.is_some()),
         ("--evaluate", args.evaluate.is_some()),
         ("--dataset", args.dataset.is_some()),
         ("--sequence", args.sequence.is_some()),
         ("--depth", args.depth != DepthChoice::Elas),
-        ("--instances with masks", !own_masks),
+        ("--instances with files of masks", !args.masks.fits_stream()),
         ("--egomotion file", matches!(args.egomotion, Some(EgomotionChoice::File(_)))),
     ];
     if let Some((option, _)) = of_recordings.iter().find(|(_, given)| *given) {

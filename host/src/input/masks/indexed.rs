@@ -15,7 +15,7 @@ pub(super) struct Indexed {
 impl Indexed {
     /// The folder, and how many of the frames it has masks for.
     pub fn open(folder: &Path, frames: Frames) -> (Self, usize) {
-        let there = frames.stems.iter().filter(|stem| folder.join(format!("{stem}.png")).is_file()).count();
+        let there = frames.files(folder, "png");
         (Self { folder: folder.to_path_buf(), frames }, there)
     }
 }

@@ -1,5 +1,5 @@
-//! Where masks come from: instance PNGs with a list beside them, KITTI-MOTS, MNC dumps, the synthetic street's own truth, the same with a
-//! detector's faults, or nowhere.
+//! Where masks come from: instance PNGs with a list beside them or without, KITTI-MOTS, COCO, YOLO, MNC dumps, boxes, the synthetic street's own
+//! truth, the same with a detector's faults, or nowhere.
 //!
 //! A source gives, frame by frame, owned [`crate::input::InstanceMask`]s, which the core takes as `Detection`s. Where a source says something that cannot be
 //! a mask (a file of another size, a line that is not a row) the run ends with a sentence; where it says too much or nothing usable (an
@@ -8,18 +8,27 @@
 //!
 //! Memory: at most `MAX_MASKS` masks and `MAX_BYTES` bytes of them in a frame; masks beyond that are counted.
 
+mod boxes;
 mod choice;
+mod coco;
 mod exact;
+mod ids;
 mod indexed;
 mod mnc;
 mod mots;
+#[cfg(feature = "onnx")]
+mod network;
 mod noisy;
+mod open;
 mod pairs;
 mod save;
+mod shapes;
 #[cfg(test)]
 mod tests;
+mod yolo;
 
-pub use choice::{MaskChoice, attach};
+pub use choice::MaskChoice;
+pub use open::attach;
 pub use pairs::{LabelPair, label_pairs};
 pub use save::{save_masks, save_masks_in_order};
 
@@ -43,9 +52,37 @@ struct Frames {
     size: (usize, usize),
 }
 
+impl Frames {
+    /// The number that tables of a sequence have for a frame: its name, where that is one.
+    fn number(&self, index: usize) -> usize {
+        self.stems.get(index).and_then(|stem| stem.parse().ok()).unwrap_or(index)
+    }
+
+    /// How many frames have a file of their name in a folder.
+    fn files(&self, folder: &Path, ending: &str) -> usize {
+        self.stems.iter().filter(|stem| folder.join(format!("{stem}.{ending}")).is_file()).count()
+    }
+}
+
 /// The class of a name; `_` and `-` may stand for spaces.
 fn class_of(name: &str) -> Option<Class> {
     Class::from_name(name).or_else(|| Class::from_name(&name.replace(['_', '-'], " ")))
+}
+
+/// The class at a position of COCO's list of 80, which most networks have.
+fn coco_class(index: usize) -> Option<Class> {
+    Some(match index {
+        0 => Class::Person,
+        1 => Class::Bicycle,
+        2 => Class::Car,
+        3 => Class::Motorcycle,
+        5 => Class::Bus,
+        6 => Class::Train,
+        7 => Class::Truck,
+        14..=23 => Class::Animal,
+        _ if index < 80 => Class::Other,
+        _ => return None,
+    })
 }
 
 /// A PNG whose grey values, 8 or 16 bit, are numbers of instances.

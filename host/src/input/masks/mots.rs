@@ -4,10 +4,10 @@
 //! mask: `frame id class height width runs`, with `id` as in the PNGs and [`crate::formats::rle`] for the runs. Class 1 is car, 2 pedestrian,
 //! 10 the region to ignore. There are no scores: all are 1. The tracks in the numbers are not used.
 
+use super::shapes::{around_runs, mask_of_runs};
 use super::{Frames, MaskSource, read_labels};
 use crate::formats::rle;
-use crate::input::source::{FrameMasks, InputError, InstanceMask, StereoImages, bounding_boxes, union};
-use dynvox_core::masks::PixelBox;
+use crate::input::source::{FrameMasks, InputError, StereoImages, bounding_boxes};
 use dynvox_core::tracking::Class;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ pub(super) struct MotsPictures {
 impl MotsPictures {
     /// The folder, and how many of the frames it has masks for.
     pub fn open(folder: &Path, frames: Frames) -> (Self, usize) {
-        let there = frames.stems.iter().filter(|stem| folder.join(format!("{stem}.png")).is_file()).count();
+        let there = frames.files(folder, "png");
         (Self { folder: folder.to_path_buf(), frames }, there)
     }
 }
@@ -98,47 +98,21 @@ impl MotsText {
 
 impl MaskSource for MotsText {
     fn masks(&self, index: usize, _: &StereoImages) -> Result<FrameMasks, InputError> {
-        let number = self.frames.stems.get(index).map_or(Some(index), |stem| stem.parse().ok()).unwrap_or(index);
+        let number = self.frames.number(index);
         let (width, height) = self.frames.size;
         let mut masks = FrameMasks::default();
         for row in self.rows.get(&number).into_iter().flatten().filter(|row| row.class != IGNORE) {
             let runs = rle::runs(&row.runs, width, height)
                 .map_err(|reason| InputError::masks(&self.path, format!("line {}: {reason}", row.line)))?;
             let class = class(row.class, &mut masks);
-            let Some(pixels) = around(&runs, height) else {
+            let Some(pixels) = around_runs(&runs, height) else {
                 masks.refusals.empty += 1;
                 continue;
             };
             if masks.reserve(pixels.area() as usize) {
-                masks.push(Some(filled(class, pixels, &runs, height)));
+                masks.push(Some(mask_of_runs(class, 1.0, pixels, &runs, height)));
             }
         }
         Ok(masks)
     }
-}
-
-/// The runs split by column: column, first row, rows.
-fn by_column(runs: &[(usize, usize)], height: usize) -> impl Iterator<Item = (i32, i32, i32)> + '_ {
-    runs.iter().flat_map(move |&(start, length)| {
-        let end = start + length;
-        (start / height..=(end - 1) / height).map(move |u| {
-            let (top, bottom) = (start.max(u * height) - u * height, end.min((u + 1) * height) - u * height);
-            (u as i32, top as i32, (bottom - top) as i32)
-        })
-    })
-}
-
-fn around(runs: &[(usize, usize)], height: usize) -> Option<PixelBox> {
-    let boxes = by_column(runs, height).map(|(left, top, height)| PixelBox { left, top, width: 1, height });
-    boxes.reduce(|a, b| union(&a, &b))
-}
-
-fn filled(class: Class, pixels: PixelBox, runs: &[(usize, usize)], height: usize) -> InstanceMask {
-    let mut mask = vec![0; pixels.area() as usize];
-    for (u, top, rows) in by_column(runs, height) {
-        for v in top..top + rows {
-            mask[((v - pixels.top) * pixels.width + u - pixels.left) as usize] = 1;
-        }
-    }
-    InstanceMask { class, score: 1.0, pixels, mask }
 }

@@ -1,5 +1,7 @@
 //! Each format on tiny folders made here, each kind of bad input, and the real clips' masks.
 
+mod boxes;
+
 use super::*;
 use crate::formats::rle;
 use crate::input::source::{FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals};
@@ -8,9 +10,12 @@ use crate::synth::StreetConfig;
 use dynvox_core::masks::PixelBox;
 use image::{ImageBuffer, Luma};
 use std::fs;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
+/// Masks in every frame.
+const EVERY: NonZeroUsize = NonZeroUsize::MIN;
 const WIDTH: u32 = 40;
 const HEIGHT: u32 = 36;
 
@@ -42,7 +47,7 @@ fn labels(path: &Path, values: &[u16], deep: bool) {
 }
 
 fn laid_over(root: &Path, choice: &MaskChoice) -> Result<Box<dyn FrameSource>, InputError> {
-    attach(input::open(root, &OpenOptions::default())?, choice)
+    attach(input::open(root, &OpenOptions::default())?, choice, EVERY)
 }
 
 fn first(root: &Path, choice: &MaskChoice) -> Result<FrameMasks, InputError> {
@@ -136,7 +141,7 @@ fn a_frame_without_a_file_has_no_masks_and_an_empty_folder_is_refused_only_if_gi
     let empty = TempDir::new().unwrap();
     let asked = |path: &Path| refusal_of(laid_over(root.path(), &MaskChoice::Files(path.to_path_buf())));
     assert!(asked(empty.path()).contains("nothing for any frame; the first image is 000000.png"));
-    assert!(asked(&empty.path().join("no")).contains("no such folder"));
+    assert!(asked(&empty.path().join("no")).contains("no such file or folder"));
     fs::remove_file(folder.join("000001.png")).unwrap();
     assert!(first(root.path(), &MaskChoice::Auto).unwrap().instances.is_empty());
     assert!(refusal_of(laid_over(root.path(), &MaskChoice::Exact)).contains("only the synthetic street"));
@@ -155,7 +160,7 @@ fn scaled_images_have_scaled_masks() {
     picture.save(folder.join("000000.png")).unwrap();
     fs::write(folder.join("000000.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
     let half = input::Scaled::new(input::open(root.path(), &OpenOptions::default()).unwrap(), 0.5).unwrap();
-    let masks = attach(Box::new(half), &MaskChoice::Auto).unwrap().frame(0).unwrap().masks;
+    let masks = attach(Box::new(half), &MaskChoice::Auto, EVERY).unwrap().frame(0).unwrap().masks;
     assert_eq!(masks.instances.len(), 1);
     assert_eq!(masks.instances[0].pixels, PixelBox { left: 4, top: 6, width: 8, height: 4 });
 }
@@ -314,7 +319,7 @@ fn street() -> Box<dyn FrameSource> {
 
 #[test]
 fn the_street_knows_every_car_it_draws_parked_ones_too() {
-    let given = |choice: &MaskChoice| attach(street(), choice).unwrap().frame(20).unwrap();
+    let given = |choice: &MaskChoice| attach(street(), choice, EVERY).unwrap().frame(20).unwrap();
     assert!(given(&MaskChoice::Auto).masks.instances.is_empty(), "exact masks are given only to those who ask for them");
     let frame = given(&MaskChoice::Exact);
     let truth = frame.objects.unwrap();
@@ -331,8 +336,8 @@ fn the_street_knows_every_car_it_draws_parked_ones_too() {
 
 #[test]
 fn noise_is_a_detectors_and_the_same_again_for_the_same_seed() {
-    let exact = attach(street(), &MaskChoice::Exact).unwrap();
-    let noisy = |seed: u64| attach(street(), &MaskChoice::Noisy(seed)).unwrap();
+    let exact = attach(street(), &MaskChoice::Exact, EVERY).unwrap();
+    let noisy = |seed: u64| attach(street(), &MaskChoice::Noisy(seed), EVERY).unwrap();
     let (again, other) = (noisy(3), noisy(4));
     let noisy = noisy(3);
     let (mut missed, mut false_ones, mut ragged, mut differs) = (0i64, 0, 0, 0);
@@ -354,7 +359,8 @@ fn sources_are_named_on_the_command_line() {
     let choice = |text: &str| text.parse::<MaskChoice>();
     assert_eq!(choice("files:a/b"), Ok(MaskChoice::Files(PathBuf::from("a/b"))));
     assert_eq!((choice("noisy"), choice("noisy:7")), (Ok(MaskChoice::Noisy(1)), Ok(MaskChoice::Noisy(7))));
-    for wrong in ["", "files", "files:", "onnx:a", "noisy:x", "AUTO"] {
+    assert_eq!(choice("onnx:a,b"), Ok(MaskChoice::Networks(vec![PathBuf::from("a"), PathBuf::from("b")])));
+    for wrong in ["", "files", "files:", "onnx:", "other:a", "noisy:x", "AUTO"] {
         assert!(choice(wrong).is_err(), "{wrong}");
     }
     let finds_motion = |text: &str| choice(text).unwrap().finds_motion();
@@ -371,7 +377,7 @@ fn masks_of_the_real_clips_are_read_whole() {
             println!("skipped: masks_of_the_real_clips_are_read_whole {root} {sequence}");
             continue;
         };
-        let clip = attach(clip, &MaskChoice::Auto).unwrap();
+        let clip = attach(clip, &MaskChoice::Auto, EVERY).unwrap();
         let frames: Vec<FrameMasks> = [0, clip.len() / 2, clip.len() - 1].iter().map(|&at| clip.frame(at).unwrap().masks).collect();
         assert!(frames.iter().all(|masks| masks.instances.len() > 1 && masks.refusals == MaskRefusals::default()), "{root} {sequence}");
         assert!(frames.iter().flat_map(|masks| &masks.instances).any(|one| one.class == Class::Car));

@@ -148,6 +148,14 @@ pub enum InputError {
         /// What is wrong.
         reason: String,
     },
+    /// A network that cannot be used.
+    #[error("the network {path} cannot be used: {reason}")]
+    Network {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        reason: String,
+    },
     /// Depth that cannot be used.
     #[error("the depth {path} cannot be used: {reason}. Correct it, give another folder with --depth, or have it computed: --depth elas")]
     Depth {
@@ -243,6 +251,11 @@ impl InputError {
             FormatError::Content { path, reason, .. } => Self::Masks { path, reason },
             other => Self::Format(other),
         }
+    }
+
+    /// A network that cannot be used; the reason says what to do.
+    pub fn network(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Network { path: path.to_path_buf(), reason: reason.into() }
     }
 
     /// Depth that cannot be used.

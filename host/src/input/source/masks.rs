@@ -130,10 +130,12 @@ pub struct FrameMasks {
 impl FrameMasks {
     /// The masks of a frame without a file.
     pub fn missing() -> Self {
-        Self {
-            refusals: MaskRefusals { missing: 1, ..MaskRefusals::default() },
-            ..Self::default()
-        }
+        Self::refusing(MaskRefusals { missing: 1, ..MaskRefusals::default() })
+    }
+
+    /// No masks yet, and what is not among them.
+    pub fn refusing(refusals: MaskRefusals) -> Self {
+        Self { refusals, ..Self::default() }
     }
 
     /// Whether a mask of so many bytes fits within the limits; if not it is counted.

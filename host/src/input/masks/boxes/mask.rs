@@ -1,0 +1,218 @@
+//! The mask of a box: what stands at the depth it shows most of.
+
+use super::DetectedBox;
+use super::marks::Marks;
+use crate::formats::Image;
+use crate::input::source::InstanceMask;
+use dynvox_core::geometry::StereoRig;
+use dynvox_core::image::{DISPARITY_ONE_PX, View};
+use dynvox_core::masks::PixelBox;
+use dynvox_core::tracking::{Class, Ground};
+
+/// Boxes of fewer pixels are shrunk only.
+const SMALL_PX: i64 = 1_500;
+/// By how much at each side, as a share of width and height.
+const SHRUNK: f64 = 0.05;
+/// Where in a box its object surely is: shares of its width and height.
+const CORE: [f64; 4] = [0.2, 0.3, 0.8, 0.85];
+/// What is lower above the ground belongs to it, m.
+const CLEARANCE_M: f64 = 0.12;
+/// Depth errs by this, m for each m^2 of squared depth.
+const DEPTH_ERROR: f64 = 0.0012;
+/// Disparities of neighbouring pixels of one object differ by less, px.
+const STEP_PX: f64 = 1.2;
+/// Gaps up to this share of a box's width are filled.
+const GAP: f64 = 0.1;
+/// Least share of a box that a mask fills: less is another object's, and the box is shrunk only.
+const FILLED_MIN: f64 = 0.25;
+
+/// Least share of a box that a semantic map must have in a class of the box's to count for it.
+const KNOWN_SHARE: f64 = 0.15;
+/// Fewest pixels of an object that a semantic map shows and no box, and its score.
+const REGION_MIN_PX: i64 = 400;
+const REGION_SCORE: f32 = 0.5;
+
+/// How long an object of a class is, m.
+fn length_m(class: Class) -> f64 {
+    match class {
+        Class::Bus => 12.0,
+        Class::Truck => 10.0,
+        Class::Train => 25.0,
+        Class::Van => 5.5,
+        Class::Person => 0.8,
+        Class::Rider | Class::Bicycle | Class::Motorcycle | Class::Animal => 2.0,
+        Class::Car | Class::MovingObject | Class::Other => 4.5,
+    }
+}
+
+/// A frame's disparity, with the ground under it.
+pub(super) struct Scene<'a> {
+    rig: &'a StereoRig,
+    disparity_q8: View<'a, u16>,
+    ground: Option<Ground>,
+    /// A semantic map of the image, by [`Class::code`].
+    regions: Option<&'a Image<u8>>,
+}
+
+impl<'a> Scene<'a> {
+    pub fn new(rig: &'a StereoRig, disparity_q8: View<'a, u16>, regions: Option<&'a Image<u8>>) -> Self {
+        Self { rig, disparity_q8, ground: Ground::of(rig, disparity_q8), regions }
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.disparity_q8.width(), self.disparity_q8.height())
+    }
+
+    /// Disparity of a pixel, px.
+    fn disparity_px(&self, u: i32, v: i32) -> Option<f64> {
+        let q8 = self.disparity_q8.get(usize::try_from(u).ok()?, usize::try_from(v).ok()?).filter(|q8| *q8 > 0)?;
+        Some(f64::from(q8) / f64::from(DISPARITY_ONE_PX))
+    }
+
+    /// The mask of a box; `None` where it has no pixel in the image.
+    pub fn mask(&self, one: &DetectedBox) -> Option<InstanceMask> {
+        let pixels = one.pixels(0.0, self.size());
+        let grown = (pixels.area() >= SMALL_PX).then(|| self.grown(one, &pixels)).flatten();
+        let count = |mask: &InstanceMask| mask.mask.iter().filter(|pixel| **pixel > 0).count() as f64;
+        grown.filter(|mask| count(mask) >= FILLED_MIN * pixels.area() as f64).or_else(|| {
+            let shrunk = one.pixels(SHRUNK, self.size());
+            (shrunk.area() > 0).then(|| InstanceMask::from_predicate(one.class, one.score, shrunk, |_, _| true)).flatten()
+        })
+    }
+
+    /// What stands at the depth the box shows most of.
+    fn grown(&self, one: &DetectedBox, pixels: &PixelBox) -> Option<InstanceMask> {
+        let peak_px = self.peak_px(one, pixels)?;
+        let (focal_m_px, length_m) = (self.rig.focal_baseline_px_m(), length_m(one.class));
+        let depth_m = focal_m_px / peak_px;
+        let error_m = DEPTH_ERROR * depth_m * depth_m;
+        let (near_m, far_m) = (depth_m - length_m - error_m, depth_m + length_m + error_m);
+        let agrees = self.agrees(one.class, pixels);
+        let is_own = |u: i32, v: i32| {
+            let Some(disparity_px) = self.disparity_px(u, v) else { return false };
+            let per_px = self.rig.baseline_m / disparity_px;
+            let point = [
+                (f64::from(u) - self.rig.center_u_px) * per_px,
+                (f64::from(v) - self.rig.center_v_px) * per_px,
+                self.rig.focal_px * per_px,
+            ];
+            agrees(u, v) && (near_m..=far_m).contains(&point[2]) && self.ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
+        };
+        let components = Marks::new(*pixels, is_own).components(|a, b| self.is_next(a, b));
+        // Of equals the first.
+        let largest = components.iter().rev().max_by_key(|component| component.len())?;
+        self.filled(one.class, one.score, largest, |_, _| true)
+    }
+
+    /// Whether neighbours can be on one surface.
+    fn is_next(&self, a: (i32, i32), b: (i32, i32)) -> bool {
+        let pair = self.disparity_px(a.0, a.1).zip(self.disparity_px(b.0, b.1));
+        pair.is_some_and(|(a, b)| (a - b).abs() < STEP_PX)
+    }
+
+    /// The mask of a component, its gaps filled where `may` is true.
+    fn filled(&self, class: Class, score: f32, component: &[(i32, i32)], may: impl Fn(i32, i32) -> bool) -> Option<InstanceMask> {
+        let mut marks = Marks::of(component)?;
+        marks.fill_gaps((GAP * f64::from(marks.pixels.width)) as usize + 2, may);
+        InstanceMask::from_predicate(class, score, marks.pixels, |u, v| marks.holds(u, v))
+    }
+
+    /// The masks of regions that none of `masks` covers: their components in disparity. They have the score of a certain detection.
+    pub fn uncovered(&self, masks: &[InstanceMask]) -> Vec<InstanceMask> {
+        let Some(regions) = self.regions else { return Vec::new() };
+        let (width, height) = self.size();
+        let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
+        let class = |u: i32, v: i32| Class::from_code(u32::from(regions.get(u as usize, v as usize).unwrap_or_default()));
+        let is_free = |u: i32, v: i32| class(u, v) != Class::Other && !masks.iter().any(|mask| mask.contains(u, v));
+        let free = Marks::new(image, is_free);
+        let agrees = |a: (i32, i32), b: (i32, i32)| class(a.0, a.1).agrees_with(class(b.0, b.1)) && self.is_next(a, b);
+        let components = free.components(agrees);
+        let large = components.iter().filter(|component| component.len() as i64 >= REGION_MIN_PX);
+        let mask = |component: &Vec<(i32, i32)>| {
+            let (u, v) = component[component.len() / 2];
+            let own = class(u, v);
+            self.filled(own, REGION_SCORE, component, |u, v| free.holds(u, v) && class(u, v).agrees_with(own))
+        };
+        large.filter_map(mask).collect()
+    }
+
+    /// Whether the semantic map has a class at a pixel that can be the box's; true without a map, and where it has hardly any of that class.
+    fn agrees<'b>(&'b self, class: Class, pixels: &PixelBox) -> impl Fn(i32, i32) -> bool + 'b {
+        let at = move |u: i32, v: i32| {
+            self.regions.is_none_or(|regions| {
+                let code = regions.get(u as usize, v as usize).unwrap_or_default();
+                Class::from_code(u32::from(code)).agrees_with(class)
+            })
+        };
+        let rows = pixels.top..pixels.top + pixels.height;
+        let count = rows.flat_map(|v| (pixels.left..pixels.left + pixels.width).map(move |u| (u, v))).filter(|(u, v)| at(*u, *v)).count();
+        let is_known = count as f64 >= KNOWN_SHARE * pixels.area() as f64;
+        move |u, v| !is_known || at(u, v)
+    }
+
+    /// The disparity that most of a box's core has, px.
+    fn peak_px(&self, one: &DetectedBox, pixels: &PixelBox) -> Option<f64> {
+        let [left, top, right, bottom] = one.edges;
+        let (width, height) = (right - left, bottom - top);
+        let at = |from: f64, side: f64, share: f64| (from + share * side) as i32;
+        let core = PixelBox {
+            left: at(left, width, CORE[0]),
+            top: at(top, height, CORE[1]),
+            width: (width * (CORE[2] - CORE[0])) as i32,
+            height: (height * (CORE[3] - CORE[1])) as i32,
+        }
+        .intersection(pixels);
+        // Half pixels: an object's depth is that of its nearest surface, which fills a few of them.
+        let mut counts = vec![0u32; 2 * 256];
+        for v in core.top..core.top + core.height {
+            for disparity_px in (core.left..core.left + core.width).filter_map(|u| self.disparity_px(u, v)) {
+                counts.get_mut((2.0 * disparity_px) as usize).into_iter().for_each(|count| *count += 1);
+            }
+        }
+        let around = |bin: usize| {
+            let reach = 1 + bin / 16;
+            counts.get(bin.saturating_sub(reach)..=(bin + reach).min(counts.len() - 1)).map_or(0, |near| near.iter().sum::<u32>())
+        };
+        let best = (1..counts.len()).max_by_key(|&bin| (around(bin), bin)).filter(|&bin| around(bin) > 0)?;
+        Some((best as f64 + 0.5) / 2.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RIG: StereoRig = StereoRig { focal_px: 300.0, center_u_px: 100.0, center_v_px: 40.0, baseline_m: 0.5 };
+
+    /// A car 60 x 50 px large, with a pane that shows the wall behind it, before a wall.
+    fn mask(class: Class, edges: [f64; 4]) -> Option<InstanceMask> {
+        let on_car =
+            |u: usize, v: usize| (70..130).contains(&u) && (30..80).contains(&v) && !((90..94).contains(&u) && (40..44).contains(&v));
+        let disparity: Vec<u16> = (0..200 * 100).map(|at| if on_car(at % 200, at / 200) { 24 * 256 } else { 6 * 256 }).collect();
+        let view = View::new(&disparity, 200, 100).unwrap();
+        Scene::new(&RIG, view, None).mask(&DetectedBox { class, score: 0.5, edges })
+    }
+
+    fn filled(mask: &InstanceMask) -> usize {
+        mask.mask.iter().filter(|pixel| **pixel > 0).count()
+    }
+
+    #[test]
+    fn a_box_becomes_what_stands_at_its_depth() {
+        let found = mask(Class::Car, [60.0, 22.0, 140.0, 90.0]).unwrap();
+        assert_eq!(found.pixels, PixelBox { left: 70, top: 30, width: 60, height: 50 });
+        assert_eq!(filled(&found), 3_000, "the pane is filled");
+    }
+
+    #[test]
+    fn small_boxes_and_those_that_show_little_of_one_depth_are_shrunk() {
+        let small = mask(Class::Car, [80.0, 40.0, 110.0, 60.0]).unwrap();
+        assert_eq!(small.pixels, PixelBox { left: 82, top: 41, width: 27, height: 18 });
+        // A box beyond the image ends with it.
+        let cut = mask(Class::Car, [180.0, 40.0, 260.0, 60.0]).unwrap();
+        assert_eq!((cut.pixels.left, cut.pixels.width), (184, 16));
+        for nothing in [[300.0, 10.0, 400.0, 90.0], [50.0, 50.0, 50.0, 50.0], [90.0, 50.0, 60.0, 20.0], [f64::NAN; 4]] {
+            assert_eq!(mask(Class::Car, nothing), None);
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! What the shapes of a network cannot tell: `MODEL.toml` beside `MODEL.onnx`.
+
+use super::model::InputValues;
+use crate::formats::{FormatError, read_text};
+use crate::input::masks::{class_of, coco_class};
+use crate::input::source::InputError;
+use dynvox_core::tracking::{Class, Treatment};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Cityscapes' classes in the order of its networks.
+const CITYSCAPES: [&str; 19] = [
+    "road",
+    "sidewalk",
+    "building",
+    "wall",
+    "fence",
+    "pole",
+    "traffic light",
+    "traffic sign",
+    "vegetation",
+    "terrain",
+    "sky",
+    "person",
+    "rider",
+    "car",
+    "truck",
+    "bus",
+    "train",
+    "motorcycle",
+    "bicycle",
+];
+
+/// How the three channels of a picture are ordered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Channels {
+    /// Red first.
+    Rgb,
+    /// Blue first.
+    Bgr,
+}
+
+/// The settings of a network; each has a default that suits the layout.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// The network, where this file is given in its stead; relative to this file.
+    pub model: Option<PathBuf>,
+    /// Size of the input, px, where the network leaves it open.
+    pub width: Option<usize>,
+    /// See `width`.
+    pub height: Option<usize>,
+    /// Order of the channels; BGR for boxes that are not decoded, else RGB.
+    pub channels: Option<Channels>,
+    /// Taken off each value of 0 to 255, by channel in the order of the input; 0.
+    pub mean: Option<[f32; 3]>,
+    /// Multiplies the difference; 1 for boxes that are not decoded, else 1/255.
+    pub scale: Option<[f32; 3]>,
+    /// Whether the picture fills the input; otherwise its sides keep their ratio and the rest is grey.
+    pub fill: Option<bool>,
+    /// Whether boxes of the shape that YOLOX gives are decoded already; false.
+    pub decoded: bool,
+    /// Names of the classes in the network's order; COCO's 80 or Cityscapes' 19 otherwise.
+    pub names: Option<Vec<String>>,
+    /// Names of the classes to keep; those of all that may move otherwise.
+    pub keep: Option<Vec<String>>,
+    /// Least score; 0.3.
+    pub score_min: f32,
+    /// Tiles side by side that a wide picture is divided into, besides the whole; 2 where it is 1.5 times as wide as the input's shape, 0 for none.
+    pub tiles: Option<usize>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            model: None,
+            width: None,
+            height: None,
+            channels: None,
+            mean: None,
+            scale: None,
+            fill: None,
+            decoded: false,
+            names: None,
+            keep: None,
+            score_min: 0.3,
+            tiles: None,
+        }
+    }
+}
+
+impl Settings {
+    /// The path of a network and its settings; `path` is that of the network, or of its settings.
+    ///
+    /// # Errors
+    /// A file is missing, or the settings are not such.
+    pub fn beside(path: &Path) -> Result<(PathBuf, Self), InputError> {
+        let is_settings = path.extension().is_some_and(|ending| ending == "toml");
+        let file = if is_settings { path.to_path_buf() } else { path.with_extension("toml") };
+        let settings = if is_settings || file.is_file() {
+            toml::from_str(&read_text(&file)?).map_err(|error| {
+                InputError::from(FormatError::content(
+                    &file,
+                    error.message().to_owned(),
+                    "docs/inputs.md lists the keys of a network's settings",
+                ))
+            })?
+        } else {
+            Self::default()
+        };
+        let given =
+            if is_settings { settings.model.as_ref().map(|model| file.with_file_name("").join(model)) } else { Some(path.to_path_buf()) };
+        match given {
+            Some(path) if path.is_file() => Ok((path, settings)),
+            Some(path) => Err(InputError::network(&path, "there is no such file".to_owned())),
+            None => Err(InputError::network(&file, "it does not name its network: add model = \"FILE.onnx\"".to_owned())),
+        }
+    }
+
+    /// What each of so many classes is; `None` for those that are not kept. Without a number, as of a map of integers, as many as are named.
+    ///
+    /// # Errors
+    /// The number of classes has no list that is known.
+    pub fn classes(&self, count: Option<usize>) -> Result<Vec<Option<Class>>, String> {
+        let named = |name: &str| self.kept(name, class_of(name));
+        match (&self.names, count) {
+            (Some(names), Some(count)) if names.len() != count => {
+                Err(format!("its settings name {} classes, but it has {count}: correct `names`", names.len()))
+            }
+            (Some(names), _) => Ok(names.iter().map(|name| named(name)).collect()),
+            (None, None | Some(19)) => Ok(CITYSCAPES.iter().map(|name| named(name)).collect()),
+            (None, Some(80)) => Ok((0..80).map(|index| self.kept("", coco_class(index))).collect()),
+            (None, Some(count)) => Err(format!(
+                "it has {count} classes, neither COCO's 80 nor Cityscapes' 19. Name them in the file of its settings: names = [\"car\", ...]"
+            )),
+        }
+    }
+
+    /// The values of an input that takes bytes or not; `in_grid`: of a network that gives boxes in the cells of its grids.
+    pub fn values(&self, bytes: bool, in_grid: bool) -> InputValues {
+        let channels = self.channels.unwrap_or(if in_grid { Channels::Bgr } else { Channels::Rgb });
+        InputValues {
+            blue_first: channels == Channels::Bgr,
+            mean: self.mean.unwrap_or_default(),
+            scale: self.scale.unwrap_or(if bytes || in_grid { [1.0; 3] } else { [1.0 / 255.0; 3] }),
+        }
+    }
+
+    fn kept(&self, name: &str, class: Option<Class>) -> Option<Class> {
+        let is_kept = |class: &Class| match &self.keep {
+            Some(keep) => keep.iter().any(|kept| kept == name || kept == class.name()),
+            None => class.treatment() != Treatment::Ignore,
+        };
+        class.filter(is_kept)
+    }
+}
