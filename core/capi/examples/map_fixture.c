@@ -63,6 +63,20 @@ static uint8_t *read_file(const char *path) {
   return bytes;
 }
 
+/* Objects that left, and their triangles. */
+typedef struct {
+  uint32_t objects;
+  uint64_t triangles;
+} Retired;
+
+static void retire(void *context, const DynvoxRetired *object) {
+  Retired *retired = context;
+  uint64_t triangles = 0, reported = 0;
+  check(dynvox_retired_triangles(object, count, &triangles, &reported), "retired");
+  retired->objects += triangles == reported;
+  retired->triangles += triangles;
+}
+
 int main(int argc, char **argv) {
   if (argc < 3) {
     fprintf(stderr, "map_fixture CLIP BYTES [KEY=VALUE...]\n");
@@ -105,6 +119,8 @@ int main(int argc, char **argv) {
   check(dynvox_create(&capacity, &config, buffer, bytes, &mapper), "create");
 
   DynvoxReport report;
+  Retired retired = {0};
+  DynvoxObjectSink objects = {&retired, retire};
   for (uint32_t index = 0; index < frames; ++index) {
     DynvoxFrame frame = {0};
     DynvoxDetection detections[64];
@@ -127,7 +143,7 @@ int main(int argc, char **argv) {
       seen->mask = at;
       at += (size_t)seen->width * seen->height;
     }
-    check(dynvox_step(mapper, &frame, NULL, &report), "step");
+    check(dynvox_step_with(mapper, &frame, NULL, &objects, &report), "step");
     printf("%u %016llx\n", (unsigned)report.frame, (unsigned long long)report.digest);
   }
 
@@ -144,11 +160,11 @@ int main(int argc, char **argv) {
   check(dynvox_triangles(mapper, count, &triangles, &reported), "triangles");
   uint32_t left = 0, stored = 0, lost = 0;
   DynvoxStore store = {&left, store_block, NULL};
-  check(dynvox_finish(mapper), "finish");
+  check(dynvox_finish_with(mapper, &objects), "finish");
   check(dynvox_stream_out(mapper, &store, &stored, &lost), "stream out");
   check(dynvox_destroy(mapper), "destroy");
-  fprintf(stderr, "%zu of %zu pixels show the map, %llu triangles, %u blocks left\n", seen, width * height, (unsigned long long)triangles,
-          (unsigned)left);
+  fprintf(stderr, "%zu of %zu pixels show the map, %llu triangles, %u blocks left; %u objects of %llu triangles\n", seen, width * height, (unsigned long long)triangles,
+          (unsigned)left, (unsigned)retired.objects, (unsigned long long)retired.triangles);
   free(depth_m);
   free(buffer);
   free(clip);

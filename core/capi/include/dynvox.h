@@ -111,10 +111,49 @@ typedef struct {
   double baseline_m;
 } DynvoxRig;
 
+// A lens by its model. Numbers as in dynvox's own table of models.
+typedef uint32_t DynvoxLensModel;
+
+// A camera as it is: its lens and the size of its images.
+typedef struct {
+  // Columns of its images, px, at most 4,096.
+  uint32_t width;
+  // Rows of its images, px, at most 4,096.
+  uint32_t height;
+  // Focal lengths, horizontal and vertical, px.
+  double focal_px[2];
+  // Principal point, px from the centre of the upper left pixel.
+  double center_px[2];
+  // DYNVOX_LENS_...
+  DynvoxLensModel model;
+  // Its parameters; those that the model does not have are not read.
+  double parameters[8];
+} DynvoxRawCamera;
+
+// Two cameras as they are, the motion between them, and the size their images are rectified to.
+typedef struct {
+  // The left camera.
+  DynvoxRawCamera left;
+  // The right camera.
+  DynvoxRawCamera right;
+  // Rotation of left camera coordinates to right ones, row by row.
+  double r_right_left[9];
+  // The left camera's centre in right camera coordinates, m.
+  double t_right_left_m[3];
+  // Columns of the rectified images, px; 0 where pairs come rectified.
+  uint32_t width;
+  // Rows of the rectified images, px.
+  uint32_t height;
+  // Their focal length, px; 0 takes the least that shows no pixel without image.
+  double focal_px;
+} DynvoxRawRig;
+
 // Everything a mapper can be told, beside its bounds: the defaults for a rig, and what dynvox_config_set changed of them.
 typedef struct {
-  // The cameras.
+  // The cameras; where pairs are raw, the rectified ones.
   DynvoxRig rig;
+  // Raw cameras, if dynvox_config_raw named them.
+  DynvoxRawRig raw;
   // Bytes of `settings` in use.
   size_t settings_len;
   // Lines `key=value`, in the order they were set. Written by dynvox_config_set.
@@ -130,6 +169,10 @@ typedef struct {
   size_t image_width;
   // Highest image, px.
   size_t image_height;
+  // Widest raw image that is rectified, px, at most 4,096; 0 where pairs come rectified.
+  size_t raw_width;
+  // Highest raw image, px.
+  size_t raw_height;
   // Features kept for each image.
   size_t features;
   // Matches kept for each frame.
@@ -190,7 +233,7 @@ typedef struct {
   double translation_m[3];
 } DynvoxPose;
 
-// A rectified stereo pair and what is known of it. Everything is read during the call alone.
+// A stereo pair and what is known of it, rectified, or raw where the configuration is dynvox_config_raw's. Everything is read during the call alone.
 typedef struct {
   // Of every image, px.
   size_t width;
@@ -285,6 +328,38 @@ typedef struct {
   // Digest of all that came of the step: the same frames and configuration give the same number everywhere.
   uint64_t digest;
 } DynvoxReport;
+
+// An object that leaves. Valid during the call.
+typedef struct {
+  // Number of its track.
+  uint32_t id;
+  // Number of the trajectory segment within the track.
+  uint32_t segment_id;
+  // Its class, as in DynvoxDetection.
+  uint8_t class_code;
+  // Whether it moves.
+  DynvoxMotionState state;
+  // First frame it was fused in.
+  uint32_t first_frame;
+  // Last frame it was fused in.
+  uint32_t last_frame;
+  // Frames it was fused in.
+  uint32_t frames;
+  // Blocks of its volume.
+  uint32_t blocks;
+  // Its frame to the world, when it was fused last.
+  DynvoxPose t_world_object;
+  // For dynvox_retired_triangles.
+  const void *volume;
+} DynvoxRetired;
+
+// The caller's sink for objects that leave. Called on the thread of the step, which waits for it; must not call the same mapper.
+typedef struct {
+  // Handed to the function.
+  void *context;
+  // Takes an object. Null: none is reported.
+  void (*retire)(void *context, const DynvoxRetired *object);
+} DynvoxObjectSink;
 
 // A rendered view of the map: buffers of the caller, any may be null. The view has the size of the frames; its rows follow each other
 // without padding.
@@ -384,6 +459,18 @@ typedef bool (*DynvoxRead)(void *context, uint8_t *bytes, size_t len);
 // Below 2 GiB, images up to 1920 x 1088, colour.
 #define DYNVOX_PROFILE_DESKTOP 3
 
+// Pinhole with radial and tangential distortion; parameters k1 to k6, p1, p2.
+#define DYNVOX_LENS_RADIAL_TANGENTIAL 0
+
+// Equidistant fisheye (Kannala, Brandt); parameters k1 to k4.
+#define DYNVOX_LENS_EQUIDISTANT 1
+
+// Double sphere; parameters xi, alpha.
+#define DYNVOX_LENS_DOUBLE_SPHERE 2
+
+// Extended unified; parameters alpha, beta.
+#define DYNVOX_LENS_EXTENDED_UNIFIED 3
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -474,6 +561,16 @@ DynvoxStatus dynvox_step(DynvoxMapper *mapper,
                          const DynvoxStore *store,
                          DynvoxReport *report);
 
+// As dynvox_step; objects that leave the mapper within the step go to `objects`, which may be null.
+//
+// # Safety
+// As dynvox_step; `objects` is null or points to a sink.
+DynvoxStatus dynvox_step_with(DynvoxMapper *mapper,
+                              const DynvoxFrame *frame,
+                              const DynvoxStore *store,
+                              const DynvoxObjectSink *objects,
+                              DynvoxReport *report);
+
 // Writes the left camera's pose in the last frame; the identity before the first.
 //
 // # Safety
@@ -512,11 +609,19 @@ DynvoxStatus dynvox_stream_out(DynvoxMapper *mapper,
                                uint32_t *stored,
                                uint32_t *lost);
 
-// Ends a sequence: prunes what is still in the window. The map can be rendered and read out as before.
+// Ends a sequence: prunes what is still in the window. Objects are lost; see dynvox_finish_with. The map can be rendered and read out as before.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
 DynvoxStatus dynvox_finish(DynvoxMapper *mapper);
+
+// As dynvox_finish; the objects that are still in the mapper leave to `objects`, which may be null.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `objects` is null or points to a
+// sink.
+DynvoxStatus dynvox_finish_with(DynvoxMapper *mapper,
+                                const DynvoxObjectSink *objects);
 
 // Writes a pose as the upper three rows of its matrix, row by row: twelve numbers.
 //
@@ -545,6 +650,24 @@ DynvoxStatus dynvox_object_triangles(DynvoxMapper *mapper,
                                      DynvoxTriangleSink sink,
                                      void *context,
                                      uint64_t *count);
+
+// Writes all defaults for raw cameras, whose pairs the mapper rectifies: frames then have the size of the raw images, and the capacity's
+// `raw_width` and `raw_height` bound it. The rectified rig is in the configuration. DYNVOX_STATUS_CONFIG where the calibration cannot be used.
+//
+// # Safety
+// `rig` is null or points to a rig, `config` is null or points to a configuration.
+DynvoxStatus dynvox_config_raw(const DynvoxRawRig *rig,
+                               DynvoxConfig *config);
+
+// Hands every triangle of an object that leaves to `sink`, in the object's own frame, and writes how many there were to `count`, which may be
+// null. Only within the call that reports the object.
+//
+// # Safety
+// `object` is null or what the caller's DynvoxObjectSink was handed, within that call; `count` is null or points to a number.
+DynvoxStatus dynvox_retired_triangles(const DynvoxRetired *object,
+                                      DynvoxTriangleSink sink,
+                                      void *context,
+                                      uint64_t *count);
 
 // Writes the whole state of a mapper, but for blocks that a store holds. The mapper continues as before. DYNVOX_STATUS_CALLBACK when
 // `write` refused.

@@ -26,6 +26,10 @@ pub struct DynvoxCapacity {
     pub image_width: usize,
     /// Highest image, px.
     pub image_height: usize,
+    /// Widest raw image that is rectified, px, at most 4,096; 0 where pairs come rectified.
+    pub raw_width: usize,
+    /// Highest raw image, px.
+    pub raw_height: usize,
     /// Features kept for each image.
     pub features: usize,
     /// Matches kept for each frame.
@@ -57,6 +61,8 @@ impl From<&Capacity> for DynvoxCapacity {
         Self {
             image_width: of.image_width,
             image_height: of.image_height,
+            raw_width: of.raw_width,
+            raw_height: of.raw_height,
             features: of.features,
             matches: of.matches,
             blocks: of.blocks,
@@ -79,8 +85,8 @@ impl DynvoxCapacity {
         let capacity = Capacity {
             image_width: self.image_width,
             image_height: self.image_height,
-            raw_width: 0,
-            raw_height: 0,
+            raw_width: self.raw_width,
+            raw_height: self.raw_height,
             features: self.features,
             matches: self.matches,
             blocks: self.blocks,

@@ -1,8 +1,9 @@
 //! The configuration: a rig, and settings by their dotted keys.
 
 use crate::{
-    DynvoxStatus,
+    DynvoxRawRig, DynvoxStatus,
     given::{output, read},
+    raw::defaults,
 };
 use core::ffi::{CStr, c_char};
 use dynvox_core::{Config, SetError, geometry::StereoRig};
@@ -28,19 +29,27 @@ pub struct DynvoxRig {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxConfig {
-    /// The cameras.
+    /// The cameras; where pairs are raw, the rectified ones.
     pub rig: DynvoxRig,
+    /// Raw cameras, if dynvox_config_raw named them.
+    pub raw: DynvoxRawRig,
     /// Bytes of `settings` in use.
     pub settings_len: usize,
     /// Lines `key=value`, in the order they were set. Written by dynvox_config_set.
     pub settings: [u8; DYNVOX_SETTINGS_BYTES],
 }
 
+impl From<&StereoRig> for DynvoxRig {
+    fn from(&StereoRig { focal_px, center_u_px, center_v_px, baseline_m }: &StereoRig) -> Self {
+        Self { focal_px, center_u_px, center_v_px, baseline_m }
+    }
+}
+
 impl DynvoxConfig {
     /// The defaults with all settings; refused where the lines are not what dynvox_config_set wrote.
     pub(crate) fn resolved(&self) -> Result<Config, DynvoxStatus> {
         let DynvoxRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
-        let mut config = Config::for_rig(StereoRig { focal_px, center_u_px, center_v_px, baseline_m });
+        let mut config = defaults(StereoRig { focal_px, center_u_px, center_v_px, baseline_m }, &self.raw)?;
         let lines = self.settings.get(..self.settings_len).ok_or(DynvoxStatus::Config)?;
         let lines = core::str::from_utf8(lines).map_err(|_| DynvoxStatus::Config)?;
         for line in lines.split_terminator('\n') {
@@ -76,7 +85,14 @@ pub unsafe extern "C" fn dynvox_config_default(rig: *const DynvoxRig, config: *m
         (Err(status), _) | (_, Err(status)) => return status,
     };
     // SAFETY: not null and aligned, as checked; of the right type, as promised.
-    unsafe { config.write(DynvoxConfig { rig, settings_len: 0, settings: [0; DYNVOX_SETTINGS_BYTES] }) };
+    unsafe {
+        config.write(DynvoxConfig {
+            rig,
+            raw: DynvoxRawRig::NONE,
+            settings_len: 0,
+            settings: [0; DYNVOX_SETTINGS_BYTES],
+        })
+    };
     DynvoxStatus::Ok
 }
 

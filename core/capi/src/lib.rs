@@ -16,6 +16,8 @@ mod config;
 mod given;
 mod handle;
 mod map;
+mod raw;
+mod retired;
 mod snapshot;
 mod status;
 mod step;
@@ -29,9 +31,14 @@ pub use capacity::{
 };
 pub use config::{DYNVOX_SETTINGS_BYTES, DynvoxConfig, DynvoxRig, dynvox_config_default, dynvox_config_problem, dynvox_config_set};
 pub use handle::{DynvoxMapper, dynvox_alignment, dynvox_bytes, dynvox_create, dynvox_destroy};
-pub use map::{DynvoxPicture, dynvox_finish, dynvox_pose_matrix, dynvox_raycast, dynvox_stream_out, dynvox_triangles};
+pub use map::{DynvoxPicture, dynvox_finish, dynvox_finish_with, dynvox_pose_matrix, dynvox_raycast, dynvox_stream_out, dynvox_triangles};
+pub use raw::{
+    DYNVOX_LENS_DOUBLE_SPHERE, DYNVOX_LENS_EQUIDISTANT, DYNVOX_LENS_EXTENDED_UNIFIED, DYNVOX_LENS_RADIAL_TANGENTIAL, DynvoxLensModel,
+    DynvoxRawCamera, DynvoxRawRig, dynvox_config_raw,
+};
+pub use retired::{DynvoxObjectSink, DynvoxRetired, dynvox_retired_triangles};
 pub use snapshot::{DynvoxRead, DynvoxWrite, dynvox_restore, dynvox_save};
 pub use status::{DynvoxStatus, dynvox_status_text};
-pub use step::{dynvox_pose, dynvox_step};
+pub use step::{dynvox_pose, dynvox_step, dynvox_step_with};
 pub use tracks::{DynvoxMotionState, DynvoxTrack, dynvox_object_triangles, dynvox_tracks};
 pub use types::{DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxReport, DynvoxSeverity};

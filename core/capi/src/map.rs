@@ -1,9 +1,10 @@
 //! Rendering the map and reading it out.
 
 use crate::{
-    DynvoxMapper, DynvoxPose, DynvoxStatus, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink,
+    DynvoxMapper, DynvoxObjectSink, DynvoxPose, DynvoxStatus, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink,
     given::{items_mut, output, read},
     handle::with,
+    retired::Retiring,
 };
 use core::{ffi::c_void, ops::Range};
 use dynvox_core::{Serial, image::View, view::Triangle};
@@ -138,7 +139,7 @@ pub unsafe extern "C" fn dynvox_stream_out(
     }
 }
 
-/// Ends a sequence: prunes what is still in the window. The map can be rendered and read out as before.
+/// Ends a sequence: prunes what is still in the window. Objects are lost; see dynvox_finish_with. The map can be rendered and read out as before.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
@@ -148,6 +149,23 @@ pub unsafe extern "C" fn dynvox_finish(mapper: *mut DynvoxMapper) -> DynvoxStatu
     unsafe {
         with(mapper, |mapper, _| {
             mapper.finish();
+            Ok(())
+        })
+    }
+}
+
+/// As dynvox_finish; the objects that are still in the mapper leave to `objects`, which may be null.
+///
+/// # Safety
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `objects` is null or points to a
+/// sink.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_finish_with(mapper: *mut DynvoxMapper, objects: *const DynvoxObjectSink) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        with(mapper, |mapper, _| {
+            let mut retiring = Retiring { sink: DynvoxObjectSink::given(objects)?, mesh: mapper.config().mesh };
+            mapper.finish_with(&mut retiring);
             Ok(())
         })
     }

@@ -1,15 +1,15 @@
 //! Taking frames.
 
 use crate::{
-    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxMapper, DynvoxPose, DynvoxReport, DynvoxStatus, DynvoxStore,
+    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxMapper, DynvoxObjectSink, DynvoxPose, DynvoxReport, DynvoxStatus, DynvoxStore,
     given::{items, output, read},
     handle::with,
+    retired::Retiring,
 };
-use core::ops::Range;
+use core::{ops::Range, ptr};
 use dynvox_core::{
     Serial, StereoFrame,
     image::View,
-    objects::NoSink,
     tracking::{Class, Detection, MAX_DETECTIONS},
 };
 
@@ -28,10 +28,27 @@ pub unsafe extern "C" fn dynvox_step(
     report: *mut DynvoxReport,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
+    unsafe { dynvox_step_with(mapper, frame, store, ptr::null(), report) }
+}
+
+/// As dynvox_step; objects that leave the mapper within the step go to `objects`, which may be null.
+///
+/// # Safety
+/// As dynvox_step; `objects` is null or points to a sink.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_step_with(
+    mapper: *mut DynvoxMapper,
+    frame: *const DynvoxFrame,
+    store: *const DynvoxStore,
+    objects: *const DynvoxObjectSink,
+    report: *mut DynvoxReport,
+) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, buffer| {
             let frame = read(frame)?;
             let mut store = if store.is_null() { DynvoxStore::NONE } else { read(store)? };
+            let mut retiring = Retiring { sink: DynvoxObjectSink::given(objects)?, mesh: mapper.config().mesh };
             let report = if report.is_null() { None } else { Some(output(report)?) };
             let mut buffered = [NOTHING; MAX_DETECTIONS];
             let frame_in_core = StereoFrame {
@@ -44,7 +61,7 @@ pub unsafe extern "C" fn dynvox_step(
                 time_ns: if frame.time_ns.is_null() { None } else { Some(read(frame.time_ns)?) },
                 t_world_camera: if frame.t_world_camera.is_null() { None } else { Some(read(frame.t_world_camera)?.transform()?) },
             };
-            let done = mapper.step_with(&frame_in_core, &Serial, &mut store, &mut NoSink)?;
+            let done = mapper.step_with(&frame_in_core, &Serial, &mut store, &mut retiring)?;
             if let Some(report) = report {
                 report.write((&done).into());
             }

@@ -67,6 +67,16 @@ pub struct DynvoxTrack {
     pub blocks: u32,
 }
 
+impl From<MotionState> for DynvoxMotionState {
+    fn from(state: MotionState) -> Self {
+        match state {
+            MotionState::Uncertain => Self::Uncertain,
+            MotionState::Static => Self::Static,
+            MotionState::Dynamic => Self::Dynamic,
+        }
+    }
+}
+
 impl From<&TrackReport> for DynvoxTrack {
     fn from(track: &TrackReport) -> Self {
         let [speed_m_s, speed_sigma_m_s] = track.speed_m_s.unwrap_or([-1.0, 0.0]);
@@ -76,11 +86,7 @@ impl From<&TrackReport> for DynvoxTrack {
             detected: u8::from(track.detected),
             measured: u8::from(track.measured),
             has_pose: u8::from(track.t_world_object.is_some()),
-            state: match track.state {
-                MotionState::Uncertain => DynvoxMotionState::Uncertain,
-                MotionState::Static => DynvoxMotionState::Static,
-                MotionState::Dynamic => DynvoxMotionState::Dynamic,
-            },
+            state: track.state.into(),
             score: track.score,
             first_frame: track.first_frame,
             last_frame: track.last_frame,

@@ -59,7 +59,7 @@ pub struct DynvoxDetection {
     pub mask: *const u8,
 }
 
-/// A rectified stereo pair and what is known of it. Everything is read during the call alone.
+/// A stereo pair and what is known of it, rectified, or raw where the configuration is dynvox_config_raw's. Everything is read during the call alone.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxFrame {

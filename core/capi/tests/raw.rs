@@ -1,0 +1,126 @@
+//! Raw cameras through C: the digests of the core with the same rectification, and what cannot be rectified is a status.
+#![allow(missing_docs, clippy::unwrap_used, clippy::indexing_slicing)]
+#![expect(clippy::undocumented_unsafe_blocks, reason = "each call keeps the header's promises")]
+
+use dynvox_capi::*;
+use dynvox_core::memory::SLAB_ALIGN;
+use dynvox_core::rectify::{Lens, LensModel, RawCamera, RawRig, Rectification, Sizing};
+use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, image::View};
+use std::ptr;
+
+const RAW: [usize; 2] = [176, 80];
+const RECTIFIED: [u32; 2] = [160, 64];
+
+fn camera() -> DynvoxRawCamera {
+    DynvoxRawCamera {
+        width: RAW[0] as u32,
+        height: RAW[1] as u32,
+        focal_px: [100.0, 101.0],
+        center_px: [88.0, 40.0],
+        model: DYNVOX_LENS_RADIAL_TANGENTIAL,
+        parameters: [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.001, -0.001],
+    }
+}
+
+/// The right camera turned by 1.1 degrees, so that rows and columns of its rotation differ.
+fn rig() -> DynvoxRawRig {
+    let (sin, cos) = 0.02f64.sin_cos();
+    DynvoxRawRig {
+        left: camera(),
+        right: camera(),
+        r_right_left: [cos, 0.0, sin, 0.0, 1.0, 0.0, -sin, 0.0, cos],
+        t_right_left_m: [-0.5, 0.0, 0.0],
+        width: RECTIFIED[0],
+        height: RECTIFIED[1],
+        focal_px: 0.0,
+    }
+}
+
+fn config_of(rig: &DynvoxRawRig) -> Result<DynvoxConfig, DynvoxStatus> {
+    let mut config = unsafe { std::mem::zeroed() };
+    match unsafe { dynvox_config_raw(rig, &raw mut config) } {
+        DynvoxStatus::Ok => Ok(config),
+        status => Err(status),
+    }
+}
+
+fn pixels(shift: usize) -> Vec<u8> {
+    (0..RAW[0] * RAW[1]).map(|i| (((i + shift) / 3) as u32).wrapping_mul(2_654_435_761).rotate_left(9) as u8).collect()
+}
+
+/// The digest that the core gives for two frames.
+fn digest_of_core(capacity: &Capacity) -> u64 {
+    let lens = LensModel::RadialTangential { radial: [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0], tangential: [0.001, -0.001] };
+    let camera = RawCamera {
+        lens: Lens::new([100.0, 101.0], [88.0, 40.0], lens).unwrap(),
+        width: RAW[0] as u32,
+        height: RAW[1] as u32,
+    };
+    let (sin, cos) = 0.02f64.sin_cos();
+    let rig = RawRig {
+        left: camera,
+        right: camera,
+        // By columns.
+        r_right_left: [[cos, 0.0, -sin], [0.0, 1.0, 0.0], [sin, 0.0, cos]].into(),
+        t_right_left_m: [-0.5, 0.0, 0.0].into(),
+    };
+    let sizing = Sizing::Given { width: RECTIFIED[0], height: RECTIFIED[1], focal_px: None };
+    let (rectification, rig) = Rectification::of(&rig, sizing).unwrap();
+    let config = Config { rectification: Some(rectification), ..Config::for_rig(rig) };
+    let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    let mut mapper = Mapper::new(capacity, &config, &mut slab).unwrap();
+    let (left, right) = (pixels(0), pixels(4));
+    let view = |pixels| View::new(pixels, RAW[0], RAW[1]).unwrap();
+    let frame = StereoFrame::pair(view(&left), view(&right));
+    (0..2).map(|_| mapper.step(&frame, &Serial).unwrap().digest).last().unwrap()
+}
+
+#[test]
+fn raw_pairs_give_the_digests_of_the_core() {
+    let (mut capacity, mut len): (DynvoxCapacity, usize) = (unsafe { std::mem::zeroed() }, 0);
+    assert_eq!(unsafe { dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &raw mut capacity) }, DynvoxStatus::Ok);
+    (capacity.raw_width, capacity.raw_height) = (RAW[0], RAW[1]);
+    assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut len) }, DynvoxStatus::Ok);
+    let mut buffer = vec![0u8; len + dynvox_alignment()];
+    let start = buffer.as_ptr().align_offset(dynvox_alignment());
+    let (config, mut mapper) = (config_of(&rig()).unwrap(), ptr::null_mut());
+    assert!((config.rig.baseline_m - 0.5).abs() < 1e-12 && config.rig.focal_px > 80.0, "{:?}", config.rig);
+    let at = buffer[start..].as_mut_ptr();
+    assert_eq!(unsafe { dynvox_create(&raw const capacity, &raw const config, at, len, &raw mut mapper) }, DynvoxStatus::Ok);
+    let (left, right) = (pixels(0), pixels(4));
+    let image = |pixels: &[u8]| DynvoxImage { pixels: pixels.as_ptr(), stride: RAW[0] };
+    let frame = DynvoxFrame {
+        width: RAW[0],
+        height: RAW[1],
+        left: image(&left),
+        right: image(&right),
+        colour: DynvoxImage { pixels: ptr::null(), stride: 0 },
+        detections: ptr::null(),
+        detection_count: 0,
+        t_world_camera: ptr::null(),
+        time_ns: ptr::null(),
+        disparity_q8: ptr::null(),
+    };
+    let mut report: DynvoxReport = unsafe { std::mem::zeroed() };
+    for _ in 0..2 {
+        assert_eq!(unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), &raw mut report) }, DynvoxStatus::Ok);
+    }
+    let of_core = Capacity { raw_width: RAW[0], raw_height: RAW[1], ..Capacity::TINY };
+    assert_eq!(report.digest, digest_of_core(&of_core));
+    assert_eq!(unsafe { dynvox_destroy(mapper) }, DynvoxStatus::Ok);
+}
+
+#[test]
+fn what_cannot_be_rectified_is_a_status() {
+    let refused = |change: fn(&mut DynvoxRawRig)| {
+        let mut rig = rig();
+        change(&mut rig);
+        config_of(&rig).err()
+    };
+    assert_eq!(refused(|rig| rig.left.model = 9), Some(DynvoxStatus::Unknown));
+    assert_eq!(refused(|rig| rig.right.focal_px[0] = -1.0), Some(DynvoxStatus::Config));
+    assert_eq!(refused(|rig| rig.r_right_left[0] = 3.0), Some(DynvoxStatus::Config));
+    assert_eq!(refused(|rig| rig.t_right_left_m[0] = 0.5), Some(DynvoxStatus::Config), "exchanged");
+    assert_eq!(refused(|rig| rig.width = 0), Some(DynvoxStatus::Size));
+    assert_eq!(unsafe { dynvox_config_raw(ptr::null(), ptr::null_mut()) }, DynvoxStatus::Null);
+}
