@@ -1,5 +1,7 @@
 //! `dynvox budget`.
 
+mod targets;
+
 use super::capacity::{Bytes, ImageSize, to_json, to_toml};
 use crate::report::text::grouped;
 use dynvox_core::volume::{BLOCK_SIDE, VolumeConfig};
@@ -34,7 +36,10 @@ pub struct BudgetArgs {
     /// Objects reconstructed at once [default: as many as a fifth of the bytes allows]
     #[arg(long, value_name = "N", requires = "memory")]
     objects: Option<usize>,
-    /// Write the bounds to standard output as JSON
+    /// Sum up slab, stack and code for the targets they are known for
+    #[arg(long)]
+    stack: bool,
+    /// Write the tables to standard output as JSON
     #[arg(long)]
     json: bool,
 }
@@ -48,9 +53,15 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
             voxel_size_m: Some(args.voxel),
             ..BudgetOptions::default()
         };
-        return solved(args, memory, &super::capacity::solve(memory, (width, height), &options)?);
+        let capacity = super::capacity::solve(memory, (width, height), &options)?;
+        return if args.stack { targets::show(&[(memory.to_string(), capacity)], args.json) } else { solved(args, memory, &capacity) };
     }
     match &args.profile {
+        Some(name) if args.stack => targets::show(&[super::profile(name)?], args.json)?,
+        None if args.stack => {
+            let profiles = Capacity::PROFILES.map(|(name, capacity)| (name.to_owned(), capacity));
+            targets::show(&profiles, args.json)?;
+        }
         None if args.json => outln!("{}", serde_json::to_string_pretty(&profiles_json()?)?),
         None => overview(),
         Some(name) => {
@@ -87,7 +98,19 @@ fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Resu
     outln!("  objects reconstructed at once: {}, of {} blocks each", capacity.objects, grouped(capacity.object_blocks as u64));
     outln!("\nas a file for `dynvox run --capacity FILE`:\n\n{}", to_toml(capacity)?);
     outln!("as Rust:\n\nconst CAPACITY: Capacity = {capacity:#?};");
+    outln!("\nas C:\n\n{}", to_c(capacity)?);
     Ok(())
+}
+
+/// The capacity as an initialiser in C, where images come rectified.
+fn to_c(capacity: &Capacity) -> anyhow::Result<String> {
+    let table = to_json(capacity)?;
+    let bounds = table["capacity"].as_object().into_iter().flatten();
+    let fields = bounds.map(|(name, value)| match value.as_bool() {
+        Some(flag) => format!("  .{name} = {},\n", u8::from(flag)),
+        None => format!("  .{name} = {value},\n"),
+    });
+    Ok(format!("static const DynvoxCapacity capacity = {{\n{}}};", fields.collect::<String>()))
 }
 
 fn overview() {
