@@ -110,6 +110,24 @@ fn a_camera_faster_than_the_mapper_loses_frames_that_are_counted() {
     assert_eq!(frames + dropped, 20 * FRAMES as u64);
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_does_not_grow_with_the_stream() {
+    const ROUNDS: usize = 200;
+    let root = street();
+    let coarse = ["--quiet", "--threads", "1", "--set", "volume.voxel_size_m=0.2", "--set", "volume.prune_lag=5"];
+    let run = piped(root.path(), &in_turn(root.path()).repeat(ROUNDS), "result", &coarse);
+    assert!(run.status.success(), "{}", output_text(&run));
+    let csv = fs::read_to_string(root.path().join("result/frames.csv")).unwrap();
+    let mut lines = csv.lines();
+    let column = lines.next().unwrap().split(',').position(|name| name == "rss_bytes").unwrap();
+    let resident: Vec<i64> = lines.map(|line| line.split(',').nth(column).unwrap().parse().unwrap()).collect();
+    assert_eq!(resident.len(), ROUNDS * FRAMES);
+    // A row kept in memory would be 2 KiB, 1.6 MiB in all; charts and histograms fill up to their bounds.
+    let grown = resident[resident.len() - 1] - resident[resident.len() / 3];
+    assert!(grown < 1 << 20, "{grown} bytes in {} frames", resident.len() - resident.len() / 3);
+}
+
 #[test]
 fn a_stream_that_stops_inside_an_image_is_an_incomplete_run() {
     let root = street();

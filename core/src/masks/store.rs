@@ -53,24 +53,36 @@ impl MaskHandle {
 pub(crate) struct MaskStore<'s> {
     words: &'s mut [u64],
     used: usize,
+    /// The most used since the store was last emptied.
+    peak: usize,
 }
 
 impl<'s> MaskStore<'s> {
     /// A store in `words`.
     pub(crate) fn new(words: &'s mut [u64]) -> Self {
-        Self { words, used: 0 }
+        Self { words, used: 0, peak: 0 }
     }
 
     /// Visits all masks.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { words, used } = self;
+        let Self {
+            words,
+            used,
+            // The next frame begins by forgetting it.
+            peak: _,
+        } = self;
         visitor.count(used, words.len());
         visitor.u64s(part_mut(words, ..*used));
     }
 
     /// Forgets all masks.
     pub(crate) fn clear(&mut self) {
-        self.used = 0;
+        (self.used, self.peak) = (0, 0);
+    }
+
+    /// The most words in use since the masks were last forgotten.
+    pub(crate) fn peak(&self) -> usize {
+        self.peak
     }
 
     /// Space for a mask in a box within the image, all its bits 0; `None` when the store is full.
@@ -80,6 +92,9 @@ impl<'s> MaskStore<'s> {
         let end = self.used.checked_add(mask.stride as usize * usize::try_from(pixels.height).ok()?)?;
         self.words.get_mut(self.used..end)?.fill(0);
         self.used = end;
+        if end > self.peak {
+            self.peak = end;
+        }
         Some(mask)
     }
 

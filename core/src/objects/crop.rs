@@ -293,6 +293,17 @@ impl<'s> Crops<'s> {
         digest.finish()
     }
 
+    /// Pixels of a ring that would hold the crops kept now: from the oldest to the newest, and once more the largest, since a crop that does
+    /// not fit at the end of the ring begins at its front.
+    pub fn enough_pixels(&self) -> usize {
+        let kept = part(self.entries, ..self.len);
+        let oldest = kept.first().map_or(0, |crop| crop.start as usize);
+        let pixels = self.disparity_q8.len();
+        let span = if oldest < self.next { self.next - oldest } else { pixels - oldest + self.next };
+        let largest = kept.iter().map(|crop| crop.len as usize).max().unwrap_or(0);
+        if span + largest < pixels { span + largest } else { pixels }
+    }
+
     /// Crops kept.
     pub fn len(&self) -> usize {
         self.len

@@ -82,6 +82,8 @@ impl<'s> Objects<'s> {
         match track.motion_state.state() {
             MotionState::Uncertain => {
                 let dropped = self.crops.push(crop, disparity, &frame.picture);
+                let enough = self.crops.enough_pixels() as u32;
+                self.report.crop_pixels = if enough > self.report.crop_pixels { enough } else { self.report.crop_pixels };
                 self.report.crops_dropped += dropped.unwrap_or(1);
             }
             // A moving object's pose is extrapolated in a frame without a motion of its own.

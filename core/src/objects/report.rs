@@ -27,6 +27,8 @@ pub struct ObjectsReport {
     pub crops_dropped: u32,
     /// Blocks in use over all objects.
     pub blocks: u32,
+    /// Pixels of crops that would have been enough for this frame: what `capacity.crop_pixels` bounds.
+    pub crop_pixels: u32,
 }
 
 /// One frame's instances.
@@ -47,13 +49,23 @@ pub struct InstancesReport {
     pub matches_excluded: u32,
     /// Pixels whose depth was kept out of the static map.
     pub pixels_masked: u32,
+    /// Most words of masks in use: what `capacity.mask_words` bounds.
+    pub mask_words: u32,
 }
 
 impl InstancesReport {
     /// The report of a frame, from those of its stages. `matches_excluded` is the camera's.
     pub(crate) fn of(tracking: &TrackingReport, objects: ObjectsReport, matches_excluded: u32) -> Self {
-        let &TrackingReport { detections, tracks, segmentation, pixels_masked } = tracking;
-        Self { detections, segmentation, tracks, objects, matches_excluded, pixels_masked }
+        let &TrackingReport { detections, tracks, segmentation, pixels_masked, mask_words } = tracking;
+        Self {
+            detections,
+            segmentation,
+            tracks,
+            objects,
+            matches_excluded,
+            pixels_masked,
+            mask_words,
+        }
     }
 
     /// What should have been used and was not: detections, tracks, masks, objects, their blocks and crops.

@@ -58,6 +58,8 @@ pub struct TrackingReport {
     pub segmentation: SegmentationReport,
     /// Pixels whose depth was kept out of the static map.
     pub pixels_masked: u32,
+    /// Most words of masks in use: what `capacity.mask_words` bounds.
+    pub mask_words: u32,
 }
 
 impl Tracker<'_> {

@@ -92,6 +92,7 @@ impl<'s> Tracked<'_, 's> {
     /// Ends the frame: masks are kept for the next one.
     pub(crate) fn commit(self) -> TrackingReport {
         self.tracker.commit();
+        self.tracker.report.mask_words = self.tracker.masks.current().peak() as u32;
         self.tracker.report
     }
 }

@@ -99,7 +99,7 @@ impl<'s> SlotPool<'s> {
     }
 
     /// The most slots ever taken at once.
-    pub(crate) fn peak(&self) -> usize {
+    pub fn peak(&self) -> usize {
         self.peak
     }
 

@@ -1,10 +1,9 @@
 //! Which bounds a run has: a named profile, a byte budget, or a file; without any of them 256 MiB for the images that come.
 
-use crate::formats::CapacityTable;
+use crate::formats::CapacityFile;
 use anyhow::{Context, bail};
 use dynvox_core::rectify::{Rectification, RectifiedImages, Rectifier};
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
-use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -122,21 +121,14 @@ impl FromStr for ImageSize {
     }
 }
 
-/// A capacity as a file.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CapacityFile {
-    capacity: CapacityTable,
-}
-
 /// A capacity as TOML, for `--capacity`.
 pub fn to_toml(capacity: &Capacity) -> anyhow::Result<String> {
-    Ok(toml::to_string(&CapacityFile { capacity: CapacityTable(*capacity) })?)
+    Ok(CapacityFile::of(capacity).to_toml()?)
 }
 
 /// A capacity as JSON.
 pub fn to_json(capacity: &Capacity) -> anyhow::Result<serde_json::Value> {
-    Ok(serde_json::to_value(CapacityFile { capacity: CapacityTable(*capacity) })?)
+    Ok(serde_json::to_value(CapacityFile::of(capacity))?)
 }
 
 fn read(path: &Path) -> anyhow::Result<Capacity> {

@@ -50,7 +50,8 @@ fn sentences(comparison: &Comparison, names: [&Path; 2]) -> String {
     text += &match (&comparison.divergence, comparison.prefix()) {
         (Some(divergence), _) => {
             let stage = divergence.stage.map_or("the combined digest alone: a table was edited".to_owned(), |stage| stage.to_string());
-            format!("first divergence: frame {}, {stage}\n", divergence.frame)
+            let apart = format!("apart in frame {}: {}\napart at most: {}\n", divergence.frame, divergence.there, divergence.most);
+            format!("first divergence: frame {}, {stage}\n{apart}", divergence.frame)
         }
         (None, Some(which)) => {
             let [short, long] = if which == 0 { [&a, &b] } else { [&b, &a] };

@@ -39,7 +39,7 @@ pub fn five_numbers(values: &[f64]) -> Option<[f64; 5]> {
     Some([first, low, middle, high, last])
 }
 
-fn rank(len: usize, share: f64) -> usize {
+pub(super) fn rank(len: usize, share: f64) -> usize {
     ((share * len as f64) as usize).min(len.saturating_sub(1))
 }
 

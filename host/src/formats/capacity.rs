@@ -30,3 +30,26 @@ struct CapacityDef {
     crop_pixels: usize,
     colour: bool,
 }
+
+/// A capacity as a file, for `--capacity`.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CapacityFile {
+    /// The bounds.
+    pub capacity: CapacityTable,
+}
+
+impl CapacityFile {
+    /// The file of a capacity.
+    pub fn of(capacity: &Capacity) -> Self {
+        Self { capacity: CapacityTable(*capacity) }
+    }
+
+    /// Its text.
+    ///
+    /// # Errors
+    /// A bound is beyond TOML's integers.
+    pub fn to_toml(self) -> Result<String, toml::ser::Error> {
+        toml::to_string(&self)
+    }
+}

@@ -19,7 +19,7 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
-pub use capacity::CapacityTable;
+pub use capacity::{CapacityFile, CapacityTable};
 pub use draft::DraftFolder;
 pub use error::{FormatError, read_text};
 pub use image::{Image, luma};
@@ -30,5 +30,5 @@ pub use picture::{
 };
 pub use ply::{Mesh, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16};
-pub use poses::{Trajectory, read_poses, write_kitti, write_numbered, write_tum};
+pub use poses::{Trajectory, kitti_line, read_poses, tum_line, write_numbered};
 pub use rows::{parse_seconds, read_stamped_names, read_times};

@@ -54,8 +54,8 @@ fn pose_of(numbers: &[f64]) -> Option<(Option<f64>, Transform)> {
 }
 
 /// KITTI: the twelve numbers of the rows of `t_world_camera`, one line a frame.
-pub fn write_kitti(out: &mut impl Write, poses: &[Transform]) -> io::Result<()> {
-    poses.iter().try_for_each(|pose| writeln!(out, "{}", kitti_row(pose)))
+pub fn kitti_line(pose: &Transform) -> String {
+    format!("{}\n", kitti_row(pose))
 }
 
 /// Poses of some frames only: the frame's number, then the twelve numbers of KITTI's row.
@@ -67,12 +67,9 @@ fn kitti_row(pose: &Transform) -> String {
     joined(pose.matrix_3x4().as_flattened().iter().copied())
 }
 
-/// TUM: `t x y z qx qy qz qw`, one line a frame. Times are ns and written as seconds to the last digit.
-pub fn write_tum(out: &mut impl Write, times_ns: &[u64], poses: &[Transform]) -> io::Result<()> {
-    for (&time_ns, pose) in times_ns.iter().zip(poses) {
-        writeln!(out, "{} {}", seconds_text(time_ns), joined(pose.translation_m.into_iter().chain(pose.rotation)))?;
-    }
-    Ok(())
+/// TUM: `t x y z qx qy qz qw`, one line a frame. The time is in ns and written as seconds to the last digit.
+pub fn tum_line(time_ns: u64, pose: &Transform) -> String {
+    format!("{} {}\n", seconds_text(time_ns), joined(pose.translation_m.into_iter().chain(pose.rotation)))
 }
 
 fn joined(numbers: impl Iterator<Item = f64>) -> String {

@@ -21,9 +21,7 @@ fn poses() -> Vec<dynvox_core::geometry::Transform> {
 fn kitti_trajectories_are_read_back_as_they_were() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("t.txt");
-    let mut text = Vec::new();
-    write_kitti(&mut text, &poses()).unwrap();
-    fs::write(&path, text).unwrap();
+    fs::write(&path, poses().iter().map(kitti_line).collect::<String>()).unwrap();
     for (read, written) in read_poses(&path).unwrap().poses.iter().zip(poses()) {
         assert_eq!(read.translation_m, written.translation_m, "to the last bit");
         assert!((read.inverse() * written).angle_rad() < 1e-7);
@@ -33,10 +31,8 @@ fn kitti_trajectories_are_read_back_as_they_were() {
 #[test]
 fn tum_trajectories_keep_every_digit_of_time_and_pose() {
     let times_ns = [0, 103_730_000, 1_317_354_879_123_456_000, 1_317_354_879_123_457_001, 2_000_000_000_000_000_000];
-    let mut text = Vec::new();
-    write_tum(&mut text, &times_ns, &poses()).unwrap();
-    let rows: Vec<Vec<f64>> =
-        String::from_utf8(text).unwrap().lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
+    let text: String = times_ns.iter().zip(poses()).map(|(time_ns, pose)| tum_line(*time_ns, &pose)).collect();
+    let rows: Vec<Vec<f64>> = text.lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
     for ((row, time_ns), pose) in rows.iter().zip(times_ns).zip(poses()) {
         let ([x, y, z], [i, j, k, w]) = (pose.translation_m, pose.rotation);
         assert_eq!(*row, [time_ns as f64 / 1e9, x, y, z, i, j, k, w]);

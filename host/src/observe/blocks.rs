@@ -107,7 +107,7 @@ impl Observer for BlocksObserver {
         Ok(())
     }
 
-    fn finish(mut self, _: &Setup<'_>, finished: &Finished<'_>) -> Result<BlocksSection, ObserveError> {
+    fn finish(mut self, _: &Setup<'_>, finished: &Finished) -> Result<BlocksSection, ObserveError> {
         self.totals.prune_visited += u64::from(finished.pruned.visited);
         self.totals.voxels_reset += u64::from(finished.pruned.voxels_reset);
         self.totals.blocks_freed += u64::from(finished.pruned.blocks_freed);

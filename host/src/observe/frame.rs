@@ -19,7 +19,7 @@ pub struct StageTime {
 }
 
 /// One frame.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct FrameRow {
     /// Number of the frame in the data set.
     pub frame: usize,
@@ -35,6 +35,8 @@ pub struct FrameRow {
     pub track_states: [u32; 3],
     /// Masks of the source that could not be used.
     pub mask_refusals: MaskRefusals,
+    /// Mean disparity of the pixels that have one, px.
+    pub disparity_mean_px: Option<f64>,
     /// Invalid values of a given depth image: not finite, negative, or no disparity of this rig.
     pub depth_refused: u32,
     /// Wall time of the whole step, ms.

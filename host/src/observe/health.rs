@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct HealthSection {
     /// The worst event of all frames and of the end.
-    #[serde(skip)]
     pub worst: Severity,
     /// Features and matches for which there was no memory.
     pub matches_dropped: u64,
@@ -44,14 +43,14 @@ impl Observer for HealthObserver {
         sums.detections = sum(sums.detections, &instances.detections);
         sums.tracks_refused += u64::from(instances.tracks.refused + instances.objects.refused);
         sums.internal_faults += u64::from(row.report.internal_faults);
+        sums.worst = sums.worst.max(row.severity());
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, finished: &Finished<'_>) -> Result<HealthSection, ObserveError> {
+    fn finish(self, _: &Setup<'_>, finished: &Finished) -> Result<HealthSection, ObserveError> {
         let store = &finished.store;
         let end = if u64::from(store.end.lost) + store.unreadable > 0 { Severity::MapAffected } else { Severity::Info };
-        let worst = finished.rows.iter().map(|row| row.severity()).fold(end, Severity::max);
-        Ok(HealthSection { worst, ..self.sums })
+        Ok(HealthSection { worst: self.sums.worst.max(end), ..self.sums })
     }
 }
 

@@ -30,7 +30,7 @@ impl Observer for InstancesObserver {
         save(&motion_folder, &found_by_motion(frame.view.mapper(), size))
     }
 
-    fn finish(self, _: &Setup<'_>, _: &super::Finished<'_>) -> Result<(), ObserveError> {
+    fn finish(self, _: &Setup<'_>, _: &super::Finished) -> Result<(), ObserveError> {
         Ok(())
     }
 }

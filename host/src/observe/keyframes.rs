@@ -64,7 +64,7 @@ impl Observer for KeyframesObserver {
     }
 
     fn end(&mut self, _: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
-        if let Some(row) = end.rows.last() {
+        if let Some(row) = end.last {
             let down = nalgebra::Vector3::new(-OVERVIEW_PITCH_RAD, 0.0, 0.0);
             let t_world_camera = row.report.t_world_camera * Transform::new(down, OVERVIEW_OFFSET_M);
             let seen = end.view.raycast(&t_world_camera);
@@ -73,7 +73,7 @@ impl Observer for KeyframesObserver {
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished<'_>) -> Result<KeyframesSection, ObserveError> {
+    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<KeyframesSection, ObserveError> {
         Ok(KeyframesSection { keyframes: self.keyframes, overview_png: self.overview_png })
     }
 }

@@ -2,27 +2,36 @@
 //! a section of the run's record in the end.
 
 mod blocks;
+mod bounds;
+mod chart_values;
 mod frame;
+mod frame_log;
+mod growing_file;
 mod health;
 mod instances;
 mod keyframes;
 mod objects;
 pub mod pictures;
 mod reference;
+pub mod tables;
 mod thumbnail;
 mod tracks;
 mod trajectory;
 mod volume_copy;
 
 pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
+pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
+pub use chart_values::{ChartValues, Charted};
 pub use frame::{FrameRow, STAGES, StageTime};
+pub use frame_log::{FrameLog, StageStatistics};
+pub use growing_file::GrowingFile;
 pub use health::{HealthObserver, HealthSection};
 pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
 pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, ReferenceSection};
-pub use tracks::{FrameTracks, TrackRecord, TrackRow, TracksObserver, TracksSection, state_name};
-pub use trajectory::{TrackingFailures, TrajectoryObserver, TrajectorySection, from_first};
+pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
+pub use trajectory::{ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first};
 pub use volume_copy::VolumeCopy;
 
 use crate::formats::Mesh;
@@ -116,8 +125,8 @@ pub struct FrameContext<'a, 's> {
 
 /// The end of a run: every frame is mapped, and the map is still in memory.
 pub struct EndContext<'a, 's> {
-    /// All frames.
-    pub rows: &'a [FrameRow],
+    /// The last frame.
+    pub last: Option<&'a FrameRow>,
     /// Objects that left the mapper at the end.
     pub retired: &'a [RetiredVolume],
     /// The map.
@@ -125,9 +134,7 @@ pub struct EndContext<'a, 's> {
 }
 
 /// A finished run: the map is on disk.
-pub struct Finished<'a> {
-    /// All frames.
-    pub rows: &'a [FrameRow],
+pub struct Finished {
     /// The slab, region by region.
     pub regions: Vec<Region>,
     /// Blocks of the map in memory at the end.
@@ -146,6 +153,11 @@ pub struct Finished<'a> {
 pub trait Observer {
     /// What it contributes to the record of the run.
     type Section;
+
+    /// Its files that grow frame by frame.
+    fn files(&mut self) -> Vec<&mut GrowingFile> {
+        Vec::new()
+    }
 
     /// The run is resumed from a checkpoint: checks files written before it, and removes those written after it.
     ///
@@ -173,7 +185,7 @@ pub trait Observer {
     ///
     /// # Errors
     /// The disk refuses.
-    fn finish(self, setup: &Setup<'_>, finished: &Finished<'_>) -> Result<Self::Section, ObserveError>;
+    fn finish(self, setup: &Setup<'_>, finished: &Finished) -> Result<Self::Section, ObserveError>;
 }
 
 /// All observers, in the order in which they see a frame.
@@ -185,6 +197,7 @@ pub struct Observers {
     tracks: TracksObserver,
     objects: ObjectsObserver,
     blocks: BlocksObserver,
+    bounds: BoundsObserver,
     health: HealthObserver,
     instances: InstancesObserver,
 }
@@ -204,6 +217,8 @@ pub struct Sections {
     pub objects: ObjectsSection,
     /// Blocks of the map: made, pruned, evicted, stored.
     pub blocks: BlocksSection,
+    /// What was needed of each bound.
+    pub bounds: BoundsSection,
     /// What was refused.
     pub health: HealthSection,
 }
@@ -218,6 +233,10 @@ impl Observers {
 impl Observer for Observers {
     type Section = Sections;
 
+    fn files(&mut self) -> Vec<&mut GrowingFile> {
+        self.trajectory.files().into_iter().chain(self.tracks.files()).collect()
+    }
+
     fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
         self.objects.resume(setup)
     }
@@ -229,6 +248,7 @@ impl Observer for Observers {
         self.tracks.frame(setup, frame)?;
         self.objects.frame(setup, frame)?;
         self.blocks.frame(setup, frame)?;
+        self.bounds.frame(setup, frame)?;
         self.health.frame(setup, frame)?;
         self.instances.frame(setup, frame)
     }
@@ -238,7 +258,7 @@ impl Observer for Observers {
         self.objects.end(setup, end)
     }
 
-    fn finish(self, setup: &Setup<'_>, finished: &Finished<'_>) -> Result<Sections, ObserveError> {
+    fn finish(self, setup: &Setup<'_>, finished: &Finished) -> Result<Sections, ObserveError> {
         Ok(Sections {
             trajectory: self.trajectory.finish(setup, finished)?,
             keyframes: self.keyframes.finish(setup, finished)?,
@@ -246,6 +266,7 @@ impl Observer for Observers {
             tracks: self.tracks.finish(setup, finished)?,
             objects: self.objects.finish(setup, finished)?,
             blocks: self.blocks.finish(setup, finished)?,
+            bounds: self.bounds.finish(setup, finished)?,
             health: self.health.finish(setup, finished)?,
         })
     }

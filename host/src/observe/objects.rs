@@ -105,7 +105,7 @@ impl Observer for ObjectsObserver {
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, finished: &Finished<'_>) -> Result<ObjectsSection, ObserveError> {
+    fn finish(self, _: &Setup<'_>, finished: &Finished) -> Result<ObjectsSection, ObserveError> {
         let mesh = finished.mesh_path.is_file();
         let swept = self.swept.as_ref().filter(|_| mesh).map(|swept| swept.triangles(&finished.mesh_path)).transpose();
         let failed = |source| ObserveError::Write { path: finished.mesh_path.clone(), source };

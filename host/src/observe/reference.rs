@@ -131,7 +131,7 @@ impl Observer for ReferenceObserver {
         Ok(())
     }
 
-    fn finish(self, setup: &Setup<'_>, _: &Finished<'_>) -> Result<Self::Section, ObserveError> {
+    fn finish(self, setup: &Setup<'_>, _: &Finished) -> Result<Self::Section, ObserveError> {
         Ok(setup.reference.as_ref().map(|plan| ReferenceSection {
             figures: ReferenceFigures::of(plan.reference.name(), plan.delay, &self.frames, self.depth_errors.figures()),
             frames: self.frames,

@@ -1,15 +1,18 @@
 //! Tracks frame by frame and over the whole run, and their errors against ground truth.
 
-use super::{Finished, FrameContext, ObserveError, Observer, Setup};
+mod sums;
+
+use super::tables::track_rows;
+use super::{Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
 use crate::evaluate::masks::{MovingErrors, MovingFigures, Overlaps};
 use crate::evaluate::objects::{ObjectErrors, ObjectFigures, TrackComparison, TrackErrors};
-use crate::evaluate::quantile::median;
 use crate::formats::Image;
 use dynvox_core::Mapper;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::{Class, MotionState, TrackReport};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use sums::TrackSums;
 
 /// Name of a motion state in tables and files.
 pub const fn state_name(state: MotionState) -> &'static str {
@@ -20,8 +23,8 @@ pub const fn state_name(state: MotionState) -> &'static str {
     }
 }
 
-/// A track seen in a frame. 64 bytes, so that a long run may have many.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// A track seen in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackRow {
     /// Its number.
     pub id: u32,
@@ -45,8 +48,6 @@ pub struct TrackRow {
     pub blocks: u32,
 }
 
-const _: () = assert!(size_of::<TrackRow>() <= 64);
-
 impl From<&TrackReport> for TrackRow {
     fn from(track: &TrackReport) -> Self {
         Self {
@@ -64,13 +65,19 @@ impl From<&TrackReport> for TrackRow {
     }
 }
 
-/// The tracks seen in a frame.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct FrameTracks {
-    /// Number of the frame in the data set.
-    pub frame: usize,
-    /// Its tracks, by age.
-    pub tracks: Vec<TrackRow>,
+/// A track's frames in a row that look alike in the report.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrackSpan {
+    /// Position of the first frame in the run.
+    pub from: usize,
+    /// Position after the last one.
+    pub to: usize,
+    /// The motion state.
+    pub state: MotionState,
+    /// Whether the motion was measured.
+    pub measured: bool,
+    /// Speed over ground in the last of them, m/s.
+    pub speed_m_s: Option<f32>,
 }
 
 /// A track over the whole run.
@@ -94,6 +101,8 @@ pub struct TrackRecord {
     pub speed_m_s: Option<f64>,
     /// Most blocks of its volume.
     pub blocks: u32,
+    /// Where it was seen, in stretches that look alike.
+    pub spans: Vec<TrackSpan>,
     /// Against ground truth, where it is known.
     pub errors: Option<TrackErrors>,
 }
@@ -101,8 +110,6 @@ pub struct TrackRecord {
 /// Tracks of a run.
 #[derive(Clone, Debug)]
 pub struct TracksSection {
-    /// Frame by frame.
-    pub frames: Vec<FrameTracks>,
     /// Each over the whole run, by number.
     pub tracks: Vec<TrackRecord>,
     /// All against ground truth, where it is known.
@@ -111,18 +118,40 @@ pub struct TracksSection {
     pub masks: Option<MovingFigures>,
     /// Every comparison with a true object, by frame and then by track.
     pub comparisons: Vec<(u32, TrackComparison)>,
+    /// Numbers of the frames compared, by position.
+    pub compared_frames: Vec<usize>,
 }
 
-/// Collects tracks.
-#[derive(Debug, Default, Serialize, Deserialize)]
+/// Collects tracks: their rows go to `tracks.csv`.
+#[derive(Debug, Serialize, Deserialize)]
 pub struct TracksObserver {
-    frames: Vec<FrameTracks>,
+    file: GrowingFile,
+    frames: usize,
+    tracks: BTreeMap<u32, TrackSums>,
     errors: ObjectErrors,
+    compared_frames: Vec<usize>,
     masks: MovingErrors,
+}
+
+impl Default for TracksObserver {
+    fn default() -> Self {
+        Self {
+            file: GrowingFile::new("tracks.csv"),
+            frames: 0,
+            tracks: BTreeMap::new(),
+            errors: ObjectErrors::default(),
+            compared_frames: Vec::new(),
+            masks: MovingErrors::default(),
+        }
+    }
 }
 
 impl Observer for TracksObserver {
     type Section = TracksSection;
+
+    fn files(&mut self) -> Vec<&mut GrowingFile> {
+        vec![&mut self.file]
+    }
 
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
         let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.detected).collect();
@@ -130,23 +159,32 @@ impl Observer for TracksObserver {
             let size = setup.dataset.size();
             let large_enough = |pixels: &PixelBox| setup.config.tracking.is_reconstructable(pixels.area(), size.0);
             self.errors.add(&tracks, &frame.row.report.t_world_camera, truth, size, large_enough);
+            self.compared_frames.push(frame.row.frame);
             if let Some(exact) = &frame.images.exact {
                 let (overlaps, by_motion) = overlaps(frame.view.mapper(), &exact.instances);
                 let large_enough = |pixels: u64| setup.config.tracking.is_trackable(pixels as i64, size.0);
                 self.masks.add(&overlaps, &truth.objects, &truth.t_world_camera, large_enough, |label| by_motion.contains(&label));
             }
         }
-        self.frames.push(FrameTracks { frame: frame.row.frame, tracks: tracks.iter().map(TrackRow::from).collect() });
+        let rows: Vec<TrackRow> = tracks.iter().map(TrackRow::from).collect();
+        let text = track_rows(frame.row.frame, &rows, self.file.is_empty());
+        self.file.append(&text.map_err(|source| ObserveError::Write { path: self.file.path(&setup.folder), source })?);
+        for row in &rows {
+            let sums = self.tracks.entry(row.id).or_insert_with(|| TrackSums::begin(frame.row.frame));
+            sums.add(frame.row.frame, self.frames, row);
+        }
+        self.frames += 1;
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished<'_>) -> Result<TracksSection, ObserveError> {
+    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<TracksSection, ObserveError> {
+        let errors = self.errors.tracks();
         Ok(TracksSection {
-            tracks: track_records(&self.frames, &self.errors.tracks()),
+            tracks: self.tracks.into_iter().map(|(id, sums)| sums.record(id, errors.get(&id))).collect(),
             figures: self.errors.figures(),
             masks: self.masks.figures(),
             comparisons: self.errors.comparisons(),
-            frames: self.frames,
+            compared_frames: self.compared_frames,
         })
     }
 }
@@ -165,35 +203,4 @@ fn overlaps(mapper: &Mapper<'_>, exact: &Image<u8>) -> (Overlaps, BTreeSet<u16>)
     let moving = labels.iter().filter(|((_, class), _)| *class == Class::MovingObject);
     by_motion.extend(moving.map(|(_, label)| *label));
     (overlaps, by_motion)
-}
-
-/// Every track over all frames.
-fn track_records(frames: &[FrameTracks], errors: &BTreeMap<u32, TrackErrors>) -> Vec<TrackRecord> {
-    let mut seen = BTreeMap::<u32, Vec<(usize, &TrackRow)>>::new();
-    for (frame, track) in frames.iter().flat_map(|frame| frame.tracks.iter().map(|track| (frame.frame, track))) {
-        seen.entry(track.id).or_default().push((frame, track));
-    }
-    let record = |(id, seen): (u32, Vec<(usize, &TrackRow)>)| {
-        let of = |state: MotionState| seen.iter().filter(move |(_, track)| track.state == state);
-        let states = [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(|state| of(state).count());
-        let state = match states {
-            [_, 0, 0] => MotionState::Uncertain,
-            [_, still, moving] if moving > still => MotionState::Dynamic,
-            _ => MotionState::Static,
-        };
-        let (first, last) = (seen.first()?, seen.last()?);
-        Some(TrackRecord {
-            id,
-            class: last.1.class,
-            first_frame: first.0,
-            last_frame: last.0,
-            frames: seen.len(),
-            states,
-            state,
-            speed_m_s: median(of(state).filter_map(|(_, track)| track.speed_m_s.map(|[speed, _]| f64::from(speed)))),
-            blocks: seen.iter().map(|(_, track)| track.blocks).max().unwrap_or_default(),
-            errors: errors.get(&id).cloned(),
-        })
-    };
-    seen.into_iter().filter_map(record).collect()
 }

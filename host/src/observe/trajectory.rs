@@ -1,10 +1,15 @@
-//! The camera's path.
+//! The camera's path: written to `trajectory_kitti.txt` and `trajectory_tum.txt` as it comes, and kept in memory only where it is compared with
+//! true poses, which are there as well.
 
-use super::{Finished, FrameContext, ObserveError, Observer, Setup};
+use super::{Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
 use crate::evaluate::trajectory::{TrajectoryErrors, errors};
+use crate::formats::{kitti_line, tum_line};
 use dynvox_core::egomotion::icp::IcpStatus;
 use dynvox_core::geometry::Transform;
 use serde::{Deserialize, Serialize};
+
+/// Points kept of the path, at most.
+const MOST_POINTS: usize = 4096;
 
 /// Frames the depth tracker lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,11 +27,9 @@ pub struct TrackingFailures {
 pub struct TrajectorySection {
     /// Where the motion came from: `stereo`, `icp` or `file`.
     pub source: &'static str,
-    /// Time of each frame, s.
-    pub times_s: Vec<f64>,
-    /// `t_world_camera` of each frame.
-    pub poses: Vec<Transform>,
-    /// True poses of the same frames, the first at the origin, where they are known.
+    /// Where the camera was, thinned for a chart.
+    pub path: ThinnedPath,
+    /// True poses of the frames, the first at the origin, where they are known.
     pub truth: Option<Vec<Transform>>,
     /// Errors against them.
     pub errors: Option<TrajectoryErrors>,
@@ -36,37 +39,105 @@ pub struct TrajectorySection {
     pub failures: Option<TrackingFailures>,
 }
 
+/// A path with at most [`MOST_POINTS`] points: every so many frames one, and the last frame's.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ThinnedPath {
+    points_m: Vec<[f64; 3]>,
+    /// Frames from one point to the next: 2 to the power of this.
+    doublings: u32,
+    frames: usize,
+    last_m: Option<[f64; 3]>,
+    length_m: f64,
+}
+
+impl ThinnedPath {
+    fn add(&mut self, position_m: [f64; 3]) {
+        if self.frames.is_multiple_of(1 << self.doublings) {
+            if self.points_m.len() == MOST_POINTS {
+                self.points_m = self.points_m.iter().step_by(2).copied().collect();
+                self.doublings += 1;
+            }
+            self.points_m.push(position_m);
+        }
+        let step = self.last_m.map(|last| nalgebra::Vector3::from(position_m) - nalgebra::Vector3::from(last));
+        self.length_m += step.map_or(0.0, |step| step.norm());
+        self.last_m = Some(position_m);
+        self.frames += 1;
+    }
+
+    /// Its points, m, the last frame's at the end.
+    pub fn points_m(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.points_m.iter().copied().chain(self.last_m)
+    }
+
+    /// Distance travelled, frame by frame, m.
+    pub fn length_m(&self) -> f64 {
+        self.length_m
+    }
+}
+
 /// Collects poses.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct TrajectoryObserver {
-    times_s: Vec<f64>,
-    poses: Vec<Transform>,
+    kitti: GrowingFile,
+    tum: GrowingFile,
+    path: ThinnedPath,
+    /// Number and pose of each frame, where true poses are known.
+    compared: Vec<(usize, Transform)>,
     held_frames: usize,
+    /// Frames the depth tracker lost, and number and cause of the first.
+    lost_frames: usize,
+    first_lost: Option<(usize, IcpStatus)>,
+}
+
+impl Default for TrajectoryObserver {
+    fn default() -> Self {
+        Self {
+            kitti: GrowingFile::new("trajectory_kitti.txt"),
+            tum: GrowingFile::new("trajectory_tum.txt"),
+            path: ThinnedPath::default(),
+            compared: Vec::new(),
+            held_frames: 0,
+            lost_frames: 0,
+            first_lost: None,
+        }
+    }
 }
 
 impl Observer for TrajectoryObserver {
     type Section = TrajectorySection;
 
-    fn frame(&mut self, _: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
-        self.times_s.push(frame.row.time_s);
-        self.poses.push(frame.row.report.t_world_camera);
-        self.held_frames += usize::from(frame.row.held());
+    fn files(&mut self) -> Vec<&mut GrowingFile> {
+        vec![&mut self.kitti, &mut self.tum]
+    }
+
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        let (row, pose) = (frame.row, frame.row.report.t_world_camera);
+        self.kitti.append(kitti_line(&pose).as_bytes());
+        let time_ns = row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64);
+        self.tum.append(tum_line(time_ns, &pose).as_bytes());
+        self.path.add(pose.translation_m);
+        if setup.dataset.truth().is_some() {
+            self.compared.push((row.frame, pose));
+        }
+        self.held_frames += usize::from(row.held());
+        if let Some(status) = row.report.icp.map(|icp| icp.status).filter(|status| *status != IcpStatus::Tracked) {
+            self.lost_frames += 1;
+            self.first_lost.get_or_insert((row.frame, status));
+        }
         Ok(())
     }
 
-    fn finish(self, setup: &Setup<'_>, finished: &Finished<'_>) -> Result<TrajectorySection, ObserveError> {
-        let frames: Vec<usize> = finished.rows.iter().map(|row| row.frame).collect();
+    fn finish(self, setup: &Setup<'_>, _: &Finished) -> Result<TrajectorySection, ObserveError> {
+        let (frames, poses): (Vec<usize>, Vec<Transform>) = self.compared.into_iter().unzip();
         let truth = setup.dataset.truth().map(|truth| from_first(truth, &frames));
-        let statuses = finished.rows.iter().filter_map(|row| Some((row.frame, row.report.icp?.status)));
-        let lost: Vec<(usize, IcpStatus)> = statuses.filter(|(_, status)| *status != IcpStatus::Tracked).collect();
         Ok(TrajectorySection {
             source: setup.motion_source,
-            errors: truth.as_ref().and_then(|truth| errors(truth, &self.poses)),
+            path: self.path,
+            errors: truth.as_ref().and_then(|truth| errors(truth, &poses)),
             truth,
-            times_s: self.times_s,
-            poses: self.poses,
             held_frames: self.held_frames,
-            failures: lost.first().map(|&(first, status)| TrackingFailures { frames: lost.len(), first, cause: status.name() }),
+            failures: self.first_lost.map(|(first, status)| TrackingFailures { frames: self.lost_frames, first, cause: status.name() }),
         })
     }
 }
@@ -76,4 +147,19 @@ pub fn from_first(poses: &[Transform], indices: &[usize]) -> Vec<Transform> {
     let chosen: Vec<Transform> = indices.iter().filter_map(|&index| poses.get(index).copied()).collect();
     let Some(first) = chosen.first().map(Transform::inverse) else { return Vec::new() };
     chosen.iter().map(|pose| first * pose).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_path_is_thinned_and_keeps_its_length_and_its_end() {
+        let mut path = ThinnedPath::default();
+        (0..10_000).for_each(|at| path.add([0.0, 0.0, 0.5 * f64::from(at)]));
+        let points: Vec<[f64; 3]> = path.points_m().collect();
+        assert!(points.len() <= MOST_POINTS && path.doublings == 2, "{}", points.len());
+        assert_eq!((points[1][2], points[points.len() - 1][2], path.length_m()), (2.0, 4_999.5, 4_999.5));
+        assert_eq!(ThinnedPath::default().points_m().count(), 0);
+    }
 }

@@ -1,5 +1,6 @@
 //! The last lines of a run on the console.
 
+use super::bounds;
 use super::rig;
 use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time};
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
@@ -24,6 +25,7 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     }
     lines.extend(tracks.masks.iter().map(|masks| ("moving objects", moving_masks(masks))));
     lines.extend(block_lines(run));
+    lines.push(("memory", bounds::sentence(run)));
     lines.extend(pose_lines(run));
     lines.push((if rig::is_warning(run) { "calibration WARNING" } else { "calibration" }, rig::sentence(run)));
     lines.push(("digest", format!("{:016x}", run.digest())));

@@ -1,5 +1,6 @@
 //! What a run leaves behind: tables, the summary, the page and the last lines on the console; and two runs compared by their tables.
 
+pub mod bounds;
 pub mod chart;
 pub mod compare;
 mod console;
@@ -10,5 +11,5 @@ mod summary;
 pub mod text;
 
 pub use console::summary_lines;
-pub use csv::{write_frames, write_reference, write_tracks, write_tracks_truth};
+pub use csv::{write_reference, write_tracks_truth};
 pub use summary::Summary;

@@ -1,5 +1,6 @@
 //! `summary.json`: the figures of a run under fixed keys. A key is absent where its value is unknown.
 
+use super::bounds::CapacitySummary;
 use super::rig::RigSummary;
 use crate::evaluate::masks::MovingFigures;
 use crate::evaluate::objects::{ObjectFigures, TrackErrors};
@@ -41,6 +42,8 @@ pub struct Summary {
     /// Masks of what moves against exact ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     masks_truth: Option<MovingFigures>,
+    /// What was needed of each bound, and the least capacity that would have held the run.
+    capacity: CapacitySummary,
     map: MapSummary,
     prune: PruneSummary,
     evict: EvictSummary,
@@ -203,13 +206,14 @@ impl Summary {
             incomplete: run.incomplete.clone(),
             slab_bytes: run.header.slab_bytes,
             rss_peak_bytes: run.rss_peak_bytes,
-            stages: run.stage_statistics().into_iter().map(|(name, of)| (name, stage(of))).collect(),
+            stages: run.frames.stage_statistics().into_iter().map(|(name, of)| (name, stage(of))).collect(),
             egomotion: EgomotionSummary::of(&sections.trajectory),
             rig: super::rig::summary(run),
             lidar: sections.reference.as_ref().and_then(|reference| reference.figures.clone()),
             objects: sections.tracks.tracks.iter().map(|track| ObjectSummary::of(track, &sections.objects.objects)).collect(),
             objects_truth: sections.tracks.figures.clone(),
             masks_truth: sections.tracks.masks.clone(),
+            capacity: super::bounds::summary(run),
             map: MapSummary {
                 blocks: sections.blocks.blocks,
                 blocks_peak: sections.blocks.totals.peak,

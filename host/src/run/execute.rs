@@ -26,6 +26,13 @@ pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> R
     let mut slab = HostSlab::map(slab_bytes).ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
     let Mapped { setup, mut state, mut since, regions, blocks, pruned, output, mut incomplete } =
         map(plan, slab.bytes_mut(), folder, checkpoint)?;
+    if !state.sync(folder.path()).is_empty() {
+        // What was kept for this moment is enough for the last rows.
+        folder.release_reserve();
+        for (name, error) in state.sync(folder.path()) {
+            Incomplete::add_missing(&mut incomplete, &name, &error.to_string());
+        }
+    }
     // The mapper is gone: its slab serves to read the map piece by piece.
     let (written, store) = output.finish(slab.bytes_mut(), (&plan.capacity, &plan.config), folder);
     let mesh = written.unwrap_or_else(|error| {
@@ -33,7 +40,7 @@ pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> R
         Mesh::default()
     });
     let mesh_path = folder.file(MAP_FILE);
-    let finished = Finished { rows: &state.rows, regions, blocks, pruned, mesh, mesh_path, store };
+    let finished = Finished { regions, blocks, pruned, mesh, mesh_path, store };
     let sections = std::mem::take(&mut state.observers).finish(&setup, &finished)?;
     for name in &sections.objects.unwritten {
         Incomplete::add_missing(&mut incomplete, &format!("objects/{name}.ply"), "an object could not be written");
@@ -42,7 +49,7 @@ pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> R
     state.timers.add_since(&mut since);
     Ok(RunRecord {
         header: header(plan),
-        frames: state.rows,
+        frames: state.frames,
         skipped: state.skipped,
         dropped: plan.dataset.stream().map_or(0, |stream| stream.dropped),
         incomplete,

@@ -7,8 +7,11 @@ use super::state::RunState;
 use super::view::LiveMap;
 use super::{FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes, stereo_frame};
 use crate::input::{InputError, InstanceMask, StereoImages};
-use crate::observe::{EndContext, FrameContext, FrameRow, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy, from_first};
+use crate::observe::{
+    EndContext, FrameContext, FrameRow, ObserveError, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy, from_first,
+};
 use dynvox_core::geometry::Transform;
+use dynvox_core::image::View;
 use dynvox_core::objects::{ObjectSink, RetiredObject};
 use dynvox_core::tracking::{Detection, MotionState};
 use dynvox_core::volume::PruneReport;
@@ -58,6 +61,7 @@ impl<'p, 's> Session<'p, 's> {
         let mut session = Self::with(plan, folder, mapper, store, checkpoint.state, since)?;
         session.check_last_frame()?;
         session.state.observers.resume(&session.setup)?;
+        session.state.resume(&session.setup.folder)?;
         Ok(session)
     }
 
@@ -84,7 +88,7 @@ impl<'p, 's> Session<'p, 's> {
 
     /// Refuses a data set whose last mapped frame changed since the checkpoint.
     fn check_last_frame(&self) -> Result<(), RunError> {
-        let Some(row) = self.state.rows.last() else { return Ok(()) };
+        let Some(row) = self.state.frames.last() else { return Ok(()) };
         let position = self.plan.frames.position_of(row.frame).unwrap_or_default();
         let images = self.plan.dataset.frame(row.frame)?;
         let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
@@ -114,9 +118,9 @@ impl<'p, 's> Session<'p, 's> {
         let mapped = read_ahead(plan.dataset.as_ref(), remaining, plan.skip_bad_frames, |read| self.take(read, &progress));
         progress.finish();
         let Err(error) = mapped else {
-            return if self.state.rows.is_empty() { Err(self.no_frame()) } else { Ok(None) };
+            return if self.state.frames.is_empty() { Err(self.no_frame()) } else { Ok(None) };
         };
-        if self.state.rows.is_empty() {
+        if self.state.frames.is_empty() {
             return Err(error);
         }
         // After a failed observation the state is not that of one frame.
@@ -149,7 +153,7 @@ impl<'p, 's> Session<'p, 's> {
             match plan.stop.signal() {
                 // Of a stream this is the usual end.
                 Some(_) if open => return Ok(()),
-                Some(signal) => return Err(RunError::Signal { signal, frames: self.state.rows.len() }),
+                Some(signal) => return Err(RunError::Signal { signal, frames: self.state.frames.len() }),
                 None => {}
             }
             let (position, index) = (frame.position, frame.index);
@@ -171,19 +175,20 @@ impl<'p, 's> Session<'p, 's> {
     fn frame(&mut self, read: ReadFrame, progress: &Progress) -> Result<(), RunError> {
         let (position, index) = (read.position, read.index);
         let failed_before = (self.store.failure().is_some(), self.state.observers.failure().is_some());
-        let (row, retired, images) = self.step(read)?;
+        let (mut row, retired, images) = self.step(read)?;
         self.state.timers.add_since(&mut self.since);
         self.state.taken = position + 1;
-        self.push(row);
-        let RunState { rows, observers, timers, .. } = &mut self.state;
-        let (done, Some(row)) = (rows.len(), rows.last_mut()) else { return Ok(()) };
+        let RunState { frames, observers, timers, .. } = &mut self.state;
         let blocks = row.report.blocks;
-        let fps = done as f64 / timers.mapping().as_secs_f64();
+        let fps = (frames.len() + 1) as f64 / timers.mapping().as_secs_f64();
         progress.frame(position + 1, fps, f64::from(blocks.used) / f64::from(blocks.capacity), row.held());
         let mut view = LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
-        let mut context = FrameContext { position, row: &*row, images: &images, retired: &retired, view: &mut view };
-        observers.frame(&self.setup, &mut context)?;
+        let mut context = FrameContext { position, row: &row, images: &images, retired: &retired, view: &mut view };
+        let observed = observers.frame(&self.setup, &mut context);
         row.stages[Stage::Raycast as usize] = view.first_raycast.unwrap_or_default();
+        frames.add(row).map_err(|source| ObserveError::Write { path: frames.file().path(&self.setup.folder), source })?;
+        observed?;
+        self.state.write_due(&self.setup.folder)?;
         self.warn_of_disk(index, failed_before, progress);
         self.check_limits()?;
         if self.plan.checkpoints.as_ref().is_some_and(|plan| (position + 1).is_multiple_of(plan.every)) {
@@ -191,17 +196,6 @@ impl<'p, 's> Session<'p, 's> {
         }
         self.state.timers.overhead += self.since.elapsed();
         Ok(())
-    }
-
-    /// Adds a row. With the first one memory for all is taken, so that growth during the run is a leak.
-    fn push(&mut self, row: FrameRow) {
-        let rows = &mut self.state.rows;
-        if let Some(frames) = self.plan.frames.count().filter(|&frames| rows.capacity() < frames) {
-            let len = rows.len();
-            rows.resize(frames, row.clone());
-            rows.truncate(len);
-        }
-        rows.push(row);
     }
 
     /// Warns of a disk that refused for the first time in this frame.
@@ -243,6 +237,7 @@ impl<'p, 's> Session<'p, 's> {
             report,
             history_frames: self.mapper.background().history().len(),
             track_states: [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(tracks_in),
+            disparity_mean_px: mean_px(self.mapper.disparity_q8()),
             mask_refusals: images.masks.refusals,
             depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count()) + report.stereo.refused,
             step_ms: 0.0,
@@ -253,7 +248,7 @@ impl<'p, 's> Session<'p, 's> {
 
     /// Ends a run whose last frame went beyond its limits.
     fn check_limits(&self) -> Result<(), RunError> {
-        let Some(row) = self.state.rows.last() else { return Ok(()) };
+        let Some(row) = self.state.frames.last() else { return Ok(()) };
         if self.plan.strict && row.severity() >= Severity::MapAffected {
             return Err(RunError::Strict { frame: row.frame, cause: row.cause() });
         }
@@ -273,6 +268,9 @@ impl<'p, 's> Session<'p, 's> {
 
     fn write_checkpoint(&mut self) -> Result<(), FolderError> {
         let Some(plan) = &self.plan.checkpoints else { return Ok(()) };
+        if let Some((_, ObserveError::Write { path, source })) = self.state.sync(&self.setup.folder).into_iter().next() {
+            return Err(FolderError::Write { path, source });
+        }
         let position = self.store.position();
         let blocks = position.map_err(|source| FolderError::Write { path: self.folder.file(BLOCKS_FILE), source })?;
         checkpoint::write(self.folder, &plan.manifest, blocks, &self.state, &mut self.mapper)
@@ -282,9 +280,17 @@ impl<'p, 's> Session<'p, 's> {
     pub fn end(&mut self) -> Result<PruneReport, RunError> {
         let mut retired = RetiredVolumes::default();
         let pruned = self.mapper.finish_with(&mut retired);
+        let RunState { frames, observers, .. } = &mut self.state;
         let mut view = LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
-        let mut context = EndContext { rows: &self.state.rows, retired: &retired.0, view: &mut view };
-        self.state.observers.end(&self.setup, &mut context)?;
+        let mut context = EndContext { last: frames.last(), retired: &retired.0, view: &mut view };
+        observers.end(&self.setup, &mut context)?;
         Ok(pruned)
     }
+}
+
+/// Mean of the disparities that are known, px.
+fn mean_px(disparity_q8: View<'_, u16>) -> Option<f64> {
+    let known = disparity_q8.rows().flatten().filter(|disparity| **disparity > 0);
+    let (sum, count) = known.fold((0u64, 0u64), |(sum, count), disparity| (sum + u64::from(*disparity), count + 1));
+    (count > 0).then(|| sum as f64 / count as f64 / 256.0)
 }

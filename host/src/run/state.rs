@@ -1,19 +1,42 @@
 //! The state of a run next to its mapper, as plain data: all of it goes into a checkpoint.
 
 use super::SkippedFrames;
-use crate::observe::{FrameRow, Observers};
+use crate::observe::{FrameLog, GrowingFile, ObserveError, Observer, Observers};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Rows, observers, timers. What follows from the plan (settings, folders) is not here.
+/// Frames, observers, timers. What follows from the plan (settings, folders) is not here.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct RunState {
-    pub rows: Vec<FrameRow>,
+    pub frames: FrameLog,
     /// Frames taken from the source, those left out included.
     pub taken: usize,
     pub skipped: SkippedFrames,
     pub observers: Observers,
     pub timers: Timers,
+}
+
+impl RunState {
+    /// The files that grow frame by frame.
+    fn files(&mut self) -> Vec<&mut GrowingFile> {
+        std::iter::once(self.frames.file()).chain(self.observers.files()).collect()
+    }
+
+    /// Writes rows that are due.
+    pub fn write_due(&mut self, folder: &Path) -> Result<(), ObserveError> {
+        self.files().into_iter().try_for_each(|file| file.write_due(folder))
+    }
+
+    /// Writes all rows, and waits until they are on the disk. Returns the files that cannot be written, and why.
+    pub fn sync(&mut self, folder: &Path) -> Vec<(String, ObserveError)> {
+        self.files().into_iter().filter_map(|file| Some((file.name().to_owned(), file.sync(folder).err()?))).collect()
+    }
+
+    /// Brings the rows on disk back to those of the checkpoint.
+    pub fn resume(&mut self, folder: &Path) -> Result<(), ObserveError> {
+        self.files().into_iter().try_for_each(|file| file.resume(folder))
+    }
 }
 
 /// Time a run took so far, that before an interruption included.

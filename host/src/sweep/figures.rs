@@ -88,13 +88,14 @@ fn prune(rows: &[Row<'_>]) -> Markup {
 
 /// Blocks in use frame by frame, a line for each value.
 fn over_time(rows: &[Row<'_>]) -> Markup {
-    let frames = rows.iter().filter_map(|(_, result)| Some(result.as_ref()?.blocks.len())).max().unwrap_or_default();
+    let results = || rows.iter().filter_map(|(_, result)| result.as_ref());
+    let frames = results().map(|result| result.blocks.len() * result.blocks_every).max().unwrap_or_default();
     if frames < 2 {
         return html! {};
     }
     let times: Vec<usize> = (0..TIMES).map(|nth| nth * (frames - 1) / (TIMES - 1)).collect();
     let curve = |(colour, (point, result)): (usize, &Row<'_>)| {
-        let blocks = |&at: &usize| Some(f64::from(*result.as_ref()?.blocks.get(at)?) / 1e3);
+        let blocks = |&at: &usize| result.as_ref().and_then(|result| Some(f64::from(*result.blocks.get(at / result.blocks_every)?) / 1e3));
         (point.value.clone(), colour, times.iter().map(blocks).collect::<Vec<_>>())
     };
     let curves: Vec<_> = rows.iter().enumerate().map(curve).collect();

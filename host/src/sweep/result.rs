@@ -2,6 +2,7 @@
 
 use super::SweepError;
 use crate::evaluate::reference::{EvaluatedFrame, Region};
+use crate::observe::Charted;
 use crate::report::Summary;
 use crate::run::{RunRecord, write_whole};
 use serde::{Deserialize, Serialize};
@@ -18,8 +19,16 @@ pub struct RunResult {
     pub summary: Value,
     /// Evaluated frames.
     pub samples: Vec<FrameSample>,
-    /// Blocks in use after each frame.
+    /// Most blocks in use after each frame, or each few frames of a long run.
     pub blocks: Vec<u32>,
+    /// How many frames that are.
+    #[serde(default = "one")]
+    pub blocks_every: usize,
+}
+
+/// What earlier results have for `blocks_every`.
+const fn one() -> usize {
+    1
 }
 
 /// Accuracy and completeness of one evaluated frame, static region.
@@ -50,11 +59,13 @@ impl RunResult {
     /// # Errors
     /// The summary cannot be turned into JSON.
     pub fn of(arguments: &[String], run: &RunRecord) -> Result<Self, serde_json::Error> {
+        let charts = run.frames.charts();
         Ok(Self {
             arguments: arguments.to_vec(),
             summary: serde_json::to_value(Summary::of(run))?,
             samples: run.sections.reference.iter().flat_map(|reference| &reference.frames).map(FrameSample::of).collect(),
-            blocks: run.frames.iter().map(|row| row.report.blocks.used).collect(),
+            blocks: charts.series(Charted::BlocksUsed).into_iter().map(|blocks| blocks as u32).collect(),
+            blocks_every: charts.frames_per_point(),
         })
     }
 

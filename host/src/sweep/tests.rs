@@ -33,6 +33,7 @@ fn result(arguments: &[String], digest: &str, accuracy: f64) -> RunResult {
             .map(|accuracy| FrameSample { frame: 1, accuracy: [Some(accuracy); 2], completeness: [Some(0.9), None] })
             .to_vec(),
         blocks: vec![10, 20, 30],
+        blocks_every: 1,
     }
 }
 

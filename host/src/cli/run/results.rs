@@ -1,6 +1,5 @@
-//! The files of a run folder, after the map and the objects. A file that the disk refuses is missing, and the others are written.
+//! The files of a run folder that are written at the end, after the map and the objects. A file that the disk refuses is missing, and the others are written.
 
-use crate::formats;
 use crate::report::{self, Summary};
 use crate::run::{FolderError, Incomplete, RunFolder, RunRecord};
 use std::fs::File;
@@ -30,18 +29,14 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
     Ok(summary)
 }
 
-/// The files that are tables and text, by name.
+/// Tables and text, by name.
 fn files(run: &RunRecord) -> Vec<(&'static str, Writer<'_>)> {
     let sections = &run.sections;
-    let poses = &sections.trajectory.poses;
-    let stamps_ns = || run.frames.iter().map(|row| row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64)).collect::<Vec<_>>();
-    let mut files: Vec<(&'static str, Writer<'_>)> = vec![
-        ("config.toml", Box::new(|out| out.write_all(run.header.config_toml.as_bytes()))),
-        ("trajectory_kitti.txt", Box::new(|out| formats::write_kitti(out, poses))),
-        ("trajectory_tum.txt", Box::new(move |out| formats::write_tum(out, &stamps_ns(), poses))),
-        ("frames.csv", Box::new(|out| report::write_frames(out, &run.frames))),
-        ("tracks.csv", Box::new(|out| report::write_tracks(out, &sections.tracks.frames))),
-    ];
+    let mut files: Vec<(&'static str, Writer<'_>)> =
+        vec![("config.toml", Box::new(|out| out.write_all(run.header.config_toml.as_bytes())))];
+    if let Ok(text) = report::bounds::capacity_toml(run) {
+        files.push(("capacity.toml", Box::new(move |out| out.write_all(text.as_bytes()))));
+    }
     if let Some(text) = report::rig::calibration_toml(run) {
         files.push(("calibration.toml", Box::new(move |out| out.write_all(text.as_bytes()))));
     }

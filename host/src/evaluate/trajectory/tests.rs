@@ -1,5 +1,5 @@
 use super::*;
-use crate::formats::{Trajectory, write_kitti, write_tum};
+use crate::formats::{Trajectory, kitti_line, tum_line};
 use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 use std::path::Path;
@@ -105,14 +105,14 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
     let poses = arc(12, Transform::new(Vector3::new(0.01, 0.03, 0.0), Vector3::new(0.1, 0.0, 1.0)));
     let times_ns: Vec<u64> = (0..12).map(|at| 100_000_000_000 + 100_000_000 * at).collect();
     let times: Vec<f64> = times_ns.iter().map(|&ns| ns as f64 / 1e9).collect();
-    let write = |name: &str, write: &dyn Fn(&mut Vec<u8>)| {
-        let mut text = b"# a comment\n".to_vec();
-        write(&mut text);
-        std::fs::write(folder.path().join(name), text).unwrap();
+    let write = |name: &str, lines: &[String]| {
+        std::fs::write(folder.path().join(name), format!("# a comment\n{}", lines.concat())).unwrap();
         folder.path().join(name)
     };
-    let kitti = read_trajectory(&write("kitti.txt", &|out| write_kitti(out, &poses).unwrap())).unwrap();
-    let tum = read_trajectory(&write("trajectory_tum.txt", &|out| write_tum(out, &times_ns, &poses).unwrap())).unwrap();
+    let kitti_lines: Vec<String> = poses.iter().map(kitti_line).collect();
+    let tum_lines: Vec<String> = times_ns.iter().zip(&poses).map(|(time_ns, pose)| tum_line(*time_ns, pose)).collect();
+    let kitti = read_trajectory(&write("kitti.txt", &kitti_lines)).unwrap();
+    let tum = read_trajectory(&write("trajectory_tum.txt", &tum_lines)).unwrap();
     assert_eq!((&kitti.times_s, tum.times_s.as_deref()), (&None, Some(&times[..])));
     let (a, b) = matched(&kitti, &tum).unwrap();
     assert!(errors(&a, &b).unwrap().ate_m < 1e-9, "one trajectory in two formats");
@@ -130,10 +130,7 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
         ..half
     };
     assert!(matched(&late, &tum).unwrap_err().to_string().contains("same clock"));
-    let mixed = write("mixed.txt", &|out| {
-        write_kitti(out, &poses[..1]).unwrap();
-        write_tum(out, &times_ns, &poses[..1]).unwrap();
-    });
+    let mixed = write("mixed.txt", &[kitti_lines[0].clone(), tum_lines[0].clone()]);
     assert!(read_trajectory(&mixed).unwrap_err().to_string().contains("line 3 is of another format"));
     assert!(read_trajectory(&folder.path().join("none")).unwrap_err().to_string().contains("cannot be read"));
 }

@@ -28,6 +28,7 @@ struct FrameColumns {
     icp_held: Option<f64>,
     features_dropped: u32,
     stereo_density: f64,
+    disparity_mean_px: Option<f64>,
     depth_refused: u32,
     rss_bytes: Option<u64>,
 }
@@ -125,6 +126,15 @@ pub struct FrameDigests {
     pub background_digest: String,
     /// Digests of the objects: `id:digest` with `;` between two, or `-`.
     pub objects_digest: String,
+    /// Share of pixels with a disparity.
+    #[serde(default)]
+    pub stereo_density: f64,
+    /// Their mean disparity, px.
+    #[serde(default)]
+    pub disparity_mean_px: Option<f64>,
+    /// Blocks in use.
+    #[serde(default)]
+    pub blocks_used: u32,
 }
 
 /// The row of a frame, with the header before the first.
@@ -167,6 +177,7 @@ fn frame_columns(row: &FrameRow) -> FrameColumns {
         icp_held: icp.map(|icp| rounded(icp.held, 5)),
         features_dropped: row.report.dropped_features(),
         stereo_density: rounded(f64::from(row.report.stereo.density()), 4),
+        disparity_mean_px: row.disparity_mean_px.map(|mean_px| rounded(mean_px, 4)),
         depth_refused: row.depth_refused,
         rss_bytes: row.rss_bytes,
     }

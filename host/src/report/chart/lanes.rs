@@ -36,9 +36,10 @@ pub struct Lane {
     pub truth: Vec<Bar>,
 }
 
-/// Lanes over frames with these numbers; `styles` are explained in the legend.
-pub fn lanes(frames: &[usize], lanes: &[Lane], label: &str, styles: &[&'static str]) -> Markup {
-    let count = frames.len().max(1) as f64;
+/// Lanes over so many frames, of which some have these numbers, evenly spread; `styles` are explained in the legend.
+pub fn lanes(frames: &[usize], count: usize, lanes: &[Lane], label: &str, styles: &[&'static str]) -> Markup {
+    let count = count.max(1) as f64;
+    let per_number = (count / frames.len().max(1) as f64).ceil() as usize;
     let x = |at: usize| LEFT + (WHOLE - LEFT - RIGHT) * at as f64 / count;
     let width = |bar: &Bar| (x(bar.to) - x(bar.from)).max(1.0);
     let base = ROW * lanes.len() as f64;
@@ -61,7 +62,7 @@ pub fn lanes(frames: &[usize], lanes: &[Lane], label: &str, styles: &[&'static s
             @for tick in 0..=6 {
                 @let at = tick * frames.len().saturating_sub(1) / 6;
                 @let frame = frames.get(at).copied().unwrap_or_default();
-                text x=(px(x(at))) y=(px(base + 16.0)) text-anchor=(if tick == 6 { "end" } else { "start" }) {
+                text x=(px(x(at * per_number))) y=(px(base + 16.0)) text-anchor=(if tick == 6 { "end" } else { "start" }) {
                     @if tick == 0 { "frame " } (frame)
                 }
             }

@@ -49,6 +49,6 @@ fn lanes_have_a_bar_for_each_stretch_and_text_only_where_it_fits() {
     let bar = |from, to| Bar { from, to, style: "dynamic", pale: false, text: Some("3 m/s".to_owned()) };
     let lane = Lane { name: "car 1".to_owned(), bars: vec![bar(0, 1), bar(10, 90)], truth: vec![] };
     let frames: Vec<usize> = (0..100).collect();
-    let drawn = lanes(&frames, &[lane], "tracks over frames", &["dynamic"]).into_string();
+    let drawn = lanes(&frames, 100, &[lane], "tracks over frames", &["dynamic"]).into_string();
     assert_eq!((drawn.matches("<rect").count(), drawn.matches("3 m/s").count()), (2, 1));
 }

@@ -1,6 +1,11 @@
 //! Two runs compared: the first frame and stage in which they diverge.
 
-use super::csv::{FrameDigests, read_frame_digests};
+mod distance;
+
+pub use distance::{Distance, Outcome};
+
+use crate::formats::read_poses;
+use crate::observe::tables::{FrameDigests, read_frame_digests};
 use crate::run::settings::{Setting, differing, settings};
 use dynvox_core::StageDigests;
 use dynvox_core::{Digested, ObjectDigest, ObjectDigests};
@@ -46,17 +51,19 @@ pub enum CompareError {
     },
 }
 
-/// The digests of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What is compared of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// Digest of all stages.
     pub digest: u64,
     /// Digest of each stage.
     pub stages: StageDigests,
+    /// The outcome that they are of.
+    pub outcome: Outcome,
 }
 
 /// A run, as far as it can be compared.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RunDigests {
     /// The frames, by number.
     pub rows: BTreeMap<usize, Row>,
@@ -64,17 +71,21 @@ pub struct RunDigests {
     pub settings: BTreeMap<String, String>,
 }
 
-/// The first difference of two runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The first difference of two runs, and how far they are apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {
     /// The first frame that differs.
     pub frame: usize,
     /// The first stage that differs in it; `None` where only the digest of all does.
     pub stage: Option<Digested>,
+    /// How far apart the outcomes are there.
+    pub there: Distance,
+    /// How far apart they are at most, in any frame.
+    pub most: Distance,
 }
 
 /// Two runs compared.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// Settings that differ.
     pub settings: Vec<Setting>,
@@ -121,7 +132,12 @@ impl RunDigests {
                 settings.insert(format!("({key})"), value.to_owned());
             }
         }
-        Ok(Self { rows: read_rows(&frames, &folder.join("frames.csv"))?, settings })
+        let mut rows = read_rows(&frames, &folder.join("frames.csv"))?;
+        let poses = read_poses(&folder.join("trajectory_kitti.txt")).map(|trajectory| trajectory.poses).unwrap_or_default();
+        if poses.len() == rows.len() {
+            rows.values_mut().zip(poses).for_each(|(row, pose)| row.outcome.pose = Some(pose));
+        }
+        Ok(Self { rows, settings })
     }
 
     fn frames(&self) -> [usize; 3] {
@@ -136,10 +152,16 @@ impl RunDigests {
 /// They share none.
 pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareError> {
     let shared = || a.rows.iter().filter_map(|(frame, row)| Some((*frame, row, b.rows.get(frame)?)));
-    let divergence = shared().find(|(_, one, other)| one != other);
+    let divergence = shared().find(|(_, one, other)| (one.digest, one.stages) != (other.digest, other.stages));
+    let most = || shared().map(|(_, one, other)| Distance::between(&one.outcome, &other.outcome)).fold(Distance::default(), Distance::max);
     let comparison = Comparison {
         settings: differing(&a.settings, &b.settings),
-        divergence: divergence.map(|(frame, one, other)| Divergence { frame, stage: one.stages.first_difference(&other.stages) }),
+        divergence: divergence.map(|(frame, one, other)| Divergence {
+            frame,
+            stage: one.stages.first_difference(&other.stages),
+            there: Distance::between(&one.outcome, &other.outcome),
+            most: most(),
+        }),
         shared: shared().count(),
         frames: [a.frames(), b.frames()],
     };
@@ -194,19 +216,26 @@ fn row_of(row: &FrameDigests) -> Option<Row> {
         background: hex(&row.background_digest)?,
         objects: ObjectDigests::of(objects.into_iter()),
     };
-    Some(Row { digest: hex(&row.digest)?, stages })
+    let outcome = Outcome {
+        pose: None,
+        density: row.stereo_density,
+        disparity_px: row.disparity_mean_px,
+        blocks: row.blocks_used,
+    };
+    Some(Row { digest: hex(&row.digest)?, stages, outcome })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dynvox_core::geometry::Transform;
 
     fn run(frames: std::ops::Range<usize>, change: impl Fn(usize, &mut StageDigests)) -> RunDigests {
         let rows = frames.map(|frame| {
             let objects = ObjectDigests::of([ObjectDigest { id: 3, digest: 7 }, ObjectDigest { id: 9, digest: 8 }].into_iter());
             let mut stages = StageDigests { input: frame as u64, tracks: 5, objects, ..StageDigests::default() };
             change(frame, &mut stages);
-            (frame, Row { digest: stages.whole(frame as u32), stages })
+            (frame, Row { digest: stages.whole(frame as u32), stages, outcome: Outcome::default() })
         });
         RunDigests {
             rows: rows.collect(),
@@ -217,20 +246,41 @@ mod tests {
     #[test]
     fn names_the_first_frame_and_the_first_stage_in_it() {
         let clean = run(0..5, |_, _| {});
-        let divergence = |change: &dyn Fn(usize, &mut StageDigests)| compare(&clean, &run(0..5, change)).unwrap().divergence;
+        let divergence = |change: &dyn Fn(usize, &mut StageDigests)| {
+            compare(&clean, &run(0..5, change)).unwrap().divergence.map(|of| (of.frame, of.stage))
+        };
         assert_eq!(divergence(&|_, _| {}), None);
         let late = |frame: usize, stages: &mut StageDigests| {
             if frame >= 3 {
                 (stages.background, stages.matches) = (1, 1);
             }
         };
-        assert_eq!(divergence(&late), Some(Divergence { frame: 3, stage: Some(Digested::Matches) }));
+        assert_eq!(divergence(&late), Some((3, Some(Digested::Matches))));
         let object = |frame: usize, stages: &mut StageDigests| {
             if frame == 4 {
                 stages.objects = ObjectDigests::of([ObjectDigest { id: 3, digest: 7 }].into_iter());
             }
         };
-        assert_eq!(divergence(&object), Some(Divergence { frame: 4, stage: Some(Digested::Object(9)) }));
+        assert_eq!(divergence(&object), Some((4, Some(Digested::Object(9)))));
+    }
+
+    #[test]
+    fn says_how_far_apart_outcomes_are_where_they_diverge_and_at_most() {
+        let clean = run(0..5, |_, _| {});
+        let mut drifting = run(0..5, |frame, stages| stages.egomotion = u64::from(frame >= 2));
+        for (frame, row) in &mut drifting.rows {
+            let by_m = if *frame >= 2 { *frame as f64 } else { 0.0 };
+            row.outcome = Outcome {
+                pose: Some(Transform::from_translation([by_m, 0.0, 0.0])),
+                blocks: 10,
+                ..Outcome::default()
+            };
+        }
+        let mut still = clean;
+        still.rows.values_mut().for_each(|row| row.outcome.pose = Some(Transform::IDENTITY));
+        let found = compare(&still, &drifting).unwrap().divergence.unwrap();
+        assert_eq!((found.frame, found.there.position_m, found.most.position_m, found.most.blocks), (2, 2.0, 4.0, 10));
+        assert!(found.there.to_string().starts_with("pose 2.0000 m, 0.0000 deg; mean disparity 0.000 px"), "{}", found.there);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Matches, disparity density, and everything that was refused or lost.
 
 use super::{frames, series, table};
+use crate::observe::Charted;
 use crate::report::chart::{COLOURS, lines};
 use crate::report::text::{grouped, lost_because};
 use crate::run::RunRecord;
@@ -10,19 +11,11 @@ pub fn section(run: &RunRecord) -> Markup {
     let frames = frames(run);
     let matches = lines(
         &frames,
-        &[
-            series(run, "matches", COLOURS[5], |row| f64::from(row.matches().0)),
-            series(run, "inliers", COLOURS[0], |row| f64::from(row.matches().1)),
-        ],
+        &[series(run, "matches", COLOURS[5], Charted::Matches), series(run, "inliers", COLOURS[0], Charted::Inliers)],
         "matches",
         0.0,
     );
-    let density = lines(
-        &frames,
-        &[series(run, "pixels with a disparity", COLOURS[3], |row| 100.0 * f64::from(row.report.stereo.density()))],
-        "%",
-        100.0,
-    );
+    let density = lines(&frames, &[series(run, "pixels with a disparity", COLOURS[3], Charted::Density)], "%", 100.0);
     html! {
         section {
             h2 { "Health" }

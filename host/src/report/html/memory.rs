@@ -1,6 +1,8 @@
 //! Memory: the block pool, the process, the slab region by region.
 
-use super::{frames, series};
+use super::{constant, frames, series, table};
+use crate::observe::{BoundUse, Charted};
+use crate::report::bounds;
 use crate::report::chart::{COLOURS, lines};
 use crate::report::text::{MIB, grouped};
 use crate::run::RunRecord;
@@ -11,9 +13,9 @@ pub fn section(run: &RunRecord) -> Markup {
     let pool = lines(
         &frames,
         &[
-            series(run, "blocks in use", COLOURS[0], |row| f64::from(row.report.blocks.used)),
-            series(run, "visible", COLOURS[3], |row| f64::from(row.report.blocks.visible)),
-            series(run, "pool", COLOURS[5], |_| header.capacity.blocks as f64),
+            series(run, "blocks in use", COLOURS[0], Charted::BlocksUsed),
+            series(run, "visible", COLOURS[3], Charted::BlocksVisible),
+            constant(run, "pool", COLOURS[5], header.capacity.blocks as f64),
         ],
         "blocks",
         0.0,
@@ -21,9 +23,9 @@ pub fn section(run: &RunRecord) -> Markup {
     let resident = lines(
         &frames,
         &[
-            series(run, "resident memory of the process", COLOURS[4], |row| row.rss_bytes.map_or(f64::NAN, |bytes| bytes as f64 / MIB)),
-            series(run, "slab", COLOURS[5], |_| header.slab_bytes as f64 / MIB),
-            series(run, "limit", COLOURS[2], |_| header.rss_limit_bytes as f64 / MIB),
+            series(run, "resident memory of the process", COLOURS[4], Charted::Resident),
+            constant(run, "slab", COLOURS[5], header.slab_bytes as f64 / MIB),
+            constant(run, "limit", COLOURS[2], header.rss_limit_bytes as f64 / MIB),
         ],
         "MiB",
         0.0,
@@ -35,9 +37,19 @@ pub fn section(run: &RunRecord) -> Markup {
                 "The core uses one slab of " (grouped(header.slab_bytes as u64)) " bytes, allocated before the first frame, and no other memory."
             }
             div.two { div { (pool) } div { (resident) } }
+            p.small { "Bounds: " (bounds::sentence(run)) "." }
+            details { summary.small { "Bound by bound" } (table(&[("bound", false), ("of the run", true), ("needed", true), ("refused", true)], &bounds_table(run))) }
             details { summary.small { "The slab, region by region" } (regions(run)) }
         }
     }
+}
+
+fn bounds_table(run: &RunRecord) -> Vec<Vec<String>> {
+    let rows = run.sections.bounds.uses.rows(&run.header.capacity);
+    let cells = |(name, bound, of): (&str, usize, BoundUse)| {
+        std::iter::once(name.to_owned()).chain([bound as u64, of.needed as u64, of.refused].map(grouped)).collect()
+    };
+    rows.into_iter().map(cells).collect()
 }
 
 fn regions(run: &RunRecord) -> Markup {

@@ -11,7 +11,7 @@ mod time;
 mod trajectory;
 
 use super::chart::Series;
-use crate::observe::FrameRow;
+use crate::observe::Charted;
 use crate::run::RunRecord;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -88,12 +88,17 @@ fn table(heads: &[(&str, bool)], rows: &[Vec<String>]) -> Markup {
     }
 }
 
-/// One value a frame.
-fn series<'a>(run: &RunRecord, name: &'a str, colour: &'a str, value: impl Fn(&FrameRow) -> f64) -> Series<'a> {
-    Series { name, colour, values: run.frames.iter().map(value).collect() }
+/// One value a frame, or for several frames where there are many.
+fn series<'a>(run: &RunRecord, name: &'a str, colour: &'a str, value: Charted) -> Series<'a> {
+    Series { name, colour, values: run.frames.charts().series(value) }
 }
 
-/// Numbers of the frames.
+/// The same value for all frames.
+fn constant<'a>(run: &RunRecord, name: &'a str, colour: &'a str, value: f64) -> Series<'a> {
+    Series { name, colour, values: vec![value; frames(run).len()] }
+}
+
+/// Numbers of the frames that values are of.
 fn frames(run: &RunRecord) -> Vec<usize> {
-    run.frames.iter().map(|row| row.frame).collect()
+    run.frames.charts().frames()
 }

@@ -41,7 +41,7 @@ pub fn section(run: &RunRecord) -> Markup {
             @if let Some(count) = run.sections.objects.swept_triangles {
                 p.small { "Triangles of the static map in the volume that moving objects swept: " b { (grouped(count)) } "." }
             }
-            (lanes(&frames(run), &lanes_of(tracks, &shown), "tracks over frames", &[MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(state_name)))
+            (lanes(&frames(run), run.frames.len(), &lanes_of(&shown), "tracks over frames", &[MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(state_name)))
             (track_table(&shown))
             (gallery(&run.sections.objects.objects))
         }
@@ -106,19 +106,15 @@ fn association(of: &AssociationFigures) -> Markup {
 }
 
 /// The bars of the tracks shown.
-fn lanes_of(tracks: &TracksSection, shown: &[&TrackRecord]) -> Vec<Lane> {
+fn lanes_of(shown: &[&TrackRecord]) -> Vec<Lane> {
     let lane = |record: &&TrackRecord| {
-        let mut bars: Vec<Bar> = Vec::new();
-        for (at, frame) in tracks.frames.iter().enumerate() {
-            let Some(track) = frame.tracks.iter().find(|track| track.id == record.id) else { continue };
-            let (style, pale) = (state_name(track.state), !track.measured);
-            let speed = track.speed_m_s.filter(|_| track.state != MotionState::Static);
-            let text = speed.map(|[speed, _]| format!("{speed:.1} m/s"));
-            match bars.last_mut().filter(|last| last.to == at && last.style == style && last.pale == pale) {
-                Some(last) => (last.to, last.text) = (at + 1, text),
-                None => bars.push(Bar { from: at, to: at + 1, style, pale, text }),
-            }
-        }
+        let bars = record.spans.iter().map(|span| Bar {
+            from: span.from,
+            to: span.to,
+            style: state_name(span.state),
+            pale: !span.measured,
+            text: span.speed_m_s.filter(|_| span.state != MotionState::Static).map(|speed| format!("{speed:.1} m/s")),
+        });
         let truth = record.errors.iter().flat_map(|errors| &errors.moving).map(|&(at, moving)| Bar {
             from: at,
             to: at + 1,
@@ -129,7 +125,7 @@ fn lanes_of(tracks: &TracksSection, shown: &[&TrackRecord]) -> Vec<Lane> {
         Lane {
             name: format!("{} {}", record.class.name(), record.id),
             truth: truth.collect(),
-            bars,
+            bars: bars.collect(),
         }
     };
     shown.iter().map(lane).collect()

@@ -1,6 +1,7 @@
 //! What the run found left of the calibration's error.
 
 use super::{frames, series};
+use crate::observe::Charted;
 use crate::report::chart::{COLOURS, lines};
 use crate::report::rig::{is_warning, sentence};
 use crate::run::RunRecord;
@@ -10,8 +11,8 @@ pub fn section(run: &RunRecord) -> Markup {
     let chart = lines(
         &frames(run),
         &[
-            series(run, "size of what was found", COLOURS[0], |row| row.report.self_calibration.offset_px.abs()),
-            series(run, "size of what was taken out", COLOURS[3], |row| row.report.self_calibration.applied_offset_px.abs()),
+            series(run, "size of what was found", COLOURS[0], Charted::OffsetFound),
+            series(run, "size of what was taken out", COLOURS[3], Charted::OffsetApplied),
         ],
         "px",
         0.1,

@@ -1,7 +1,7 @@
 //! Time per stage.
 
 use super::{frames, series, table};
-use crate::observe::StageTime;
+use crate::observe::Charted;
 use crate::report::chart::{COLOURS, Series, lines, stacked};
 use crate::run::RunRecord;
 use dynvox_core::Stage;
@@ -9,9 +9,10 @@ use maud::{Markup, html};
 
 pub fn section(run: &RunRecord) -> Markup {
     let frames = frames(run);
-    let mut wall = vec![series(run, "whole step", "currentColor", |row| row.step_ms)];
-    wall.extend(stages(run, |time| time.wall_ms));
+    let mut wall = vec![series(run, "whole step", "currentColor", Charted::Step)];
+    wall.extend(stages(run, Charted::Wall));
     let rows: Vec<Vec<String>> = run
+        .frames
         .stage_statistics()
         .into_iter()
         .map(|(name, of)| {
@@ -28,7 +29,7 @@ pub fn section(run: &RunRecord) -> Markup {
             }
             div.two {
                 div { (lines(&frames, &wall, "ms, wall", 0.0)) }
-                div { (stacked(&frames, &stages(run, |time| time.cpu_ms), "ms, CPU")) }
+                div { (stacked(&frames, &stages(run, Charted::Cpu), "ms, CPU")) }
             }
             (table(&[("stage", false), ("median, ms", true), ("p99, ms", true), ("CPU median, ms", true), ("frames", true)], &rows))
         }
@@ -36,7 +37,7 @@ pub fn section(run: &RunRecord) -> Markup {
 }
 
 /// A line for each stage within the step.
-fn stages(run: &RunRecord, of: fn(&StageTime) -> f64) -> Vec<Series<'static>> {
+fn stages(run: &RunRecord, of: fn(Stage) -> Charted) -> Vec<Series<'static>> {
     let within = Stage::ALL.iter().enumerate().filter(|(_, stage)| **stage != Stage::Raycast);
-    within.map(|(at, stage)| series(run, stage.name(), COLOURS[at % COLOURS.len()], move |row| of(&row.stages[at]))).collect()
+    within.map(|(at, stage)| series(run, stage.name(), COLOURS[at % COLOURS.len()], of(*stage))).collect()
 }

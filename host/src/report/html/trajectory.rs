@@ -1,25 +1,29 @@
 //! The camera's path, and its errors against ground truth.
 
 use super::table;
-use crate::evaluate::trajectory::{TrajectoryErrors, travelled_m};
+use crate::evaluate::trajectory::TrajectoryErrors;
 use crate::report::chart::{Path, from_above};
 use crate::run::RunRecord;
-use dynvox_core::geometry::Transform;
 use maud::{Markup, html};
 
 pub fn section(run: &RunRecord) -> Markup {
     let trajectory = &run.sections.trajectory;
-    let above = |poses: &[Transform]| poses.iter().map(|pose| (pose.translation_m[0], pose.translation_m[2])).collect();
+    let above = |position_m: [f64; 3]| (position_m[0], position_m[2]);
     let mut paths = vec![Path {
         name: "estimate",
         colour: "var(--accent)",
         dashed: false,
-        points: above(&trajectory.poses),
+        points: trajectory.path.points_m().map(above).collect(),
     }];
     if let Some(truth) = &trajectory.truth {
-        paths.push(Path { name: "ground truth", colour: "var(--truth)", dashed: true, points: above(truth) });
+        paths.push(Path {
+            name: "ground truth",
+            colour: "var(--truth)",
+            dashed: true,
+            points: truth.iter().map(|pose| above(pose.translation_m)).collect(),
+        });
     }
-    let length_m = travelled_m(&trajectory.poses).last().copied().unwrap_or_default();
+    let length_m = trajectory.path.length_m();
     html! {
         section {
             h2 { "Trajectory from above" }

@@ -9,9 +9,9 @@
 //! | | the host's part, CBOR: manifest, end of the file of blocks, state |
 //! | | the mapper's, to the end: [`dynvox_core::mapper::snapshot`] |
 //!
-//! Evicted blocks are not copied: their file only ever grows, so its length and a checksum describe it.
+//! Evicted blocks and rows are not copied: their files only ever grow, so the length and a checksum of each describe it.
 //!
-//! Memory: the host's part, some 4 KiB a frame, while it is written or read.
+//! Memory: the host's part, while it is written or read. It grows with the tracks and objects seen, and with what is compared with ground truth.
 
 mod error;
 mod manifest;
@@ -34,7 +34,7 @@ use std::path::PathBuf;
 
 const MAGIC: [u8; 8] = *b"DVXDRIVE";
 /// Version of the layout and of the host's state. Another one is refused: there is no conversion.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Magic, version, length.
 const HEAD: usize = 20;
 
@@ -145,7 +145,7 @@ impl Checkpoint {
 
     /// Frames mapped.
     pub fn frames(&self) -> usize {
-        self.state.rows.len()
+        self.state.frames.len()
     }
 
     /// Restores the mapper in `slab`.

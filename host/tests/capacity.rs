@@ -1,0 +1,82 @@
+//! What a run needed of its bounds: the least bounds hold the same run without a refusal, and smaller ones do not.
+#![allow(missing_docs)]
+
+mod binary;
+
+use binary::{dynvox, output_text};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// A street with traffic, exact masks and no block on disk.
+const STREET: [&str; 12] = [
+    "run",
+    "--quiet",
+    "--no-stream",
+    "--set",
+    "street.width=320",
+    "--set",
+    "street.height=96",
+    "--set",
+    "street.frames=16",
+    "--instances",
+    "exact",
+    "--overwrite",
+];
+
+fn run(root: &Path, out: &str, more: &[&str]) -> Value {
+    let run = dynvox(root, &[&STREET[..], &["--out", out], more].concat());
+    assert!(run.status.success(), "{}", output_text(&run));
+    serde_json::from_slice(&fs::read(root.join(out).join("summary.json")).unwrap()).unwrap()
+}
+
+/// What was refused, by bound.
+fn refused(summary: &Value) -> Vec<(String, u64)> {
+    let bounds = summary["capacity"]["bounds"].as_object().unwrap();
+    bounds.iter().map(|(name, of)| (name.clone(), of["refused"].as_u64().unwrap())).filter(|(_, refused)| *refused > 0).collect()
+}
+
+/// A stage's digest in each frame.
+fn digests(folder: &Path, stage: &str) -> Vec<String> {
+    let csv = fs::read_to_string(folder.join("frames.csv")).unwrap();
+    let column = csv.lines().next().unwrap().split(',').position(|name| name == format!("{stage}_digest")).unwrap();
+    csv.lines().skip(1).map(|line| line.split(',').nth(column).unwrap().to_owned()).collect()
+}
+
+#[test]
+fn the_least_bounds_hold_the_same_run_and_smaller_ones_refuse() {
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    let lag = ["--set", "volume.prune_lag=6"];
+    let large = run(root, "large", &[&["--profile", "small"], &lag[..]].concat());
+    assert_eq!((refused(&large), &large["capacity"]["enough"]), (vec![], &true.into()), "{large}");
+    let [least, slab] = [&large["capacity"]["least_bytes"], &large["slab_bytes"]].map(|bytes| bytes.as_u64().unwrap());
+    assert!(least < slab, "{least} of {slab}");
+    fs::copy(root.join("large/capacity.toml"), root.join("least.toml")).unwrap();
+    let again = run(root, "least", &[&["--capacity", "least.toml"], &lag[..]].concat());
+    assert_eq!((refused(&again), again["slab_bytes"].as_u64()), (vec![], Some(least)));
+    // Where crops wait in their ring is in the digest of the tracks, so that one differs.
+    for column in ["input", "disparity", "matches", "egomotion", "background", "objects"] {
+        assert_eq!(digests(&root.join("least"), column), digests(&root.join("large"), column), "{column}");
+    }
+    let console =
+        dynvox(root, &["run", "--capacity", "least.toml", "--set", "street.width=320", "--set", "street.height=96", "--frames", "2"]);
+    assert!(
+        String::from_utf8_lossy(&console.stdout).contains("MiB would have held this run without a refusal"),
+        "{}",
+        output_text(&console)
+    );
+
+    // One fewer of each bound that the run used in full is refused, or is another run.
+    let text = fs::read_to_string(root.join("least.toml")).unwrap();
+    for name in ["features", "matches", "blocks", "visible_blocks", "mask_words", "tracks"] {
+        let line = text.lines().find(|line| line.starts_with(&format!("{name} = "))).unwrap();
+        let value: usize = line.rsplit(' ').next().unwrap().parse().unwrap();
+        fs::write(root.join("fewer.toml"), text.replace(&format!("\n{line}\n"), &format!("\n{name} = {}\n", value - 1))).unwrap();
+        let less = run(root, "less", &[&["--capacity", "fewer.toml"], &lag[..]].concat());
+        assert!(refused(&less).iter().any(|(refused, _)| refused == name), "{name}: {:?}", refused(&less));
+        assert_eq!(less["capacity"]["enough"], false);
+        assert!(fs::read_to_string(root.join("less/capacity.toml")).unwrap().contains("# Something was refused"));
+    }
+}
