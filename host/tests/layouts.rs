@@ -1,4 +1,4 @@
-//! One clip of the street in every layout and format: equal digests, whatever the images are called and wherever they lie.
+//! One clip of the street in every layout and format: equal digests for all names and places of the images.
 #![allow(missing_docs)]
 
 mod binary;
@@ -106,11 +106,11 @@ fn dress_data_sets(clip: &Clip) {
     clip.save(|at, side| at_root("tracking").join(format!("training/image_0{}/0000/{at:06}.png", side + 2)));
     write(at_root("tracking").join("training/calib/0000.txt"), &(clip.calibration(["P0", "P1"]) + &clip.calibration(["P2", "P3"])));
     let dates: String = (0..FRAMES as u64).map(|at| format!("2011-09-26 13:02:25.{:09}\n", at * STEP_NS)).collect();
-    for (name, drive, data) in
+    for (name, recording, data) in
         [("raw/2011_09_26", "2011_09_26_drive_0001_sync", "data"), ("kitti360", "data_2d_raw/2013_05_28_drive_0000_sync", "data_rect")]
     {
-        clip.save(|at, side| at_root(name).join(format!("{drive}/image_0{side}/{data}/{at:010}.png")));
-        ["image_00", "image_01"].iter().for_each(|camera| write(at_root(name).join(drive).join(camera).join("timestamps.txt"), &dates));
+        clip.save(|at, side| at_root(name).join(format!("{recording}/image_0{side}/{data}/{at:010}.png")));
+        ["image_00", "image_01"].iter().for_each(|camera| write(at_root(name).join(recording).join(camera).join("timestamps.txt"), &dates));
     }
     let rectified = clip.calibration(["P_rect_00", "P_rect_01"]);
     write(at_root("raw/2011_09_26/calib_cam_to_cam.txt"), &format!("S_rect_00: 160 64\n{rectified}"));

@@ -44,8 +44,11 @@ fn mapped_by_c(fixture: &Path, bytes: usize, settings: &[String]) -> String {
     fs::write(&clip, dynvox::fixtures::pack(fixture).expect("the fixture can be packed")).expect("the clip can be written");
     let program = build("map_fixture", folder.path());
     let ran = Command::new(&program).arg(&clip).arg(bytes.to_string()).args(settings).output().expect("the program can be run");
-    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
-    assert!(ran.status.success() && !said.contains(" 0 objects") && !said.contains("of 0 triangles"), "objects leave: {said}");
+    let output_text = String::from_utf8_lossy(&ran.stderr).into_owned();
+    assert!(
+        ran.status.success() && !output_text.contains(" 0 objects") && !output_text.contains("of 0 triangles"),
+        "objects leave: {output_text}"
+    );
     String::from_utf8_lossy(&ran.stdout).into_owned()
 }
 

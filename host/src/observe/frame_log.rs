@@ -89,7 +89,7 @@ impl FrameLog {
         self.frames
     }
 
-    /// Whether there is none.
+    /// Whether no frame was added yet.
     pub fn is_empty(&self) -> bool {
         self.frames == 0
     }

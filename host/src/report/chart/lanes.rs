@@ -36,7 +36,7 @@ pub struct Lane {
     pub truth: Vec<Bar>,
 }
 
-/// Lanes over so many frames, of which some have these numbers, evenly spread; `styles` are explained in the legend.
+/// Lanes over so many frames; `frames` are the numbers of some of them, evenly spread; `styles` are explained in the legend.
 pub fn lanes(frames: &[usize], count: usize, lanes: &[Lane], label: &str, styles: &[&'static str]) -> Markup {
     let count = count.max(1) as f64;
     let per_number = (count / frames.len().max(1) as f64).ceil() as usize;
