@@ -67,8 +67,8 @@ impl State {
         let since = SINCE.get();
         let now = ThreadTime::now();
         SINCE.set(now);
-        let spent = now.duration_since(since);
-        std::mem::take(&mut self.cost).then(Cost::serial(spent))
+        let elapsed = now.duration_since(since);
+        std::mem::take(&mut self.cost).then(Cost::serial(elapsed))
     }
 }
 
