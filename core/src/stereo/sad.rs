@@ -33,12 +33,14 @@ pub(super) trait Kernels {
 }
 
 /// Kernels as functions, so that each can be written where its instructions are safe.
+#[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
 struct Functions<S, L, C> {
     sums: S,
     least: L,
     costs: C,
 }
 
+#[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
 impl<S, L, C> Kernels for Functions<S, L, C>
 where
     S: Fn(&Eight<Descriptor>, &Eight<Descriptor>) -> Eight<u32>,

@@ -104,16 +104,15 @@ impl Candidates<'_> {
             consider(d, cost.elsewhere, &self.beyond(d));
         }
         // Most often all eight have one plane, or change it once.
-        let mut runs = planes.chunk_by(|a, b| a == b);
-        let mut end = 0;
-        while let Some((&plane, run)) = runs.next().and_then(|run| run.first().zip(Some(run.len()))) {
-            let start = end;
-            end += run;
+        let mut start = 0;
+        while let Some(&plane) = planes.get(start) {
+            let run = planes.iter().skip(start).take_while(|other| **other == plane).count();
+            let mut others = [BARRED; LANES];
+            others.iter_mut().skip(start).take(run).for_each(|barred| *barred = 0);
+            start += run;
             if plane == NOTHING {
                 continue;
             }
-            let mut others = [BARRED; LANES];
-            others.iter_mut().take(end).skip(start).for_each(|barred| *barred = 0);
             let (mean, radius) = (plane & 255, cost.radius as i32);
             let costs = if plane >= i32::from(STEEP) { &cost.about_steep } else { &cost.about_plane };
             for (d, &cost) in (mean - radius..=mean + radius).zip(costs) {
