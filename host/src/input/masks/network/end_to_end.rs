@@ -27,7 +27,7 @@ pub fn decode(outputs: &[Output], format: &EndToEndFormat, part: &PicturePart<'_
         let least = if values.iter().any(|value| *value < 0.0) { 0.0 } else { 0.5 };
         let map = Map { values, width, height };
         let holds = |u: i32, v: i32| {
-            let [x, y] = part.fit.to_input([f64::from(u) + 0.5, f64::from(v) + 0.5]);
+            let [x, y] = part.fit.input_point([f64::from(u) + 0.5, f64::from(v) + 0.5]);
             let [x, y] = [x * width as f64 / part.input.0 as f64, y * height as f64 / part.input.1 as f64];
             map.at(1, x, y).any(|value| value > least)
         };

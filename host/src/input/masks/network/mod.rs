@@ -58,7 +58,7 @@ struct PicturePart<'a> {
 impl PicturePart<'_> {
     /// Left, top, right and bottom edge in the picture of those in the input.
     fn edges(&self, [left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
-        let ([left, top], [right, bottom]) = (self.fit.to_picture([left, top]), self.fit.to_picture([right, bottom]));
+        let ([left, top], [right, bottom]) = (self.fit.picture_point([left, top]), self.fit.picture_point([right, bottom]));
         [left, top, right, bottom]
     }
 }

@@ -141,15 +141,15 @@ impl Input {
             let point = [(at % width) as f64 + 0.5, (at / width) as f64 + 0.5];
             let mut colour = [GREY; 3];
             if fit.is_filled(point) {
-                let [x, y] = fit.to_picture(point);
+                let [x, y] = fit.picture_point(point);
                 colour = picture.sample(x, y);
             }
             if kind.blue_first {
                 colour.reverse();
             }
-            for channel in 0..3 {
+            for (channel, value) in colour.into_iter().enumerate() {
                 let to = if self.channels_last { 3 * at + channel } else { channel * width * height + at };
-                values[to] = (colour[channel] - kind.mean[channel]) * kind.scale[channel];
+                values[to] = (value - kind.mean[channel]) * kind.scale[channel];
             }
         }
         let shape = if self.channels_last { [1, height, width, 3] } else { [1, 3, height, width] };

@@ -80,12 +80,12 @@ impl Fit {
     }
 
     /// Where a point of the input is in the picture, px.
-    pub fn to_picture(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub fn picture_point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.left + x / self.scale[0], self.top + y / self.scale[1]]
     }
 
     /// Where a point of the picture is in the input, px.
-    pub fn to_input(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub fn input_point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [(x - self.left) * self.scale[0], (y - self.top) * self.scale[1]]
     }
 

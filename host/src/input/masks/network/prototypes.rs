@@ -22,7 +22,7 @@ pub fn decode(outputs: &[Output], format: &PrototypeFormat, part: &PicturePart<'
         let first = 4 + format.boxes.classes;
         let weights: Vec<f32> = (0..format.prototypes).map(|at| row.value(first + at)).collect();
         let holds = |u: i32, v: i32| {
-            let [x, y] = part.fit.to_input([f64::from(u) + 0.5, f64::from(v) + 0.5]);
+            let [x, y] = part.fit.input_point([f64::from(u) + 0.5, f64::from(v) + 0.5]);
             let [x, y] = [x * map.width as f64 / part.input.0 as f64, y * map.height as f64 / part.input.1 as f64];
             map.at(weights.len(), x, y).zip(&weights).map(|(value, weight)| value * weight).sum::<f32>() > 0.0
         };

@@ -16,7 +16,7 @@ pub fn decode(output: &Output, part: &PicturePart<'_>) -> Option<Image<u8>> {
     let mut codes = Vec::with_capacity(width * height);
     for v in 0..height {
         for u in 0..width {
-            let at = part.fit.to_input([u as f64 + 0.5, v as f64 + 0.5]);
+            let at = part.fit.input_point([u as f64 + 0.5, v as f64 + 0.5]);
             let [x, y] = [at[0] * share[0], at[1] * share[1]];
             let class = match channels {
                 1 => map.nearest(x, y) as usize,
