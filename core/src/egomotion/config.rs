@@ -16,6 +16,13 @@ pub struct EgomotionConfig {
     pub refined_inlier_px: f32,
     /// Fewest matches, and fewest inliers, an estimate is made of; 3..=1000. DynSLAM: 6.
     pub matches_min: u16,
+    /// Least share of the matches that must be inliers; in 0..=1. DynSLAM: 0.
+    pub inlier_share_min: f32,
+    /// Largest acceleration of a camera, m/s²: a motion that needs a larger one is taken only where the share of inliers is at least
+    /// `inlier_share_strong`. Above 0. DynSLAM: none.
+    pub acceleration_max_m_s2: f64,
+    /// Share of inliers from which on any motion is believed; in 0..=1.
+    pub inlier_share_strong: f32,
     /// Most Gauss-Newton steps of a hypothesis; 1..=50. DynSLAM: about 12.
     pub sample_steps: u8,
     /// Most Gauss-Newton steps of a round of refinement; 1..=250. DynSLAM: about 250.
@@ -34,6 +41,9 @@ impl Default for EgomotionConfig {
             inlier_px: 2.0,
             refined_inlier_px: 2.0,
             matches_min: 6,
+            inlier_share_min: 0.35,
+            acceleration_max_m_s2: 15.0,
+            inlier_share_strong: 0.65,
             sample_steps: 12,
             refine_steps: 50,
             side_knee: 0.3,
@@ -50,6 +60,11 @@ impl EgomotionConfig {
         require(problems, positive(self.inlier_px), "egomotion.inlier_px", "must be above 0");
         require(problems, positive(self.refined_inlier_px), "egomotion.refined_inlier_px", "must be above 0");
         require(problems, (3..=1000).contains(&self.matches_min), "egomotion.matches_min", "must be in 3..=1000");
+        let is_share = |value: f32| (0.0..=1.0).contains(&value);
+        require(problems, is_share(self.inlier_share_min), "egomotion.inlier_share_min", "must be in 0..=1");
+        require(problems, is_share(self.inlier_share_strong), "egomotion.inlier_share_strong", "must be in 0..=1");
+        let acceleration = self.acceleration_max_m_s2.is_finite() && self.acceleration_max_m_s2 > 0.0;
+        require(problems, acceleration, "egomotion.acceleration_max_m_s2", "must be above 0");
         require(problems, (1..=50).contains(&self.sample_steps), "egomotion.sample_steps", "must be in 1..=50");
         require(problems, (1..=250).contains(&self.refine_steps), "egomotion.refine_steps", "must be in 1..=250");
         require(problems, self.side_knee > 0.0 && self.side_knee <= 10.0, "egomotion.side_knee", "must be above 0 and at most 10");

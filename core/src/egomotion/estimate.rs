@@ -33,6 +33,8 @@ pub enum MotionStatus {
     TooFewInliers,
     /// The refinement did not come to rest.
     NotConverged,
+    /// The camera would have to accelerate too much ([`EgomotionConfig::acceleration_max_m_s2`]), and too few matches agree.
+    Implausible,
     /// The rig cannot be used.
     BadRig,
 }
@@ -45,7 +47,8 @@ pub enum MotionStatus {
 pub struct MotionEstimate {
     /// How it went.
     pub status: MotionStatus,
-    /// Maps previous camera coordinates to current camera coordinates; `None` unless `status` is `Estimated`.
+    /// Maps previous camera coordinates to current camera coordinates; `None` unless `status` is `Estimated`. Of the camera: from the last frame
+    /// whose pose is not a guess.
     pub t_current_previous: Option<Transform>,
     /// Matches handed in that could be triangulated.
     pub matches: u32,
@@ -123,6 +126,7 @@ impl<'s> Estimator<'s> {
         if matches < needed {
             return MotionEstimate::failed(MotionStatus::TooFewMatches, matches, 0, 0);
         }
+        let needed = needed.max(libm::ceilf(config.inlier_share_min * matches as f32) as usize);
         let start = initial.copied().unwrap_or(Transform::IDENTITY);
         let (best, samples) = self.ransac(config, rig, random, &start);
         let mut estimate = MotionEstimate::failed(MotionStatus::TooFewInliers, matches, 0, samples);

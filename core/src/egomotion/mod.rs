@@ -38,7 +38,7 @@ mod track;
 
 pub use config::EgomotionConfig;
 pub use estimate::{Estimator, MotionEstimate, MotionStatus};
-pub use track::Egomotion;
+pub use track::{Egomotion, REFERENCE_FRAMES_MAX};
 
 #[cfg(test)]
 mod tests;

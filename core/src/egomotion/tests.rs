@@ -1,6 +1,6 @@
 mod clip;
 
-use super::{Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus};
+use super::{Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus, REFERENCE_FRAMES_MAX};
 use crate::{
     geometry::{StereoRig, Transform},
     image::View,
@@ -41,7 +41,7 @@ fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
         let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
         matcher.push(&SceneFlowConfig::default(), view(&left), view(&right), &Serial);
         if frame > 0 {
-            let estimate = camera.step(&EgomotionConfig::default(), &RIG, matcher.bucketed(), &mut estimator);
+            let estimate = camera.step(&EgomotionConfig::default(), &RIG, 0.1, matcher.bucketed(), &mut estimator);
             estimates.push((estimate, motions[frame - 1].inverse()));
         }
         if let Some(motion) = motions.get(frame) {
@@ -199,7 +199,7 @@ fn a_dark_right_camera_repeats_the_last_motion() {
         let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
         matcher.push(&SceneFlowConfig::default(), view(&left), view(right), &Serial);
         if frame > 0 {
-            let estimate = camera.step(&EgomotionConfig::default(), &RIG, matcher.bucketed(), &mut estimator);
+            let estimate = camera.step(&EgomotionConfig::default(), &RIG, 0.1, matcher.bucketed(), &mut estimator);
             let expected = if frame == 1 { MotionStatus::Estimated } else { MotionStatus::TooFewMatches };
             assert_eq!((estimate.status, camera.held_frames()), (expected, frame - 1));
             let (distance, _) = between(camera.t_current_previous(), &step.inverse());
@@ -208,6 +208,68 @@ fn a_dark_right_camera_repeats_the_last_motion() {
         t_world_camera = t_world_camera * step;
     }
     assert!((camera.t_world_camera().translation().z - 1.2).abs() < 0.05, "three steps, two of them extrapolated");
+}
+
+#[test]
+fn after_dark_frames_the_camera_is_found_again_from_the_last_frame_that_was_seen() {
+    let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
+    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
+    let mut estimator = estimator(&mut slab);
+    let mut camera = Egomotion::default();
+    let dark = vec![0; WIDTH * HEIGHT];
+    let mut t_world_camera = Transform::IDENTITY;
+    for (frame, metres) in [0.0, 0.3, 0.3, 0.1, 0.1].into_iter().enumerate() {
+        t_world_camera = t_world_camera * Transform::from_translation([0.0, 0.0, metres]);
+        let seen = see(&t_world_camera);
+        let [left, right] = if frame == 2 || frame == 3 { [&dark, &dark] } else { [&seen[0], &seen[1]] };
+        let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
+        matcher.push(&SceneFlowConfig::default(), view(left), view(right), &Serial);
+        if frame > 0 {
+            camera.step(&EgomotionConfig::default(), &RIG, 0.1, matcher.bucketed(), &mut estimator);
+        }
+        if camera.since_reference() > 0 {
+            matcher.keep_previous();
+        }
+        let (distance, _) = between(camera.t_world_camera(), &t_world_camera);
+        let guessed = camera.held_frames() > 0;
+        assert_eq!((guessed, camera.segment()), (frame == 2 || frame == 3, 0));
+        assert!(distance < if guessed { 0.3 } else { 0.03 }, "frame {frame}: {distance} m");
+    }
+    assert!((camera.t_current_previous().distance_m() - 0.5 / 3.0).abs() < 0.02, "a frame's share of the motion since then");
+}
+
+/// A camera that moved by `motion()` a frame, and what it makes of one of another motion with `outliers` among 60 matches.
+fn after_one_frame(then: &Transform, outliers: usize) -> (MotionEstimate, Egomotion) {
+    let mut slab = Box::new(Slab([0; BYTES]));
+    let (mut estimator, mut camera, mut random) = (estimator(&mut slab), Egomotion::default(), Random::new(5));
+    let config = EgomotionConfig::default();
+    let first = matches(60, 0, &motion(), &mut random);
+    assert_eq!(camera.step(&config, &RIG, 0.1, &first, &mut estimator).status, MotionStatus::Estimated);
+    let second = matches(60, outliers, then, &mut random);
+    (camera.step(&config, &RIG, 0.1, &second, &mut estimator), camera)
+}
+
+#[test]
+fn a_leap_is_believed_of_many_matches_that_agree_and_not_of_few() {
+    let leap = motion() * Transform::from_translation([0.0, 0.0, -1.0]);
+    let (estimate, camera) = after_one_frame(&leap, 30);
+    assert_eq!((estimate.status, estimate.t_current_previous, camera.held_frames()), (MotionStatus::Implausible, None, 1));
+    assert!(between(camera.t_current_previous(), &motion()).0 < 1e-3, "it moves on as before");
+    assert_eq!(after_one_frame(&leap, 5).0.status, MotionStatus::Estimated);
+    assert_eq!(after_one_frame(&motion(), 30).0.status, MotionStatus::Estimated, "half of the matches are enough for what was expected");
+    assert_eq!(after_one_frame(&motion(), 50).0.status, MotionStatus::TooFewInliers);
+}
+
+#[test]
+fn a_camera_lost_for_long_goes_on_from_a_guess_and_says_so() {
+    let mut camera = Egomotion::default();
+    camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));
+    for frame in 1..=REFERENCE_FRAMES_MAX {
+        assert_eq!((camera.segment(), camera.since_reference()), (0, frame - 1));
+        camera.hold();
+    }
+    assert_eq!((camera.segment(), camera.since_reference()), (1, 0));
+    assert!((camera.t_world_camera().distance_m() - 1.0 - f64::from(REFERENCE_FRAMES_MAX)).abs() < 1e-9);
 }
 
 #[test]

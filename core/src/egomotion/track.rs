@@ -1,6 +1,6 @@
 //! The camera's motion from frame to frame, also where it cannot be estimated.
 
-use super::{EgomotionConfig, Estimator, MotionEstimate};
+use super::{EgomotionConfig, Estimator, MotionEstimate, MotionStatus};
 use crate::{
     geometry::{StereoRig, Transform},
     random::Random,
@@ -11,12 +11,33 @@ use crate::{
 /// Seed of the camera's own draws.
 const SEED: u64 = 0x6361_6D65_7261;
 
+/// An estimate with so many times fewer inliers than the one before it is not strong, however large their share.
+const FEWER_INLIERS_MAX: u32 = 4;
+
+/// Distance by which the estimate of one frame's motion may be wrong, m.
+const NOISE_M: f64 = 0.1;
+
+/// Frames without an estimate after which matches are sought with the last frame, although its pose is a guess.
+pub const REFERENCE_FRAMES_MAX: u32 = 8;
+
 /// Where the camera is and how it last moved.
 #[derive(Clone, Debug)]
 pub struct Egomotion {
     t_world_camera: Transform,
+    /// The camera of the frame that matches are sought with.
+    t_world_reference: Transform,
+    /// Frames from it to the last one.
+    since_reference: u32,
+    /// Time from the frame that matches are sought with to the last one, s.
+    reference_s: f64,
     t_current_previous: Transform,
+    /// Time that motion took, s; 0 where no motion was estimated yet.
+    motion_s: f64,
+    /// Matches that motion explained.
+    inliers: u32,
     held: u32,
+    /// How often the reference had to be given up.
+    segment: u32,
     random: Random,
 }
 
@@ -25,41 +46,112 @@ impl Default for Egomotion {
     fn default() -> Self {
         Self {
             t_world_camera: Transform::IDENTITY,
+            t_world_reference: Transform::IDENTITY,
+            since_reference: 0,
+            reference_s: 0.0,
             t_current_previous: Transform::IDENTITY,
+            motion_s: 0.0,
+            inliers: 0,
             held: 0,
+            segment: 0,
             random: Random::new(SEED),
         }
     }
 }
 
 impl Egomotion {
-    /// Moves the camera by one frame: as estimated or, failing that, as before (constant velocity).
+    /// Moves the camera by one frame: as estimated or, failing that, as before (constant velocity). `matches` are with the reference: the last
+    /// frame whose pose is not a guess. The estimate is of the motion since then. `interval_s` is the time since the last frame.
     pub fn step<'m>(
         &mut self,
         config: &EgomotionConfig,
         rig: &StereoRig,
+        interval_s: f32,
         matches: impl IntoIterator<Item = &'m Match>,
         estimator: &mut Estimator<'_>,
     ) -> MotionEstimate {
-        let estimate = estimator.estimate(config, rig, matches, &mut self.random, Some(&self.t_current_previous));
-        self.advance(estimate.t_current_previous);
+        let expected = self.expected();
+        let mut estimate = estimator.estimate(config, rig, matches, &mut self.random, Some(&expected));
+        self.reference_s += f64::from(interval_s);
+        let frames = self.since_reference + 1;
+        let motion = estimate.t_current_previous.map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
+        if motion.is_some_and(|motion| !self.is_plausible(config, &motion, &estimate)) {
+            estimate = MotionEstimate { status: MotionStatus::Implausible, t_current_previous: None, ..estimate };
+        }
+        match (&estimate.t_current_previous, motion) {
+            (Some(t_current_reference), Some(motion)) => {
+                (self.t_current_previous, self.motion_s, self.inliers) = (motion, self.reference_s / f64::from(frames), estimate.inliers);
+                self.t_world_camera = (self.t_world_reference * t_current_reference.inverse()).normalized();
+                self.held = 0;
+                self.refer_to_last();
+            }
+            _ => self.hold(),
+        }
         estimate
     }
 
-    /// Moves the camera by one frame: as found or, failing that, as before.
+    /// Moves the camera by one frame: as found or, failing that, as before. The last frame is the reference.
     pub fn advance(&mut self, t_current_previous: Option<Transform>) {
         match t_current_previous {
             Some(motion) => (self.t_current_previous, self.held) = (motion, 0),
             None => self.held = self.held.saturating_add(1),
         }
         self.t_world_camera = (self.t_world_camera * self.t_current_previous.inverse()).normalized();
+        self.refer_to_last();
+    }
+
+    /// Moves the camera by one frame as before. The reference stays, until it is too long ago.
+    pub fn hold(&mut self) {
+        self.held = self.held.saturating_add(1);
+        self.since_reference += 1;
+        self.t_world_camera = (self.t_world_camera * self.t_current_previous.inverse()).normalized();
+        if self.since_reference >= REFERENCE_FRAMES_MAX {
+            self.refer_to_last();
+            self.segment = self.segment.saturating_add(1);
+        }
+    }
+
+    /// The motion to the next frame from the reference, if the camera moves on as before.
+    fn expected(&self) -> Transform {
+        match self.since_reference {
+            0 => self.t_current_previous,
+            _ => (self.t_current_previous * self.t_world_camera.inverse() * self.t_world_reference).normalized(),
+        }
+    }
+
+    /// Whether a camera can have moved so since the reference, a frame's share of it being `motion`.
+    fn is_plausible(&self, config: &EgomotionConfig, motion: &Transform, estimate: &MotionEstimate) -> bool {
+        // Few matches can agree on anything.
+        let as_many = FEWER_INLIERS_MAX * estimate.inliers >= self.inliers;
+        let agree = estimate.inliers as f32 >= config.inlier_share_strong * estimate.matches as f32;
+        if self.motion_s <= 0.0 || as_many && agree {
+            return true;
+        }
+        let frame_s = self.reference_s / f64::from(self.since_reference + 1);
+        let (then, now) = (self.t_current_previous.translation() * (frame_s / self.motion_s), motion.translation());
+        (now - then).norm() <= config.acceleration_max_m_s2 * frame_s * frame_s + NOISE_M
+    }
+
+    fn refer_to_last(&mut self) {
+        (self.t_world_reference, self.since_reference, self.reference_s) = (self.t_world_camera, 0, 0.0);
+    }
+
+    /// Frames from the reference to the last one: 0 where the last one is the reference.
+    pub fn since_reference(&self) -> u32 {
+        self.since_reference
+    }
+
+    /// How often the reference had to be given up, so that the way from poses before to poses after rests on a guess.
+    pub fn segment(&self) -> u32 {
+        self.segment
     }
 
     /// Sets the camera's pose to a given one; its motion is the difference from the pose before.
     pub fn set_pose(&mut self, t_world_camera: &Transform) {
         self.t_current_previous = (t_world_camera.inverse() * self.t_world_camera).normalized();
         self.t_world_camera = t_world_camera.normalized();
-        self.held = 0;
+        (self.held, self.motion_s) = (0, 0.0);
+        self.refer_to_last();
     }
 
     #[cfg(test)]
@@ -82,10 +174,27 @@ impl Egomotion {
 
     /// Visits every field.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { t_world_camera, t_current_previous, held, random } = self;
+        let Self {
+            t_world_camera,
+            t_world_reference,
+            since_reference,
+            reference_s,
+            t_current_previous,
+            motion_s,
+            inliers,
+            held,
+            segment,
+            random,
+        } = self;
         visitor.transform(t_world_camera);
+        visitor.transform(t_world_reference);
+        visitor.u32(since_reference);
+        visitor.f64(reference_s);
         visitor.transform(t_current_previous);
+        visitor.f64(motion_s);
+        visitor.u32(inliers);
         visitor.u32(held);
+        visitor.u32(segment);
         random.visit(visitor);
     }
 

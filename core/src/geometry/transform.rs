@@ -142,6 +142,17 @@ impl Transform {
         2.0 * libm::atan2(libm::sqrt(x * x + y * y + z * z), libm::fabs(w))
     }
 
+    /// The motion of one of `parts` equal parts of a motion in which rotation and translation run side by side; 1 and more.
+    #[must_use]
+    pub(crate) fn part_of(&self, parts: u32) -> Self {
+        let ([x, y, z, w], parts) = (self.rotation, f64::from(parts.max(1)));
+        let sine = libm::sqrt(x * x + y * y + z * z);
+        // Of a quaternion and its negative, which are the same rotation, the one with the smaller angle.
+        let half_angle = libm::atan2(if w < 0.0 { -sine } else { sine }, libm::fabs(w));
+        let scale = if sine > SMALL_ANGLE_RAD { 2.0 * half_angle / (sine * parts) } else { 2.0 / parts };
+        Self::new([x * scale, y * scale, z * scale], self.translation_m.map(|metres| metres / parts))
+    }
+
     /// Whether all seven numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.rotation.iter().chain(&self.translation_m).all(|value| value.is_finite())
@@ -242,6 +253,18 @@ mod tests {
     fn bits_of(motion: &Isometry3<f64>) -> [u64; 7] {
         let (q, t) = (motion.rotation.coords, motion.translation.vector);
         [q.x, q.y, q.z, q.w, t.x, t.y, t.z].map(f64::to_bits)
+    }
+
+    #[test]
+    fn equal_parts_of_a_small_motion_make_it_up() {
+        let whole = Transform::new([0.02, -0.05, 0.01], [0.3, -0.1, 4.0]);
+        let part = whole.part_of(5);
+        assert!((part.angle_rad() * 5.0 - whole.angle_rad()).abs() < 1e-12);
+        assert!((part.distance_m() * 5.0 - whole.distance_m()).abs() < 1e-12);
+        let negative = Transform { rotation: whole.rotation.map(|value| -value), ..whole };
+        let difference = negative.part_of(5).inverse() * part;
+        assert!(difference.angle_rad() < 1e-9 && difference.distance_m() < 1e-12, "both quaternions are one rotation");
+        assert_eq!(Transform::from_translation([0.0, 0.0, 6.0]).part_of(3), Transform::from_translation([0.0, 0.0, 2.0]));
     }
 
     #[test]

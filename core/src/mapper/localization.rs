@@ -20,6 +20,8 @@ use crate::{
 pub(super) struct Localization<'m, 's> {
     pub config: &'m Config,
     pub frame: u32,
+    /// Time since the frame before, s.
+    pub interval_s: f32,
     pub disparity_q8: View<'m, u16>,
     pub scene_flow: &'m FlowMatcher<'s>,
     pub background: &'m Volume<'s>,
@@ -61,6 +63,7 @@ impl Localization<'_, '_> {
         mask: &EgomotionMask<'_, '_>,
         executor: &E,
     ) -> Located {
+        let (before, over_several) = (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
         let (origin, egomotion, icp, matches_excluded) = if let Some(t_world_camera) = &frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
@@ -68,14 +71,23 @@ impl Localization<'_, '_> {
         } else if self.config.mapper.egomotion == MotionSource::Icp {
             let report = (self.frame > 0).then(|| self.register_depth([frame.left.width(), frame.left.height()], executor));
             (self.origin(report.is_some()), None, report, 0)
-        } else if status == FlowStatus::Matched {
-            let (estimate, excluded) = self.estimate_from_matches(mask);
-            (self.origin(true), Some(estimate), None, excluded)
         } else {
-            (PoseOrigin::First, None, None, 0)
+            match status {
+                FlowStatus::Matched => {
+                    let (estimate, excluded) = self.estimate_from_matches(mask);
+                    (self.origin(true), Some(estimate), None, excluded)
+                }
+                FlowStatus::Frozen => {
+                    self.camera.hold();
+                    (self.origin(true), None, None, 0)
+                }
+                FlowStatus::First | FlowStatus::Refused => (PoseOrigin::First, None, None, 0),
+            }
         };
         let is_measured = matches!(origin, PoseOrigin::Estimated | PoseOrigin::Given);
-        let t_current_previous: Option<Transform> = is_measured.then(|| *self.camera.t_current_previous());
+        // After a guess the motion from the guessed pose, so that motions lead from pose to pose.
+        let last_motion = || if over_several { self.camera.t_world_camera().inverse() * before } else { *self.camera.t_current_previous() };
+        let t_current_previous: Option<Transform> = is_measured.then(last_motion);
         let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
         Located { origin, camera, egomotion, icp, matches_excluded }
     }
@@ -92,11 +104,13 @@ impl Localization<'_, '_> {
     /// Estimates the motion from the matches the mask includes; and how many it excludes.
     fn estimate_from_matches(&mut self, mask: &EgomotionMask<'_, '_>) -> (MotionEstimate, u32) {
         let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
-        let included = selection.iter().filter(|&&index| mask.includes(index));
+        // Masks are of the frame before; matches over several frames are left to RANSAC.
+        let over_several = self.camera.since_reference() > 0;
+        let included = selection.iter().filter(|&&index| over_several || mask.includes(index));
         let excluded = selection.len() - included.clone().count();
         let matches = included.filter_map(|&index| refined.get(index as usize));
         let rig = self.config.scaled_rig();
-        let estimate = self.camera.step(&self.config.egomotion, &rig, matches.clone(), self.estimator);
+        let estimate = self.camera.step(&self.config.egomotion, &rig, self.interval_s, matches.clone(), self.estimator);
         // A motion few matches agree with says nothing about the rig.
         if let Some(motion) = estimate.t_current_previous.filter(|_| 2 * estimate.inliers >= estimate.matches) {
             self.self_calibration.update(&rig, matches.filter_map(|m| observations(&rig, m)), &motion);

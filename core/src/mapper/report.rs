@@ -55,7 +55,7 @@ pub enum PoseOrigin {
     First,
     /// Estimated from this frame.
     Estimated,
-    /// A guess: the estimate failed, and the motion before was held.
+    /// A guess: the estimate failed, and the motion before was held. The next frames are matched with the last one whose pose is not a guess.
     Held,
     /// Given with the frame.
     Given,
@@ -95,6 +95,9 @@ pub struct Report {
     pub scene_flow: FlowReport,
     /// How the pose came about.
     pub pose: PoseOrigin,
+    /// How often the camera was lost for so long ([`crate::egomotion::REFERENCE_FRAMES_MAX`] frames) that it went on from a guessed pose: since
+    /// then this pose and all that is mapped from it stand beside what was mapped before.
+    pub segment: u32,
     /// The camera's motion from matches; none was looked for in the first frame, nor where the pose was given.
     pub egomotion: Option<MotionEstimate>,
     /// The camera's motion from depth, where that is asked for; none in the first frame.
@@ -127,7 +130,7 @@ impl Report {
         let allocation = &self.allocation;
         let blocks = allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
         let refused = blocks + self.instances.refused() + self.internal_faults;
-        if self.pose == PoseOrigin::Held || refused > 0 || self.self_calibration.is_uncorrected() {
+        if self.pose == PoseOrigin::Held || self.segment > 0 || refused > 0 || self.self_calibration.is_uncorrected() {
             Severity::MapAffected
         } else if self.dropped_features() + self.prune.early > 0 || self.self_calibration.state() > CalibrationState::Sound {
             Severity::Recovered

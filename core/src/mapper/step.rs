@@ -79,14 +79,18 @@ impl Mapper<'_> {
         let (stereo, scene_flow) = match_images(config, &mut self.stereo, &mut self.scene_flow, frame, invalid.as_ref(), executor);
         correct_disparity(config, self.self_calibration.correction(), &mut self.stereo, &mut self.scene_flow, executor);
         let disparity_q8 = self.stereo.disparity_q8();
-        let matches = FrameMatches { refined: self.scene_flow.refined(), sparse: self.scene_flow.sparse() };
+        // Objects are followed from frame to frame: matches with an earlier one say nothing of theirs.
+        let with_last = self.camera.since_reference() == 0;
+        let matches = if with_last { frame_matches(&self.scene_flow) } else { FrameMatches::default() };
         // (B) Detections, associated with tracks, and the matches assigned to them.
-        self.tracker.set_frame_interval_s(self.clock.advance(frame.time_ns, config.tracking.frame_interval_s));
+        let interval_s = self.clock.advance(frame.time_ns, config.tracking.frame_interval_s);
+        self.tracker.set_frame_interval_s(interval_s);
         let assigned = executor.stage(Stage::Instances, || self.tracker.detect(self.frame, frame.detections, size).assign_matches(matches));
         // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
         let mut localization = Localization {
             config,
             frame: self.frame,
+            interval_s,
             disparity_q8,
             scene_flow: &self.scene_flow,
             background: &self.background,
@@ -99,10 +103,10 @@ impl Mapper<'_> {
         let mask = assigned.egomotion_mask();
         let located = executor.stage(Stage::Egomotion, || localization.locate(frame, scene_flow.status, &mask, executor));
         // (B) Moving objects that no detector found, and (D) the objects' motions.
-        let search = GuidedMatching { matcher: &self.scene_flow, disparity_q8 };
-        let segment_motion = || assigned.segment_motion(&rig, &located.camera, disparity_q8, Some(search));
+        let search = with_last.then_some(GuidedMatching { matcher: &self.scene_flow, disparity_q8 });
+        let segment_motion = || assigned.segment_motion(&rig, &located.camera, disparity_q8, search);
         let assigned = executor.stage(Stage::Segmentation, segment_motion);
-        let estimate_motions = || assigned.estimate_motions(&rig, &located.camera, Some(search), &mut self.estimator);
+        let estimate_motions = || assigned.estimate_motions(&rig, &located.camera, search, &mut self.estimator);
         let mut tracked = executor.stage(Stage::Instances, estimate_motions);
         // (E) The static map, without what moves or may move, and the objects' maps; unless the pose is extrapolated.
         let fused = located.origin != PoseOrigin::Held && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
@@ -116,6 +120,9 @@ impl Mapper<'_> {
         });
         // (F) Noise last observed a fixed lag ago is removed.
         let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
+        if self.camera.since_reference() > 0 {
+            self.scene_flow.keep_previous();
+        }
         self.finish_frame(Outcome { stereo, scene_flow, located, tracking, fused, allocation, prune })
     }
 
@@ -130,6 +137,7 @@ impl Mapper<'_> {
             stereo,
             scene_flow,
             pose: located.origin,
+            segment: self.camera.segment(),
             egomotion: located.egomotion,
             icp: located.icp,
             self_calibration: self.self_calibration.report(),
@@ -195,6 +203,11 @@ impl Mapper<'_> {
             self.objects.visit_crops(hasher);
         })
     }
+}
+
+/// The matches of a frame.
+fn frame_matches<'m>(scene_flow: &'m FlowMatcher<'_>) -> FrameMatches<'m> {
+    FrameMatches { refined: scene_flow.refined(), sparse: scene_flow.sparse() }
 }
 
 /// Depth from the pair, unless it is given, and matches over this pair and the last: neither needs the other.

@@ -1,7 +1,7 @@
 //! Which vector instructions kernels may use: told to the core by its caller, never a reason for another bit.
 //!
 //! A value of [`Vectors`] above [`Vectors::BASELINE`] exists only where the processor was asked, so that a kernel may
-//! rely on it (docs/decisions/0022-vector-kernels.md).
+//! rely on it (docs/decisions/0023-vector-kernels.md).
 
 /// Vector instructions that a machine has.
 ///
@@ -69,7 +69,7 @@ impl Vectors {
 }
 
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
-#[expect(unsafe_code, reason = "asks for the processor's state; docs/decisions/0022-vector-kernels.md")]
+#[expect(unsafe_code, reason = "asks for the processor's state; docs/decisions/0023-vector-kernels.md")]
 mod x86 {
     use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 

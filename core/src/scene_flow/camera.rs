@@ -127,6 +127,17 @@ impl<'s> Camera<'s> {
         self.describe(width, height, invalid, response_min)
     }
 
+    /// Makes the previous frame the current one again: the next image overwrites the last one.
+    pub(super) fn forget_current(&mut self) {
+        self.current = !self.current;
+    }
+
+    /// Whether the current image is the previous one, bit for bit.
+    pub(super) fn is_repeated(&self, [width, height]: [usize; 2]) -> bool {
+        let ((previous, current), pixels) = (self.frames(), width * height);
+        previous.pixels.get(..pixels) == current.pixels.get(..pixels)
+    }
+
     /// Visits the pixels of the current frame; [`Camera::describe`] finds the rest. The frame before is not
     /// looked at again.
     pub(super) fn visit(&mut self, [width, height]: [usize; 2], visitor: &mut impl Visitor) {

@@ -185,6 +185,12 @@ impl<'s> FlowMatcher<'s> {
         digest.finish()
     }
 
+    /// Forgets the last frame alone: the next one is matched with the one before it.
+    pub fn keep_previous(&mut self) {
+        self.left.forget_current();
+        self.right.forget_current();
+    }
+
     /// Forgets the last frame: the next one is a first one.
     pub fn reset(&mut self) {
         self.last = None;
@@ -271,6 +277,10 @@ impl<'s> FlowMatcher<'s> {
         let mut report = FlowReport { left, right, ..FlowReport::default() };
         if self.last.replace(size) != Some(size) {
             report.status = FlowStatus::First;
+            return report;
+        }
+        if self.left.is_repeated(size) != self.right.is_repeated(size) {
+            report.status = FlowStatus::Frozen;
             return report;
         }
         self.matched = true;

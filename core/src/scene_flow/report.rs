@@ -12,6 +12,8 @@ pub enum FlowStatus {
     Matched,
     /// There is no previous frame, or it had another size: no matches.
     First,
+    /// One camera delivered its previous image again, bit for bit, and the other did not: no matches.
+    Frozen,
     /// The images differ in size or exceed the capacity: nothing was done, and the next frame is a first one.
     Refused,
 }

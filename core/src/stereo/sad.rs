@@ -1,7 +1,7 @@
 //! Sums of absolute differences of eight descriptors at a time, by the vector instructions there are.
 //!
 //! x86 has one instruction for such sums, which compilers find in a loop over one pair at most. Work that compares descriptors is
-//! therefore written once, over [`Eight`] pairs, and compiled for each level of instructions (docs/decisions/0022-vector-kernels.md).
+//! therefore written once, over [`Eight`] pairs, and compiled for each level of instructions (docs/decisions/0023-vector-kernels.md).
 
 use super::descriptor::{Descriptor, distance};
 use crate::parallel::{Level, Vectors};

@@ -195,6 +195,7 @@ impl MotionConfig {
             inlier_px: self.inlier_px,
             refined_inlier_px: 0.75 * self.inlier_px,
             matches_min: 6,
+            inlier_share_min: 0.0,
             side_knee: 10.0,
             ..EgomotionConfig::default()
         }

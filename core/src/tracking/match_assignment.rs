@@ -58,7 +58,7 @@ impl From<MatchOwner> for OwnerCode {
 }
 
 /// The matches of a frame.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FrameMatches<'m> {
     /// Refined below the pixel.
     pub refined: &'m [Match],

@@ -12,6 +12,7 @@ use super::settings::{Settings, on_or_off};
 use crate::input::bags::Topics;
 use crate::input::depth::{self, DepthChoice};
 use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
+use crate::input::faults::{self, Faults};
 use crate::input::stream::WhenLate;
 use crate::input::{self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking, StopRequest};
 use crate::observe::Reference;
@@ -129,6 +130,10 @@ pub struct RunArgs {
     /// Leave out frames that cannot be read or mapped, and count them; otherwise the run ends before the first of them
     #[arg(long)]
     skip_bad_frames: bool,
+    /// Inject faults, to see what becomes of them: NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT], separated by commas; drop,
+    /// duplicate, swap, jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS, occlude=SHARE, brightness=FACTOR, masks; seed=N
+    #[arg(long, value_name = "SPEC")]
+    faults: Option<Faults>,
     /// Map images that are refused as exchanged, unrectified, out of order, black or the same in both cameras
     #[arg(long)]
     force: bool,
@@ -211,7 +216,7 @@ impl RunArgs {
         };
         let dataset = depth::attach(dataset, &self.depth)?;
         let dataset = if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) };
-        Ok(self.masks.attach(dataset)?)
+        faults::attach(self.masks.attach(dataset)?, self.faults.as_ref()).map_err(anyhow::Error::msg)
     }
 }
 

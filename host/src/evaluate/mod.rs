@@ -1,5 +1,6 @@
 //! How good a run was, where the truth is known.
 
+pub mod faults;
 pub mod histogram;
 pub mod masks;
 pub mod objects;

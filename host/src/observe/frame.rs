@@ -48,6 +48,11 @@ pub struct FrameRow {
 }
 
 impl FrameRow {
+    /// Its time, ns: by its stamp, else by an assumed rate.
+    pub fn time_ns(&self) -> u64 {
+        self.stamp_ns.unwrap_or((self.time_s * 1e9).round() as u64)
+    }
+
     /// How the camera's motion was found, in one word.
     pub fn motion(&self) -> &'static str {
         if let Some(icp) = &self.report.icp {
@@ -62,11 +67,13 @@ impl FrameRow {
         }
         match self.report.egomotion.map(|motion| motion.status) {
             None if self.report.pose == PoseOrigin::Given => "given",
+            None if self.report.pose == PoseOrigin::Held => "frozen_image",
             None => "first",
             Some(MotionStatus::Estimated) => "estimated",
             Some(MotionStatus::TooFewMatches) => "too_few_matches",
             Some(MotionStatus::TooFewInliers) => "too_few_inliers",
             Some(MotionStatus::NotConverged) => "not_converged",
+            Some(MotionStatus::Implausible) => "implausible",
             Some(MotionStatus::BadRig) => "bad_rig",
         }
     }
@@ -103,6 +110,7 @@ impl FrameRow {
     pub fn cause(&self) -> String {
         let (allocation, motion, masks) = (&self.report.allocation, self.motion(), &self.mask_refusals);
         let instances = &self.report.instances;
+        let lost = (self.report.segment > 0).then(|| "the pose rests on a guess: the camera was lost before".to_owned());
         let guessed = self.held().then(|| format!("no motion estimate ({}), the frame was not fused", motion.replace('_', " ")));
         let counts = [
             (allocation.refused, "block requests refused, the pool is full"),
@@ -121,7 +129,7 @@ impl FrameRow {
             (u32::from(self.report.self_calibration.is_uncorrected()), "disparity offset that is known and not corrected"),
         ];
         let counted = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
-        guessed.into_iter().chain(counted).collect::<Vec<_>>().join("; ")
+        guessed.into_iter().chain(lost).chain(counted).collect::<Vec<_>>().join("; ")
     }
 
     /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the list of visible ones.

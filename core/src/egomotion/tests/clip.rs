@@ -129,7 +129,7 @@ fn run(name: &str) -> Option<Vec<Matrix4<f64>>> {
         let begin = cpu_ms();
         let report = matcher.push(&SceneFlowConfig::default(), left_view, right_view, &Serial);
         let matched = cpu_ms();
-        let estimate = (frame > 0).then(|| camera.step(&EgomotionConfig::default(), &rig, matcher.bucketed(), &mut estimator));
+        let estimate = (frame > 0).then(|| camera.step(&EgomotionConfig::default(), &rig, 0.1, matcher.bucketed(), &mut estimator));
         (matching_ms, moving_ms) = (matching_ms + matched - begin, moving_ms + cpu_ms() - matched);
         if let Some(estimate) = estimate {
             assert_eq!(estimate.status, MotionStatus::Estimated, "{name} {frame}: {report:?} {estimate:?}");

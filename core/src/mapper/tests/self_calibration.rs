@@ -71,7 +71,7 @@ fn driven(by_px: f64) -> Option<(SelfCalibrationReport, f64)> {
         matcher.push(&SceneFlowConfig::default(), images[0], images[1], &Serial);
         matcher.correct(calibration.correction().for_rig(&RIG));
         if frame > 0 {
-            let estimate = camera.step(&EgomotionConfig::default(), &RIG, matcher.bucketed(), &mut estimator);
+            let estimate = camera.step(&EgomotionConfig::default(), &RIG, 0.1, matcher.bucketed(), &mut estimator);
             let observations = matcher
                 .bucketed()
                 .map(|m| [(m.previous_left, m.previous_right), (m.current_left, m.current_right)].map(|(l, r)| RIG.observation(l, r)));

@@ -1,5 +1,6 @@
 //! `dynvox evaluate`: figures from files, without a run.
 
+mod faults;
 mod masks;
 mod stereo;
 mod trajectory;
@@ -18,6 +19,8 @@ enum Subject {
     Stereo(stereo::StereoArgs),
     /// Evaluate instance masks against true ones: IoU mask by mask, and recall
     Masks(masks::MasksArgs),
+    /// Map with one fault after the other and say what is reported of each
+    Faults(faults::FaultsArgs),
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -25,5 +28,6 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         Subject::Trajectory(args) => trajectory::run(args),
         Subject::Stereo(args) => stereo::run(args),
         Subject::Masks(args) => masks::run(args),
+        Subject::Faults(args) => faults::run(args),
     }
 }

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 39] = [
+pub const FIXED_ARGUMENTS: [&str; 40] = [
     "path",
     "sequence",
     "dataset",
@@ -45,6 +45,7 @@ pub const FIXED_ARGUMENTS: [&str; 39] = [
     "strict",
     "skip_bad_frames",
     "force",
+    "faults",
     "out",
     "overwrite",
 ];

@@ -167,8 +167,9 @@ mod tests {
         assert_eq!(mot("1,-1,11,21,5,6,0,3,1"), Some(None), "a region to ignore");
         assert_eq!(mot("2,-1,11,21,5,6,57.3,-1,-1,-1").flatten().map(|row| (row.1, row.2)), Some((None, 1.0)));
         assert_eq!(own("2 traffic light 0.7 1 2 3.5 4"), Some(Some((None, Some(Class::Other), 0.7, [1.0, 2.0, 3.5, 4.0]))));
-        for wrong in ["", "1 2 3", "frame,id,left,top,width,height", "0,1,2,3,4,5", "3 7 Van 0 1 -1.5 10.0 20.0"] {
+        for wrong in ["", "1 2 3", "frame,id,left,top,width,height", "0,1,2,3,4,5"] {
             assert!(kitti_tracking(wrong).is_none() && mot(wrong).is_none() && own(wrong).is_none(), "{wrong}");
         }
+        assert!(kitti_tracking("3 7 Van 0 1 -1.5 10.0 20.0").is_none(), "a label cut off");
     }
 }

@@ -1,0 +1,109 @@
+//! What a run with a fault in its images makes of it: how wrong poses are that nothing warns of, what is fused from them, and when all is
+//! well again.
+
+use dynvox_core::geometry::Transform;
+use dynvox_core::{PoseOrigin, Severity};
+use serde::Serialize;
+
+/// A pose further than this from the true one is wrong, m.
+pub const WRONG_M: f64 = 0.3;
+/// A pose turned further than this from the true one is wrong, degrees.
+pub const WRONG_DEG: f64 = 2.0;
+
+/// What a frame with a known true pose came to.
+#[derive(Clone, Copy, Debug)]
+pub struct EvaluatedFrame {
+    /// The estimate, camera to world.
+    pub t_world_camera: Transform,
+    /// The truth, camera to world.
+    pub true_t_world_camera: Transform,
+    /// How the pose came about.
+    pub pose: PoseOrigin,
+    /// The worst event that was reported.
+    pub severity: Severity,
+    /// Whether it was fused.
+    pub fused: bool,
+}
+
+/// What a fault came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct FaultOutcome {
+    /// Largest distance from the true pose among frames that nothing is reported of, m.
+    pub unreported_m: f64,
+    /// Largest angle from the true pose among them, degrees.
+    pub unreported_deg: f64,
+    /// Frames with a wrong pose that nothing is reported of.
+    pub unreported_frames: usize,
+    /// Frames fused from a wrong pose.
+    pub wrong_fused: usize,
+    /// Frames whose pose was extrapolated.
+    pub held: usize,
+    /// Frames reported to affect the map.
+    pub map_affected: usize,
+    /// Frames from the first with the fault until all that follow are right and nothing is reported of them; `None` where the last is not.
+    pub recovered_after: Option<usize>,
+}
+
+impl FaultOutcome {
+    /// Of frames; `first` is the first that a fault may have touched. Poses are compared from the frame before it on, so that
+    /// drift until then does not count.
+    pub fn of(frames: &[EvaluatedFrame], first: usize) -> Self {
+        let Some(before) = frames.get(first.saturating_sub(1)) else { return Self::default() };
+        let mut outcome = Self { recovered_after: Some(0), ..Self::default() };
+        for (since, frame) in frames.iter().skip(first).enumerate() {
+            let moved = before.t_world_camera.inverse() * frame.t_world_camera;
+            let truly = before.true_t_world_camera.inverse() * frame.true_t_world_camera;
+            let error = truly.inverse() * moved;
+            let (distance_m, angle_deg) = (error.distance_m(), error.angle_rad().to_degrees());
+            let (wrong, reported) = (distance_m > WRONG_M || angle_deg > WRONG_DEG, frame.severity >= Severity::MapAffected);
+            if !reported {
+                outcome.unreported_m = outcome.unreported_m.max(distance_m);
+                outcome.unreported_deg = outcome.unreported_deg.max(angle_deg);
+                outcome.unreported_frames += usize::from(wrong);
+            }
+            outcome.wrong_fused += usize::from(wrong && frame.fused);
+            outcome.held += usize::from(frame.pose == PoseOrigin::Held);
+            outcome.map_affected += usize::from(reported);
+            if wrong || reported {
+                outcome.recovered_after = (first + since + 1 < frames.len()).then_some(since + 1);
+            }
+        }
+        outcome
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    /// A camera that moves by 1 m a frame, each pose so many metres too far.
+    fn run_with(frames: &[(f64, Severity)]) -> Vec<EvaluatedFrame> {
+        let at = |z: f64| Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, z));
+        let frame = |(index, &(off_m, severity)): (usize, &(f64, Severity))| EvaluatedFrame {
+            t_world_camera: at(index as f64 + off_m),
+            true_t_world_camera: at(index as f64),
+            pose: PoseOrigin::Estimated,
+            severity,
+            fused: true,
+        };
+        frames.iter().enumerate().map(frame).collect()
+    }
+
+    #[test]
+    fn a_wrong_pose_counts_as_unreported_only_where_nothing_is_said() {
+        let (info, affected) = (Severity::Info, Severity::MapAffected);
+        let outcome = FaultOutcome::of(&run_with(&[(0.0, info), (0.1, info), (2.0, affected), (1.0, info), (0.2, info)]), 1);
+        assert!((outcome.unreported_m - 1.0).abs() < 1e-9, "{outcome:?}");
+        assert_eq!((outcome.unreported_frames, outcome.wrong_fused, outcome.map_affected), (1, 2, 1));
+        assert_eq!(outcome.recovered_after, Some(3));
+        assert_eq!(FaultOutcome::of(&run_with(&[(0.0, info), (0.0, info)]), 1).recovered_after, Some(0));
+        assert_eq!(FaultOutcome::of(&run_with(&[(0.0, info), (9.0, info)]), 1).recovered_after, None);
+    }
+
+    #[test]
+    fn drift_before_the_fault_does_not_count() {
+        let outcome = FaultOutcome::of(&run_with(&[(5.0, Severity::Info), (5.0, Severity::Info)]), 1);
+        assert_eq!((outcome.unreported_m, outcome.unreported_frames), (0.0, 0));
+    }
+}

@@ -1,0 +1,145 @@
+//! Faults injected into a recording, drawn from a seed: what cameras, cables, drivers and detectors do wrong.
+//!
+//! [`Faults`] says which, [`FaultySource`] is the recording with them. The truth of a frame is that of the images delivered.
+
+mod order;
+mod pictures;
+mod spec;
+#[cfg(test)]
+mod tests;
+
+pub use spec::{Fault, FaultKind, Faults, Side};
+
+use super::source::{AvailableMasks, FrameSource, InputError, LidarScan, StereoImages, StreamState};
+use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::random::Random;
+use dynvox_core::rectify::Rectification;
+use order::{Delivery, deliveries};
+
+/// A recording with faults, if there are any to be injected.
+///
+/// # Errors
+/// A sentence: the recording is a stream.
+pub fn attach(recording: Box<dyn FrameSource>, faults: Option<&Faults>) -> Result<Box<dyn FrameSource>, String> {
+    match faults {
+        None => Ok(recording),
+        Some(faults) => Ok(Box::new(FaultySource::new(recording, faults.clone())?)),
+    }
+}
+
+/// A recording with faults.
+pub struct FaultySource {
+    inner: Box<dyn FrameSource>,
+    faults: Faults,
+    order: Vec<Delivery>,
+    truth: Option<Vec<Transform>>,
+    notes: Vec<String>,
+}
+
+impl FaultySource {
+    /// Injects `faults` into `inner`.
+    ///
+    /// # Errors
+    /// A sentence: a stream has no frames to go back or on to.
+    pub fn new(inner: Box<dyn FrameSource>, faults: Faults) -> Result<Self, String> {
+        if inner.stream().is_some() {
+            return Err("--faults needs a recording, and this is a stream. Save its frames to a folder first".to_owned());
+        }
+        let order = deliveries(inner.len(), &faults);
+        let truth = inner.truth().map(|truth| order.iter().filter_map(|one| truth.get(one.frame).copied()).collect());
+        let mut notes = inner.notes().to_vec();
+        notes.push(format!("faults are injected, {} in all", faults.list.len()));
+        Ok(Self { inner, faults, order, truth, notes })
+    }
+
+    /// The source's frame that is delivered at a position.
+    fn delivered(&self, position: usize) -> Result<Delivery, InputError> {
+        self.order.get(position).copied().ok_or(InputError::PastEnd { frames: self.order.len() })
+    }
+
+    /// The frame whose image a fault delivers instead of this one's.
+    fn replaced_by(&self, kind: FaultKind, first: usize, position: usize) -> Option<(Side, usize)> {
+        match kind {
+            FaultKind::Freeze(side) => Some((side, first.saturating_sub(1))),
+            FaultKind::Delay(side) => Some((side, position.saturating_sub(1))),
+            _ => None,
+        }
+    }
+}
+
+impl FrameSource for FaultySource {
+    fn frame(&self, position: usize) -> Result<StereoImages, InputError> {
+        let mut images = self.inner.frame(self.delivered(position)?.frame)?;
+        for (number, fault) in self.faults.list.iter().enumerate().filter(|(_, fault)| fault.covers(position)) {
+            let mut random = Random::new(self.faults.seed ^ ((number as u64 + 1) << 32) ^ (position as u64 + 1).wrapping_mul(0x9E37_79B9));
+            if random.below(100) >= fault.percent {
+                continue;
+            }
+            match self.replaced_by(fault.kind, fault.first, position) {
+                Some((side, other)) => pictures::put_side(side, self.inner.frame(self.delivered(other)?.frame)?, &mut images),
+                None => pictures::apply(fault.kind, &mut images, &mut random),
+            }
+        }
+        Ok(images)
+    }
+
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    fn stream(&self) -> Option<StreamState> {
+        None
+    }
+
+    fn size(&self) -> (usize, usize) {
+        self.inner.size()
+    }
+
+    fn full_size(&self) -> (usize, usize) {
+        self.inner.full_size()
+    }
+
+    fn stem(&self, position: usize) -> Option<String> {
+        self.inner.stem(self.order.get(position)?.frame)
+    }
+
+    fn masks(&self) -> AvailableMasks {
+        self.inner.masks()
+    }
+
+    fn rig(&self) -> StereoRig {
+        self.inner.rig()
+    }
+
+    fn rectification(&self) -> Option<&Rectification> {
+        self.inner.rectification()
+    }
+
+    fn stamp_ns(&self, position: usize) -> Option<u64> {
+        self.inner.stamp_ns(self.order.get(position)?.stamp)
+    }
+
+    fn time_s(&self, position: usize) -> f64 {
+        self.inner.time_s(self.order.get(position).map_or(position, |one| one.stamp))
+    }
+
+    fn has_lidar(&self, position: usize) -> bool {
+        self.order.get(position).is_some_and(|one| self.inner.has_lidar(one.frame))
+    }
+
+    fn lidar(&self, position: usize) -> Result<Option<LidarScan>, InputError> {
+        self.inner.lidar(self.delivered(position)?.frame)
+    }
+
+    fn truth(&self) -> Option<&[Transform]> {
+        self.truth.as_deref()
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}

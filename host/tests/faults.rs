@@ -1,0 +1,45 @@
+//! Faults in the images: what is wrong is said, and the camera is found again.
+#![allow(missing_docs)]
+
+mod binary;
+
+use binary::{dynvox, output_text};
+use tempfile::TempDir;
+
+/// What the report says of one fault from frame 8 on, in 18 frames of a small street.
+fn outcome(fault: &str) -> serde_json::Value {
+    let root = TempDir::new().unwrap();
+    let of_faults = ["evaluate", "faults", "--json", "--at", "8", "--frames", "18", "--fault", fault, "--"];
+    let of_run = ["--profile", "small", "--instances", "none", "--set", "street.width=416", "--set", "street.height=128"];
+    let run = dynvox(root.path(), &[&of_faults[..], &of_run].concat());
+    assert!(run.status.success(), "{fault}: {}", output_text(&run));
+    serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap()[0].clone()
+}
+
+#[test]
+fn after_blind_frames_the_camera_is_found_again() {
+    for fault in ["black@8..11", "noise=60@8..11", "exchange@8", "occlude:left=0.95@8..11"] {
+        let of = outcome(fault);
+        assert_eq!((of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()), (Some(0), Some(0)), "{of}");
+        assert!(of["held"].as_u64() > Some(0) && of["unreported_m"].as_f64() < Some(0.15), "{of}");
+    }
+}
+
+#[test]
+fn a_frozen_camera_and_a_jump_are_not_taken_for_motion() {
+    for fault in ["freeze:right@8..", "freeze:left@8..", "jump=20@8"] {
+        let of = outcome(fault);
+        assert_eq!(of["unreported_frames"].as_u64(), Some(0), "{of}");
+        assert!(of["map_affected"].as_u64() > Some(6), "{of}");
+    }
+}
+
+#[test]
+fn a_stream_and_a_data_set_without_poses_are_refused_with_a_sentence() {
+    let root = TempDir::new().unwrap();
+    binary::rig(root.path(), 4);
+    let run = dynvox(root.path(), &["evaluate", "faults", "--at", "2", "--frames", "4", "--fault", "black@2", "--", "rig", "--profile", "tiny"]);
+    assert!(!run.status.success() && output_text(&run).contains("has no true poses"), "{}", output_text(&run));
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--faults", "melt@3"]);
+    assert!(run.status.code() == Some(2) && output_text(&run).contains("there is no fault melt"), "{}", output_text(&run));
+}
