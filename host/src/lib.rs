@@ -8,6 +8,7 @@ pub mod input;
 pub mod observe;
 pub mod report;
 pub mod run;
+pub mod scene;
 pub mod slab;
 pub mod sweep;
 pub mod synth;

@@ -23,18 +23,26 @@ fn a_run_leaves_its_folder_and_json_alone_on_standard_output() {
         assert!(!summary[key].is_null(), "{key}");
     }
     assert!(summary["stages"]["stereo"]["cpu_median_ms"].as_f64().unwrap() > 0.0);
-    let files =
-        ["config.toml", "frames.csv", "map.ply", "report.html", "summary.json", "tracks.csv", "trajectory_kitti.txt", "trajectory_tum.txt"];
+    let files = [
+        "capacity.toml",
+        "config.toml",
+        "frames.csv",
+        "map.glb",
+        "map.ply",
+        "pictures",
+        "report.html",
+        "summary.json",
+        "tracks.csv",
+        "trajectory_kitti.txt",
+        "trajectory_tum.txt",
+    ];
     assert_eq!(names(&root.path().join("result")), files);
     assert_eq!(names(root.path()), ["result", "rig"]);
     let csv = fs::read_to_string(root.path().join("result/frames.csv")).unwrap();
     let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
     assert!(columns.len() == 4 && columns.iter().all(|count| *count == columns[0]), "one header, three rows, equal widths");
     let report = fs::read_to_string(root.path().join("result/report.html")).unwrap();
-    assert!(
-        !report.contains("http") && !report.contains("<script") && report.contains("data:image/png;base64,"),
-        "one self-contained file"
-    );
+    assert!(!report.contains("://") && report.contains("data:image/png;base64,"), "one self-contained file");
 }
 
 #[test]
@@ -276,7 +284,7 @@ fn what_moves_is_kept_apart_unless_no_masks_are_taken_or_all_goes_into_one_map()
     let (meshes, paths): (Vec<&String>, Vec<&String>) = objects.iter().partition(|name| name.ends_with(".ply"));
     assert!(!tracks.is_empty() && !meshes.is_empty(), "{with}");
     assert_eq!(meshes.len(), paths.len(), "each mesh comes with its trajectory: {objects:?}");
-    for name in paths {
+    for name in paths.iter().filter(|name| name.ends_with("_kitti.txt")) {
         let path = fs::read_to_string(root.path().join("with/objects").join(name)).unwrap();
         assert!(!path.is_empty() && path.lines().all(|line| line.split(' ').count() == 13), "{name}: a frame and twelve numbers a line");
     }

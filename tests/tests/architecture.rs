@@ -64,13 +64,14 @@ const HOST: Layers = &[
     ("formats", &[]),
     ("synth", &["formats"]),
     ("input", &["formats", "slab", "synth"]),
+    ("scene", &["formats"]),
     ("evaluate", &["formats", "input"]),
-    ("observe", &["evaluate", "formats", "input", "slab"]),
-    ("run", &["evaluate", "formats", "input", "observe", "slab"]),
-    ("report", &["evaluate", "formats", "observe", "run"]),
+    ("observe", &["evaluate", "formats", "input", "scene", "slab"]),
+    ("run", &["evaluate", "formats", "input", "observe", "scene", "slab"]),
+    ("report", &["evaluate", "formats", "observe", "run", "scene"]),
     ("sweep", &["evaluate", "formats", "observe", "report", "run"]),
     ("fixtures", &["formats", "input", "run", "slab"]),
-    ("cli", &["evaluate", "fixtures", "formats", "input", "observe", "report", "run", "slab", "sweep", "synth"]),
+    ("cli", &["evaluate", "fixtures", "formats", "input", "observe", "report", "run", "scene", "slab", "sweep", "synth"]),
 ];
 
 #[test]

@@ -16,6 +16,9 @@ pub struct DiffArgs {
     /// Accept runs that agree in every frame they share
     #[arg(long)]
     shared: bool,
+    /// Write the comparison to standard output as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 /// 0 for equal runs, 1 for different ones, 2 where they cannot be compared.
@@ -32,8 +35,24 @@ pub fn main(args: &DiffArgs) -> ExitCode {
 
 fn run(args: &DiffArgs) -> anyhow::Result<bool> {
     let comparison = compare(&RunDigests::read(&args.a)?, &RunDigests::read(&args.b)?)?;
-    out!("{}", sentences(&comparison, [&args.a, &args.b]));
+    if args.json {
+        outln!("{}", serde_json::to_string_pretty(&to_json(&comparison))?);
+    } else {
+        out!("{}", sentences(&comparison, [&args.a, &args.b]));
+    }
     Ok(comparison.equal() || args.shared && comparison.divergence.is_none())
+}
+
+fn to_json(comparison: &Comparison) -> serde_json::Value {
+    let frames = |[first, last, count]: [usize; 3]| serde_json::json!({ "first": first, "last": last, "count": count });
+    let divergence = comparison.divergence.as_ref();
+    serde_json::json!({
+        "equal": comparison.equal(),
+        "shared_frames": comparison.shared,
+        "frames": comparison.frames.map(frames),
+        "divergence": divergence.map(|at| serde_json::json!({ "frame": at.frame, "stage": at.stage.map(|stage| stage.to_string()) })),
+        "settings": comparison.settings.iter().map(|one| serde_json::json!({ "key": one.key, "values": one.values })).collect::<Vec<_>>(),
+    })
 }
 
 fn sentences(comparison: &Comparison, names: [&Path; 2]) -> String {

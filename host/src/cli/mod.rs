@@ -17,8 +17,10 @@ mod capacity;
 mod diff;
 mod egomotion;
 mod evaluate;
+mod export;
 mod fixtures;
 mod inspect;
+mod manual;
 mod output;
 mod rectified;
 mod run;
@@ -26,8 +28,9 @@ mod settings;
 mod signals;
 mod sweep;
 mod synth;
+mod view;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 const EXAMPLES: &str = "\
@@ -55,6 +58,7 @@ Examples:
   dynvox synth --out street --set street.frames=50
   dynvox bench ~/kitti --sequence 06 --frames 60    CPU time of every stage, on one thread and on two
   dynvox fixtures new pinned --from ~/my-rig --memory 32MiB   digests of your own rig, for your CI
+  dynvox view out/street-001                    its map in the browser
   dynvox diff out/a out/b                       the first frame and stage in which two runs diverge
 
 A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open the last in a browser.
@@ -86,12 +90,18 @@ enum Command {
     Sweep(Box<sweep::SweepArgs>),
     /// Write the synthetic street in KITTI's layout, with its ground truth
     Synth(synth::SynthArgs),
+    /// Turn the map of a finished run in the browser, frame by frame
+    View(view::ViewArgs),
     /// Name the first frame and stage in which two runs diverge
     Diff(diff::DiffArgs),
     /// Take the CPU time of every stage: on one thread, and what bounds it on two
     Bench(bench::BenchArgs),
     /// Replay small clips against the digests on file
     Fixtures(fixtures::FixturesArgs),
+    /// Write completions for a shell: dynvox completions bash > ~/.local/share/bash-completion/completions/dynvox
+    Completions(manual::CompletionsArgs),
+    /// Write the manual: dynvox man | man -l -
+    Man(manual::ManArgs),
 }
 
 /// Exit code of a run whose images would give a meaningless map.
@@ -110,9 +120,15 @@ pub fn main() -> ExitCode {
         Some(Command::Evaluate(args)) => evaluate::run(&args),
         Some(Command::Sweep(args)) => sweep::run(&args),
         Some(Command::Synth(args)) => synth::run(&args),
+        Some(Command::View(args)) => view::run(&args),
         Some(Command::Diff(args)) => return diff::main(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Fixtures(args)) => fixtures::run(&args),
+        Some(Command::Completions(args)) => {
+            manual::completions(&args, Cli::command());
+            Ok(())
+        }
+        Some(Command::Man(args)) => manual::man(&args, Cli::command()),
     };
     match done.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -149,7 +165,6 @@ fn profile(name: &str) -> anyhow::Result<(String, dynvox_core::Capacity)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn a_cause_is_printed_once() {

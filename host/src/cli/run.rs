@@ -7,6 +7,7 @@ mod stream;
 
 use super::capacity::CapacityArgs;
 use super::egomotion::EgomotionChoice;
+use super::export::ExportArgs;
 use super::rectified::RectifiedArgs;
 use super::settings::{Settings, on_or_off};
 use crate::input::bags::Topics;
@@ -37,127 +38,128 @@ pub struct RunArgs {
     /// Data set to map; - for a stream of PGM or PPM images from standard input, left and right in turn; the synthetic street without one
     path: Option<PathBuf>,
     /// Sequence within the data set: 06, 0003
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     sequence: Option<String>,
     /// Layout of the data set; guessed from the path unless given
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Input")]
     dataset: Option<Layout>,
     /// Camera pair of KITTI odometry
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = "Input")]
     images: CameraPair,
     /// Significant bits of 16-bit images, 8 to 16; told from the largest value of some of them otherwise
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=16))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=16), help_heading = "Input")]
     bits: Option<u32>,
     /// Topics of both cameras in a recording of ROS [default: told by their names]
-    #[arg(long, value_name = "LEFT,RIGHT")]
+    #[arg(long, value_name = "LEFT,RIGHT", help_heading = "Input")]
     topics: Option<Topics>,
     /// Both images of a pair lie in one, the left one left [default: told from the calibration]
-    #[arg(long)]
+    #[arg(long, help_heading = "Input")]
     side_by_side: bool,
     /// Both images of a pair lie in one, the left one above
-    #[arg(long, conflicts_with = "side_by_side")]
+    #[arg(long, conflicts_with = "side_by_side", help_heading = "Input")]
     top_bottom: bool,
     /// Frames a second of a stream
-    #[arg(long, value_name = "HZ", value_parser = rate_hz)]
+    #[arg(long, value_name = "HZ", value_parser = rate_hz, help_heading = "Input")]
     rate: Option<f64>,
     /// Frames of a stream that come while the mapper is busy: wait lets the stream wait, drop drops the oldest and counts it [default: wait]
-    #[arg(long, value_enum, value_name = "HOW")]
+    #[arg(long, value_enum, value_name = "HOW", help_heading = "Input")]
     when_late: Option<WhenLate>,
     /// Calibration in place of the recording's own: of raw images in any format `dynvox calibration` reads (give it twice where each camera
     /// has a file), of rectified ones KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
     calibration: Vec<PathBuf>,
     #[command(flatten)]
     rectified: RectifiedArgs,
     #[command(flatten)]
     bounds: CapacityArgs,
     /// Threads; the result does not depend on them [default: as many as the machine has, at most 4]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Limits")]
     threads: Option<usize>,
     /// First frame
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", help_heading = "Frames")]
     start: usize,
     /// Frames to map at most
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Frames")]
     frames: Option<usize>,
     /// Take every N-th frame
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, default_value_t = 1, value_name = "N", help_heading = "Frames")]
     stride: usize,
     /// Shrink the images, above 0 and up to 1
-    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    #[arg(long, default_value_t = 1.0, value_name = "S", help_heading = "Frames")]
     scale: f64,
     /// Source of depth: elas (stereo matching), files:DIR (PNG, PFM or OpenCV XML named as the images; depth where DIR's name says depth
     /// and not disparity), disparity:DIR, depth:DIR, or exact (the synthetic street)
-    #[arg(long, default_value = "elas", value_name = "SOURCE")]
+    #[arg(long, default_value = "elas", value_name = "SOURCE", help_heading = "Mapping")]
     depth: DepthChoice,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Mapping")]
     masks: InstancesArgs,
     /// Whether objects are masked out of the static map and reconstructed separately; off fuses everything into one map [default: on]
-    #[arg(long, value_name = "on|off", value_parser = on_or_off)]
+    #[arg(long, value_name = "on|off", value_parser = on_or_off, help_heading = "Mapping")]
     dynamic: Option<bool>,
     /// Source of the camera's motion: stereo (matches over two pairs), icp (depth against the map, the baseline of hand-held mappers:
     /// expected to fail at driving speed), or file:POSES (KITTI or TUM) [default: stereo]
-    #[arg(long, value_name = "SOURCE")]
+    #[arg(long, value_name = "SOURCE", help_heading = "Mapping")]
     egomotion: Option<EgomotionChoice>,
     /// Fuse every K-th frame; the camera is tracked in all [default: 1]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", help_heading = "Mapping")]
     fuse_every: Option<u32>,
     /// Settings from a file; config.toml of an earlier run is one
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Mapping")]
     config: Option<PathBuf>,
     /// One setting, over those of the file; may be repeated
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Mapping")]
     set: Vec<String>,
     /// Lose blocks evicted from the full pool; otherwise they are stored in map.blocks, loaded back when seen again, and included in map.ply
-    #[arg(long)]
+    #[arg(long, help_heading = "Limits")]
     no_stream: bool,
     /// Limit map.blocks to so many MiB [default: the disk's space]
-    #[arg(long, value_name = "MIB", conflicts_with = "no_stream")]
+    #[arg(long, value_name = "MIB", conflicts_with = "no_stream", help_heading = "Limits")]
     stream_mib: Option<u64>,
     /// Keep map.blocks in the run folder after the mesh is written
-    #[arg(long, conflicts_with = "no_stream")]
+    #[arg(long, conflicts_with = "no_stream", help_heading = "Results")]
     keep_blocks: bool,
-    /// Evaluate input and map against LiDAR scans or the synthetic street's exact depth: accuracy and completeness, of the static map and of
-    /// objects
-    #[arg(long, value_enum, value_name = "REFERENCE")]
+    /// Evaluate input and map, static and of objects, against LiDAR scans or the synthetic street's exact depth
+    #[arg(long, value_enum, value_name = "REFERENCE", help_heading = "Evaluation")]
     evaluate: Option<Reference>,
     /// Evaluate the map at a frame's pose N frames later, after pruning
-    #[arg(long, default_value_t = 0, value_name = "N", requires = "evaluate")]
+    #[arg(long, default_value_t = 0, value_name = "N", requires = "evaluate", help_heading = "Evaluation")]
     evaluation_delay: usize,
     /// End at the first frame that affects the map: an extrapolated pose, anything refused or lost
-    #[arg(long)]
+    #[arg(long, help_heading = "Limits")]
     strict: bool,
     /// Leave out frames that cannot be read or mapped, and count them; otherwise the run ends before the first of them
-    #[arg(long)]
+    #[arg(long, help_heading = "Frames")]
     skip_bad_frames: bool,
     /// Inject faults, to see what becomes of them: NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT], separated by commas; drop,
     /// duplicate, swap, jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS, occlude=SHARE, brightness=FACTOR, masks; seed=N
     #[arg(long, value_name = "SPEC")]
     faults: Option<Faults>,
     /// Map images that are refused as exchanged, unrectified, out of order, black or the same in both cameras
-    #[arg(long)]
+    #[arg(long, help_heading = "Frames")]
     force: bool,
     /// End when the process uses more than so many MiB [default: the slab and 256]
-    #[arg(long, value_name = "MIB")]
+    #[arg(long, value_name = "MIB", help_heading = "Limits")]
     rss_limit_mib: Option<u64>,
     /// Write a snapshot every N frames, from which an interrupted run can be resumed. Cannot be combined with --evaluate
-    #[arg(long, value_name = "N", conflicts_with = "evaluate")]
+    #[arg(long, value_name = "N", conflicts_with = "evaluate", help_heading = "Results")]
     snapshot_every: Option<usize>,
     /// Resume the interrupted run to RUN_FOLDER from its last snapshot, with its settings and data set; only --threads, --rss-limit-mib,
     /// --snapshot-every, --json and --quiet can be changed
-    #[arg(long, value_name = "RUN_FOLDER", conflicts_with_all = resume::FIXED_ARGUMENTS)]
+    #[arg(long, value_name = "RUN_FOLDER", conflicts_with_all = resume::FIXED_ARGUMENTS, help_heading = "Results")]
     resume: Option<PathBuf>,
     /// Folder for the results [default: out/<data set>-NNN]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
     /// Replace the run folder that is there
-    #[arg(long)]
+    #[arg(long, help_heading = "Results")]
     overwrite: bool,
+    #[command(flatten)]
+    export: ExportArgs,
     /// Write the summary to standard output as JSON, and nothing else
-    #[arg(long)]
+    #[arg(long, help_heading = "Results")]
     json: bool,
     /// Show no progress
-    #[arg(long)]
+    #[arg(long, help_heading = "Results")]
     quiet: bool,
 }
 
@@ -288,6 +290,7 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
             most_bytes: args.stream_mib.map(|mib| mib.saturating_mul(MIB)),
             keep_file: args.keep_blocks,
         }),
+        export: args.export.options(),
         strict: args.strict,
         evaluate: args.evaluate,
         evaluation_delay: args.evaluation_delay,

@@ -2,12 +2,13 @@
 //!
 //! A box is taken smaller than the true object: the ground below it and what it touches belong to the map.
 
+use crate::formats::{PlyMesh, PlyVertex};
 use crate::input::TrueObject;
 use dynvox_core::geometry::Transform;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io;
 use std::path::Path;
 
 /// How far above its foot a box begins: the road is mapped, and not flat to the millimetre, m.
@@ -69,38 +70,14 @@ impl Swept {
         near.filter_map(|&number| self.boxes.get(number as usize)).any(|one| one.contains(point))
     }
 
-    /// How many triangles of a mesh have their middle in it. The mesh is one this program wrote.
+    /// How many triangles of a static map have all their corners in it.
+    ///
+    /// # Errors
+    /// The file is no mesh of this program.
     pub fn triangles(&self, ply: &Path) -> io::Result<u64> {
-        let mut file = BufReader::new(std::fs::File::open(ply)?);
-        let (mut vertices, mut faces) = (0usize, 0usize);
-        loop {
-            let mut line = String::new();
-            if file.read_line(&mut line)? == 0 {
-                return Err(io::Error::other("the mesh has no header"));
-            }
-            let number = |name: &str| line.strip_prefix(name).and_then(|number| number.trim().parse().ok());
-            vertices = number("element vertex ").unwrap_or(vertices);
-            faces = number("element face ").unwrap_or(faces);
-            if line == "end_header\n" {
-                break;
-            }
-        }
-        // Which vertices lie in it: a triangle counts when all of its corners do.
-        let mut inside = Vec::with_capacity(vertices);
-        let mut vertex = [0u8; 15];
-        for _ in 0..vertices {
-            file.read_exact(&mut vertex)?;
-            let [x, y, z] = [0, 4, 8].map(|at| f64::from(f32::from_le_bytes([vertex[at], vertex[at + 1], vertex[at + 2], vertex[at + 3]])));
-            inside.push(self.contains(&Point3::new(x, y, z)));
-        }
+        let inside = |corner: &PlyVertex| corner.object == 0 && self.contains(&Point3::from(corner.position_m.map(f64::from)));
         let mut count = 0;
-        let mut face = [0u8; 13];
-        for _ in 0..faces {
-            file.read_exact(&mut face)?;
-            let corner = |at: usize| u32::from_le_bytes([face[at], face[at + 1], face[at + 2], face[at + 3]]) as usize;
-            let all = [1, 5, 9].iter().all(|&at| inside.get(corner(at)).copied().unwrap_or(false));
-            count += u64::from(all);
-        }
+        PlyMesh::open(ply).map_err(io::Error::other)?.triangles(|triangle| count += u64::from(triangle.iter().all(inside)))?;
         Ok(count)
     }
 }

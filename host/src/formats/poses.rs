@@ -42,6 +42,21 @@ pub fn read_poses(path: &Path) -> Result<Trajectory, FormatError> {
     Ok(Trajectory { times_s: (!times_s.is_empty()).then_some(times_s), poses })
 }
 
+/// Reads poses of some frames as [`write_numbered`] writes them.
+///
+/// # Errors
+/// The file cannot be read, or a line is not a number and a pose.
+pub fn read_numbered(path: &Path) -> Result<Vec<(usize, Transform)>, FormatError> {
+    let text = read_text(path)?;
+    let pose = |row| {
+        let numbers = numbers_of(row)?;
+        let (frame, numbers) = numbers.split_first()?;
+        Some((*frame as usize, pose_of(numbers)?.1))
+    };
+    let refuse = |line| FormatError::content(path, format!("line {line} is not a frame and its pose"), "A line holds 13 numbers");
+    lines_of(&text).map(|(line, row)| pose(row).ok_or_else(|| refuse(line))).collect()
+}
+
 /// Time, where the row has one, and pose. Rounded rotations are normalized to length 1.
 fn pose_of(numbers: &[f64]) -> Option<(Option<f64>, Transform)> {
     if let &[r00, r01, r02, x, r10, r11, r12, y, r20, r21, r22, z] = numbers {

@@ -3,12 +3,11 @@
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
 use crate::formats::Image;
 use dynvox_core::geometry::Transform;
+use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
 /// Frames shown in the report.
 const KEYFRAMES: usize = 5;
-/// Disparity shown in red, as a share of the image width.
-const NEAR_SHARE: f32 = 0.08;
 
 /// Position of the overview's camera relative to the last camera, m: behind and above.
 const OVERVIEW_OFFSET_M: [f64; 3] = [0.0, -7.0, -15.0];
@@ -65,10 +64,8 @@ impl Observer for KeyframesObserver {
 
     fn end(&mut self, _: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         if let Some(row) = end.last {
-            let down = nalgebra::Vector3::new(-OVERVIEW_PITCH_RAD, 0.0, 0.0);
-            let t_world_camera = row.report.t_world_camera * Transform::new(down, OVERVIEW_OFFSET_M);
-            let seen = end.view.raycast(&t_world_camera);
-            self.overview_png = seen.map(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None)).unwrap_or_default();
+            let seen = end.view.raycast(&overview_pose(&row.report.t_world_camera));
+            self.overview_png = png(seen.and_then(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None)));
         }
         Ok(())
     }
@@ -78,20 +75,35 @@ impl Observer for KeyframesObserver {
     }
 }
 
+/// A camera behind and above another.
+pub(super) fn overview_pose(t_world_camera: &Transform) -> Transform {
+    let down = nalgebra::Vector3::new(-OVERVIEW_PITCH_RAD, 0.0, 0.0);
+    *t_world_camera * Transform::new(down, OVERVIEW_OFFSET_M)
+}
+
+/// The left image of a frame: in colour where that lies on the image that was matched.
+pub(super) fn left(frame: &FrameContext<'_, '_>) -> Option<RgbImage> {
+    let rectified = frame.view.mapper().rectified_pair().map(|[left, _]| left);
+    let colour = frame.images.colour.as_ref().filter(|_| rectified.is_none()).and_then(Image::view);
+    let grey = rectified.or_else(|| frame.images.left.view())?;
+    Some(pictures::input(&grey, colour.as_ref()))
+}
+
+/// A picture as a PNG file; empty without a picture.
+fn png(picture: Option<RgbImage>) -> Vec<u8> {
+    picture.as_ref().map(pictures::png).unwrap_or_default()
+}
+
 fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
     let t_world_camera: Transform = frame.row.report.t_world_camera;
-    let rectified = frame.view.mapper().rectified_pair().map(|[left, _]| Image::from_view(&left));
-    let grey = rectified.as_ref().unwrap_or(&frame.images.left).view()?;
-    // Colour is shown where it lies on the grey image.
-    let colour = frame.images.colour.as_ref().filter(|_| rectified.is_none()).and_then(|colour| colour.view());
-    let near_px = NEAR_SHARE * grey.width() as f32;
-    let disparity_png = pictures::disparity(&frame.view.mapper().disparity_q8(), near_px);
+    let input_png = png(Some(left(frame)?));
+    let disparity_png = png(Some(pictures::disparity(&frame.view.mapper().disparity_q8())));
     let seen = frame.view.raycast(&t_world_camera)?;
     Some(Keyframe {
         frame: frame.row.frame,
-        input_png: pictures::input(&grey, colour.as_ref()),
+        input_png,
         disparity_png,
-        raycast_png: pictures::map(pictures::SMALL_PX, seen, |_| None),
-        composed_png: pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera),
+        raycast_png: png(pictures::map(pictures::SMALL_PX, seen, |_| None)),
+        composed_png: png(pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera)),
     })
 }

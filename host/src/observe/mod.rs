@@ -6,12 +6,14 @@ mod bounds;
 mod chart_values;
 mod frame;
 mod frame_log;
+mod gallery;
 mod growing_file;
 mod health;
 mod instances;
 mod keyframes;
 mod objects;
 pub mod pictures;
+mod recording;
 mod reference;
 pub mod tables;
 mod thumbnail;
@@ -24,17 +26,19 @@ pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
 pub use chart_values::{ChartValues, Charted};
 pub use frame::{FrameRow, STAGES, StageTime};
 pub use frame_log::{FrameLog, StageStatistics};
+pub use gallery::GalleryObserver;
 pub use growing_file::GrowingFile;
 pub use health::{HealthObserver, HealthSection};
 pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
+pub use recording::{RECORDING_FILE, RecordingObserver};
 pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, ReferenceSection};
 pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
 pub use trajectory::{ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first};
 pub use volume_copy::VolumeCopy;
 
-use crate::formats::Mesh;
+use crate::formats::{Axes, Mesh};
 use crate::input::{FrameSource, InputError, StereoImages};
 use dynvox_core::geometry::Transform;
 use dynvox_core::memory::Region;
@@ -83,6 +87,10 @@ pub struct Setup<'p> {
     pub folder: PathBuf,
     /// Where the camera's motion comes from: `stereo`, `icp` or `file`.
     pub motion_source: &'static str,
+    /// Whether the run is recorded as an MCAP file.
+    pub record: bool,
+    /// Axes of meshes in world coordinates.
+    pub axes: Axes,
     /// Folder that every frame's instances are saved to, if they are.
     pub save_instances: Option<&'p Path>,
     /// What the map is evaluated against, and when.
@@ -193,6 +201,8 @@ pub trait Observer {
 pub struct Observers {
     trajectory: TrajectoryObserver,
     keyframes: KeyframesObserver,
+    gallery: GalleryObserver,
+    recording: RecordingObserver,
     reference: ReferenceObserver,
     tracks: TracksObserver,
     objects: ObjectsObserver,
@@ -209,6 +219,10 @@ pub struct Sections {
     pub trajectory: TrajectorySection,
     /// Pictures.
     pub keyframes: KeyframesSection,
+    /// Why the pictures for the viewer could not be written, if so.
+    pub gallery_failure: Option<String>,
+    /// Why the recording could not be written, if so.
+    pub recording_failure: Option<String>,
     /// Input and map against a reference depth; `None` where the run has none.
     pub reference: Option<ReferenceSection>,
     /// Tracks, and their errors against ground truth.
@@ -226,7 +240,7 @@ pub struct Sections {
 impl Observers {
     /// Why a file of theirs could not be written, if so. They continue without it.
     pub fn failure(&self) -> Option<&str> {
-        self.objects.failure()
+        self.objects.failure().or(self.gallery.failure()).or(self.recording.failure())
     }
 }
 
@@ -238,12 +252,15 @@ impl Observer for Observers {
     }
 
     fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
+        self.gallery.resume(setup)?;
         self.objects.resume(setup)
     }
 
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
         self.trajectory.frame(setup, frame)?;
         self.keyframes.frame(setup, frame)?;
+        self.gallery.frame(setup, frame)?;
+        self.recording.frame(setup, frame)?;
         self.reference.frame(setup, frame)?;
         self.tracks.frame(setup, frame)?;
         self.objects.frame(setup, frame)?;
@@ -255,6 +272,8 @@ impl Observer for Observers {
 
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         self.keyframes.end(setup, end)?;
+        self.gallery.end(setup, end)?;
+        self.recording.end(setup, end)?;
         self.objects.end(setup, end)
     }
 
@@ -262,6 +281,8 @@ impl Observer for Observers {
         Ok(Sections {
             trajectory: self.trajectory.finish(setup, finished)?,
             keyframes: self.keyframes.finish(setup, finished)?,
+            gallery_failure: self.gallery.finish(setup, finished)?,
+            recording_failure: self.recording.finish(setup, finished)?,
             reference: self.reference.finish(setup, finished)?,
             tracks: self.tracks.finish(setup, finished)?,
             objects: self.objects.finish(setup, finished)?,

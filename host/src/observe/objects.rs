@@ -6,7 +6,8 @@ use super::{EndContext, Finished, FrameContext, ObserveError, Observer, RetiredV
 use crate::evaluate::objects::true_object;
 use crate::evaluate::surfaces::{SeenSide, SurfaceFigures, TrueView};
 use crate::evaluate::swept::Swept;
-use crate::formats::{PlyWriter, write_numbered};
+use crate::formats::{Axes, Mesh, PlyWriter, tum_line, write_numbered};
+use crate::scene::OBJECTS_FOLDER;
 use dynvox_core::geometry::Transform;
 use dynvox_core::objects::ObjectSummary;
 use dynvox_core::tracking::{Class, MotionState, TrackReport};
@@ -15,8 +16,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Name of the folder of objects in the run folder.
-const FOLDER: &str = "objects";
 /// Objects shown with a thumbnail, at most: those fused most often.
 const THUMBNAILS: usize = 24;
 
@@ -56,11 +55,21 @@ pub struct ObjectsSection {
     pub swept_triangles: Option<u64>,
 }
 
+/// A pose of an object in a frame.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct PosedAt {
+    /// Number of the frame.
+    frame: usize,
+    /// Its time.
+    time_ns: u64,
+    t_world_object: Transform,
+}
+
 /// Collects objects.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct ObjectsObserver {
     /// Poses of each object that is still in the mapper, in the frames it was fused in: by track and segment.
-    paths: BTreeMap<(u32, u32), Vec<(usize, Transform)>>,
+    paths: BTreeMap<(u32, u32), Vec<PosedAt>>,
     /// The true surface seen of each, where that is known.
     sides: BTreeMap<(u32, u32), SeenSide>,
     retired: Vec<ReconstructedObject>,
@@ -75,7 +84,7 @@ impl Observer for ObjectsObserver {
 
     /// Removes files of objects that left after the checkpoint: they will leave again.
     fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
-        let folder = setup.folder.join(FOLDER);
+        let folder = setup.folder.join(OBJECTS_FOLDER);
         let failed = |source| ObserveError::Write { path: folder.clone(), source };
         if !folder.is_dir() {
             return Ok(());
@@ -94,7 +103,11 @@ impl Observer for ObjectsObserver {
     fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
         self.write_all(setup, frame.retired);
         for object in fused(frame) {
-            self.paths.entry((object.id, object.segment_id)).or_default().push((frame.row.frame, object.t_world_object));
+            self.paths.entry((object.id, object.segment_id)).or_default().push(PosedAt {
+                frame: frame.row.frame,
+                time_ns: frame.row.time_ns(),
+                t_world_object: object.t_world_object,
+            });
         }
         self.note_truth(setup, frame);
         Ok(())
@@ -157,7 +170,7 @@ impl ObjectsObserver {
         for one in retired {
             let name = self.name_of(one);
             if let Err(error) = self.write(setup, one, &name) {
-                files(&name).iter().for_each(|file| drop(std::fs::remove_file(setup.folder.join(FOLDER).join(file))));
+                files(&name).iter().for_each(|file| drop(std::fs::remove_file(setup.folder.join(OBJECTS_FOLDER).join(file))));
                 self.unwritten.push(name);
                 self.failure.get_or_insert_with(|| error.to_string());
             }
@@ -174,14 +187,14 @@ impl ObjectsObserver {
     fn write(&mut self, setup: &Setup<'_>, RetiredVolume { summary, volume }: &RetiredVolume, name: &str) -> Result<(), ObserveError> {
         let poses = self.paths.remove(&(summary.id, summary.segment_id)).unwrap_or_default();
         let side = self.sides.remove(&(summary.id, summary.segment_id));
-        let folder = setup.folder.join(FOLDER);
+        let folder = setup.folder.join(OBJECTS_FOLDER);
         let mut triangles: Vec<Triangle> = Vec::new();
         let meshed = volume.triangles(&setup.config.mesh, &mut |triangle| triangles.push(triangle));
         meshed.map_err(|source| ObserveError::Write { path: folder.clone(), source })?;
         if triangles.is_empty() {
             return Ok(());
         }
-        write_files(&folder, name, &triangles, &poses)?;
+        write_files(&folder, (summary.id, name), (&triangles, setup.axes), &poses)?;
         self.retired.push(ReconstructedObject {
             id: summary.id,
             segment: summary.segment_id,
@@ -209,20 +222,40 @@ impl ObjectsObserver {
     }
 }
 
-/// The files of an object: its mesh, and its poses.
-fn files(name: &str) -> [String; 2] {
-    [format!("{name}.ply"), format!("{name}_kitti.txt")]
+/// The files of an object: its mesh in its own frame and where it was last seen, its poses by frame and by time.
+fn files(name: &str) -> [String; 4] {
+    [format!("{name}.ply"), format!("{name}_world.ply"), format!("{name}_kitti.txt"), format!("{name}_tum.txt")]
 }
 
-fn write_files(folder: &Path, name: &str, triangles: &[Triangle], poses: &[(usize, Transform)]) -> Result<(), ObserveError> {
-    let [mesh, poses_file] = files(name).map(|file| folder.join(file));
-    let written = std::fs::create_dir_all(folder).and_then(|()| {
-        let mut ply = PlyWriter::begin_in(&mesh, "the object's own frame: the camera's when it was first seen")?;
-        triangles.iter().for_each(|one| ply.triangle(one.vertices.map(|vertex| (vertex.position_m, vertex.colour))));
-        ply.finish()
-    });
-    written.map_err(|source| ObserveError::Write { path: mesh, source })?;
-    let mut text = Vec::new();
-    let written = write_numbered(&mut text, poses).and_then(|()| std::fs::write(&poses_file, text));
-    written.map_err(|source| ObserveError::Write { path: poses_file, source })
+/// Writes an object's files.
+fn write_files(
+    folder: &Path,
+    (id, name): (u32, &str),
+    (triangles, axes): (&[Triangle], Axes),
+    poses: &[PosedAt],
+) -> Result<(), ObserveError> {
+    let [mesh, world_mesh, kitti, tum] = files(name).map(|file| folder.join(file));
+    let failed = |path: &Path| {
+        let path = path.to_path_buf();
+        move |source| ObserveError::Write { path, source }
+    };
+    std::fs::create_dir_all(folder).map_err(failed(folder))?;
+    let last = poses.last().map(|pose| pose.t_world_object).unwrap_or_default();
+    let own_frame = "the object's own frame: the camera's when it was first seen";
+    write_mesh(&mesh, id, (own_frame, Axes::Camera), triangles, &Transform::IDENTITY).map_err(failed(&mesh))?;
+    write_mesh(&world_mesh, id, ("the first camera", axes), triangles, &last).map_err(failed(&world_mesh))?;
+    let mut by_frame = Vec::new();
+    let numbered: Vec<_> = poses.iter().map(|pose| (pose.frame, pose.t_world_object)).collect();
+    write_numbered(&mut by_frame, &numbered).and_then(|()| std::fs::write(&kitti, by_frame)).map_err(failed(&kitti))?;
+    let by_time: String = poses.iter().map(|pose| tum_line(pose.time_ns, &pose.t_world_object)).collect();
+    std::fs::write(&tum, by_time).map_err(failed(&tum))
+}
+
+/// Writes a mesh that a pose carries to the frame of reference of that name.
+fn write_mesh(path: &Path, id: u32, (frame, axes): (&str, Axes), triangles: &[Triangle], pose: &Transform) -> std::io::Result<Mesh> {
+    let moved = |position_m: [f32; 3]| pose.transform_point(position_m.map(f64::from)).map(|metres| metres as f32);
+    let mut ply = PlyWriter::begin_in(path, frame, axes)?;
+    ply.begin_object(id);
+    triangles.iter().for_each(|one| ply.triangle(one.vertices.map(|vertex| (moved(vertex.position_m), vertex.colour))));
+    ply.finish()
 }

@@ -2,43 +2,91 @@
 
 use super::MapView;
 use crate::evaluate::reference::{Region, Rule, Sample};
+use dynvox_core::Mapper;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::tracking::MotionState;
 use dynvox_core::view::{NORMAL_ONE, Raycaster};
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
+use image::{ExtendedColorType, ImageEncoder, ImageResult, Rgb, RgbImage, Rgba, RgbaImage};
 
 /// Widest picture of a frame, px: wider ones are thinned out, so that the report stays small.
 pub const SMALL_PX: usize = 640;
 /// Widest picture of the whole map, px.
 pub const LARGE_PX: usize = 1_920;
+/// Disparity shown in red, as a share of the image width.
+const NEAR_SHARE: f32 = 0.08;
 /// Pixels without a surface or a disparity.
 const EMPTY: [u8; 3] = [24, 26, 30];
 /// Tint of dynamic objects.
 const MOVING: [u8; 3] = [255, 120, 20];
 /// Tint of static objects.
 const STATIC: [u8; 3] = [40, 130, 255];
+/// Tint of objects whose motion is not known.
+const UNCERTAIN: [u8; 3] = [190, 190, 190];
 /// Share of a tint in what is tinted.
 const TINT: f32 = 0.45;
 /// Where light comes from, in camera axes (x right, y down, z forward), length 1: behind the camera's left shoulder.
 const TO_LIGHT: [f32; 3] = [-0.36, -0.60, -0.714];
 
-/// A picture under construction: the sampled pixels, row by row.
-fn picture(widest_px: usize, width: usize, height: usize, pixel: impl Fn(usize, usize) -> [u8; 3]) -> Vec<u8> {
-    let step = width.div_ceil(widest_px).max(1);
-    let (columns, rows) = (width.div_ceil(step), height.div_ceil(step));
-    let pixels: Vec<u8> = (0..rows).flat_map(|v| (0..columns).map(move |u| (u, v))).flat_map(|(u, v)| pixel(u * step, v * step)).collect();
-    encoded(&pixels, columns, rows)
+/// Quality of JPEG files, of 100.
+const JPEG_QUALITY: u8 = 78;
+/// How much of the image a mask covers, of 255.
+const MASK_ALPHA: u8 = 120;
+
+/// A picture as a PNG file.
+pub fn png(picture: &RgbImage) -> Vec<u8> {
+    file(|out| PngEncoder::new(out).write_image(picture, picture.width(), picture.height(), ExtendedColorType::Rgb8))
 }
 
-fn encoded(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
-    let mut png = Vec::new();
-    let made = PngEncoder::new(&mut png).write_image(rgb, width as u32, height as u32, ExtendedColorType::Rgb8);
-    // A picture that cannot be encoded is left out of the report.
-    if made.is_err() {
-        png.clear();
+/// A picture as a JPEG file.
+pub fn jpeg(picture: &RgbImage) -> Vec<u8> {
+    file(|out| JpegEncoder::new_with_quality(out, JPEG_QUALITY).encode_image(picture))
+}
+
+/// What an encoder writes. A picture that cannot be encoded is left out of the report.
+fn file(encode: impl FnOnce(&mut Vec<u8>) -> ImageResult<()>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if encode(&mut bytes).is_err() {
+        bytes.clear();
     }
-    png
+    bytes
+}
+
+/// Every so many pixels is shown so that a picture is not wider than `widest_px`; and the columns and rows that remain.
+fn thinned(widest_px: usize, width: usize, height: usize) -> (usize, u32, u32) {
+    let step = width.div_ceil(widest_px).max(1);
+    (step, width.div_ceil(step) as u32, height.div_ceil(step) as u32)
+}
+
+/// A picture of the sampled pixels.
+fn picture(widest_px: usize, width: usize, height: usize, pixel: impl Fn(usize, usize) -> [u8; 3]) -> RgbImage {
+    let (step, columns, rows) = thinned(widest_px, width, height);
+    RgbImage::from_fn(columns, rows, |u, v| Rgb(pixel(u as usize * step, v as usize * step)))
+}
+
+/// The colour of a motion state.
+pub fn state_colour(state: MotionState) -> [u8; 3] {
+    match state {
+        MotionState::Uncertain => UNCERTAIN,
+        MotionState::Static => STATIC,
+        MotionState::Dynamic => MOVING,
+    }
+}
+
+/// The instances of the last frame in the colours of their motion states, transparent elsewhere, as a PNG file. Empty without instances.
+pub fn masks(mapper: &Mapper<'_>, width: usize, height: usize) -> Vec<u8> {
+    let (step, columns, rows) = thinned(SMALL_PX, width, height);
+    let instance = |u: u32, v: u32| mapper.instance_at((u as usize * step) as i32, (v as usize * step) as i32);
+    let colour = |u: u32, v: u32| instance(u, v).map(|instance| state_colour(instance.state));
+    let mask = RgbaImage::from_fn(columns, rows, |u, v| match colour(u, v) {
+        Some([red, green, blue]) => Rgba([red, green, blue, MASK_ALPHA]),
+        None => Rgba([0; 4]),
+    });
+    if mask.pixels().all(|pixel| pixel.0[3] == 0) {
+        return Vec::new();
+    }
+    file(|out| PngEncoder::new(out).write_image(&mask, columns, rows, ExtendedColorType::Rgba8))
 }
 
 /// Points over the darkened image, each a spot in the colour of its error.
@@ -59,7 +107,7 @@ pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample
             }
         }
     }
-    encoded(pixels.as_flattened(), width, height)
+    RgbImage::from_raw(width as u32, height as u32, pixels.into_flattened()).map(|picture| png(&picture)).unwrap_or_default()
 }
 
 /// Points that are in no figure.
@@ -87,40 +135,39 @@ fn error_colour(seen_px: f32, true_px: f32) -> [u8; 3] {
 }
 
 /// The left image, in colour where there is one.
-pub fn input(grey: &View<'_, u8>, colour: Option<&View<'_, [u8; 3]>>) -> Vec<u8> {
+pub fn input(grey: &View<'_, u8>, colour: Option<&View<'_, [u8; 3]>>) -> RgbImage {
     picture(SMALL_PX, grey.width(), grey.height(), |u, v| {
         colour.and_then(|colour| colour.get(u, v)).or_else(|| grey.get(u, v).map(|grey| [grey; 3])).unwrap_or(EMPTY)
     })
 }
 
-/// Disparity as colours from blue (far) to red (near); `near_px` is red.
-pub fn disparity(disparity_q8: &View<'_, u16>, near_px: f32) -> Vec<u8> {
+/// Disparity as colours from blue (far) to red (near).
+pub fn disparity(disparity_q8: &View<'_, u16>) -> RgbImage {
+    let near_px = NEAR_SHARE * disparity_q8.width() as f32;
     picture(SMALL_PX, disparity_q8.width(), disparity_q8.height(), |u, v| match disparity_q8.get(u, v) {
         Some(q8) if q8 > 0 => turbo(f32::from(q8) / f32::from(DISPARITY_ONE_PX) / near_px),
         _ => EMPTY,
     })
 }
 
-/// The map: its colours, or clay grey where it has none, lit from behind the camera, tinted by layer with the colours of `tint`. Empty
+/// The map: its colours, or clay grey where it has none, lit from behind the camera, tinted by layer with the colours of `tint`. `None`
 /// before the first raycast.
-pub fn map(widest_px: usize, seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Vec<u8> {
-    let (Some(depth_m), Some(normal), Some(colour), Some(layer)) = (seen.depth_m(), seen.normal(), seen.colour(), seen.layer()) else {
-        return Vec::new();
-    };
-    Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }.png(widest_px)
+pub fn map(widest_px: usize, seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Option<RgbImage> {
+    let (depth_m, normal, colour, layer) = (seen.depth_m()?, seen.normal()?, seen.colour()?, seen.layer()?);
+    Some(Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }.picture(widest_px))
 }
 
-/// The static map with every object at its pose: dynamic ones tinted orange, static ones blue. Empty without objects.
-pub fn composed(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &Transform) -> Vec<u8> {
+/// The static map with every object at its pose: dynamic ones tinted orange, static ones blue. `None` without objects.
+pub fn composed(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &Transform) -> Option<RgbImage> {
     let states: Vec<MotionState> = view.mapper().posed_objects().map(|posed| posed.summary.state).collect();
     if states.is_empty() {
-        return Vec::new();
+        return None;
     }
     let tint = |layer: u8| match states.get(usize::from(layer).checked_sub(1)?)? {
         MotionState::Dynamic => Some(MOVING),
         _ => Some(STATIC),
     };
-    view.raycast_with_objects(t_world_camera).map(|seen| map(widest_px, seen, tint)).unwrap_or_default()
+    view.raycast_with_objects(t_world_camera).and_then(|seen| map(widest_px, seen, tint))
 }
 
 /// What a raycast shows, and how it is painted.
@@ -136,7 +183,7 @@ struct Painting<'a, T> {
 }
 
 impl<T: Fn(usize, usize) -> Option<[u8; 3]>> Painting<'_, T> {
-    fn png(&self, widest_px: usize) -> Vec<u8> {
+    fn picture(&self, widest_px: usize) -> RgbImage {
         picture(widest_px, self.depth_m.width(), self.depth_m.height(), |u, v| self.pixel(u, v).unwrap_or(EMPTY))
     }
 

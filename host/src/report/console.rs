@@ -30,6 +30,7 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     lines.push((if rig::is_warning(run) { "calibration WARNING" } else { "calibration" }, rig::sentence(run)));
     lines.push(("digest", format!("{:016x}", run.digest())));
     lines.push(("results", folder.display().to_string()));
+    lines.push(("report", folder.join("report.html").display().to_string()));
     lines.iter().map(|(name, value)| format!("{name:<22}{value}\n")).collect()
 }
 
@@ -80,8 +81,10 @@ fn reference_lines(figures: &ReferenceFigures) -> Vec<(&'static str, String)> {
 fn block_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
     let blocks = &run.sections.blocks;
     let (totals, store) = (&blocks.totals, &blocks.store);
-    let mut lines =
-        vec![("map", format!("{} triangles, peak {} of {} blocks", blocks.mesh.triangles, totals.peak, run.header.capacity.blocks))];
+    let mut lines = vec![(
+        "map",
+        format!("{} triangles, peak {} of {} blocks", blocks.mesh.static_triangles(), totals.peak, run.header.capacity.blocks),
+    )];
     if totals.refused > 0 {
         let advice = "Give more bytes with --memory, or a larger volume.voxel_size_m";
         lines.push(("", format!("blocks refused: {}; the map has holes. {advice}", totals.refused)));

@@ -9,6 +9,7 @@ pub mod html;
 pub mod rig;
 mod summary;
 pub mod text;
+pub mod viewer;
 
 pub use console::summary_lines;
 pub use csv::{write_reference, write_tracks_truth};

@@ -146,7 +146,9 @@ struct MapSummary {
     blocks_peak: u32,
     bytes: u64,
     triangles: u64,
-    /// Triangles among them in the volume that moving objects swept.
+    /// Triangles of objects in `map.ply`.
+    object_triangles: u64,
+    /// Triangles of the static map in the volume that moving objects swept.
     #[serde(skip_serializing_if = "Option::is_none")]
     swept_triangles: Option<u64>,
 }
@@ -218,7 +220,8 @@ impl Summary {
                 blocks: sections.blocks.blocks,
                 blocks_peak: sections.blocks.totals.peak,
                 bytes: sections.blocks.map_bytes(),
-                triangles: sections.blocks.mesh.triangles,
+                triangles: sections.blocks.mesh.static_triangles(),
+                object_triangles: sections.blocks.mesh.object_triangles,
                 swept_triangles: sections.objects.swept_triangles,
             },
             prune: PruneSummary::of(&sections.blocks.totals),

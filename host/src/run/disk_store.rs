@@ -1,8 +1,9 @@
 //! The store of evicted blocks during a run, and the mesh made of pool and store.
 
+use super::map_objects::{MapObjects, add_objects};
 use super::store::{self, BlockFile, Position, StoreError};
 use super::{FolderError, RunFolder};
-use crate::formats::{Mesh, PlyWriter};
+use crate::formats::{Axes, Mesh, PlyWriter};
 use crate::observe::StoreStats;
 use dynvox_core::view::Triangle;
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
@@ -83,8 +84,8 @@ pub struct MeshOutput {
 
 impl MeshOutput {
     /// Begins `map.ply`. Meshes the pool's blocks when none was evicted, or when nothing more can be stored; otherwise evicts them to the store.
-    pub fn begin(mapper: &mut Mapper<'_>, mut store: DiskStore, folder: &RunFolder) -> Self {
-        let mut ply = PlyWriter::begin(&folder.file(MAP_FILE));
+    pub fn begin(mapper: &mut Mapper<'_>, mut store: DiskStore, folder: &RunFolder, axes: Axes) -> Self {
+        let mut ply = PlyWriter::begin_in(&folder.file(MAP_FILE), "the first camera", axes);
         let mut report = EvictionReport::default();
         let mut meshed = HashSet::new();
         if store.0.as_ref().is_none_or(|file| file.records() == 0 || file.failure().is_some()) {
@@ -97,12 +98,12 @@ impl MeshOutput {
         Self { ply, store, meshed, report }
     }
 
-    /// Adds the stored blocks, reading them piece by piece into `slab`, and ends the file. What cannot be written leaves no file, and the reason.
+    /// Adds the stored blocks, reading them piece by piece into `slab`, and the objects, and ends the file. What cannot be written leaves no file, and the reason.
     pub fn finish(
         mut self,
         slab: &mut [u8],
         (capacity, config): (&Capacity, &Config),
-        folder: &RunFolder,
+        (folder, objects): (&RunFolder, MapObjects),
     ) -> (Result<Mesh, FolderError>, StoreStats) {
         let mut stats = StoreStats { end: self.report, failure: self.store.failure(), ..StoreStats::default() };
         let mut failed = None;
@@ -113,7 +114,11 @@ impl MeshOutput {
             failed = meshed.err().map(|error| std::io::Error::other(format!("the slab is too small for a piece of the map: {error:?}")));
             (stats.records, stats.bytes, stats.unreadable) = (file.records(), file.bytes(), file.unreadable());
         }
-        let written = failed.map_or(Ok(()), Err).and_then(|()| self.ply?.finish());
+        let written = failed.map_or(Ok(()), Err).and_then(|()| {
+            let mut ply = self.ply?;
+            add_objects(&mut ply, folder.path(), objects)?;
+            ply.finish()
+        });
         let path = folder.file(MAP_FILE);
         let written = written.map_err(|source| {
             // It may not exist.

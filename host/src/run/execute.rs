@@ -9,7 +9,8 @@ use super::session::Session;
 use super::state::RunState;
 use super::{Plan, RunFolder, resident_bytes};
 use crate::formats::Mesh;
-use crate::observe::{Finished, Observer, Setup};
+use crate::observe::{Finished, Observer, RECORDING_FILE, Setup};
+use crate::scene::PICTURES_FOLDER;
 use crate::slab::HostSlab;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
@@ -34,7 +35,7 @@ pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> R
         }
     }
     // The mapper is gone: its slab serves to read the map piece by piece.
-    let (written, store) = output.finish(slab.bytes_mut(), (&plan.capacity, &plan.config), folder);
+    let (written, store) = output.finish(slab.bytes_mut(), (&plan.capacity, &plan.config), (folder, plan.export.objects));
     let mesh = written.unwrap_or_else(|error| {
         Incomplete::add_missing(&mut incomplete, MAP_FILE, &error.to_string());
         Mesh::default()
@@ -44,6 +45,11 @@ pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> R
     let sections = std::mem::take(&mut state.observers).finish(&setup, &finished)?;
     for name in &sections.objects.unwritten {
         Incomplete::add_missing(&mut incomplete, &format!("objects/{name}.ply"), "an object could not be written");
+    }
+    for (name, failure) in [(PICTURES_FOLDER, &sections.gallery_failure), (RECORDING_FILE, &sections.recording_failure)] {
+        if let Some(failure) = failure {
+            Incomplete::add_missing(&mut incomplete, name, failure);
+        }
     }
     let mapping_seconds = state.timers.mapping().as_secs_f64();
     state.timers.add_since(&mut since);
@@ -85,7 +91,7 @@ fn map<'p>(plan: &'p Plan, slab: &mut [u8], folder: &'p RunFolder, checkpoint: O
         regions: mapper.footprint().regions().to_vec(),
         blocks: mapper.background().pool().len(),
         pruned,
-        output: MeshOutput::begin(&mut mapper, store, folder),
+        output: MeshOutput::begin(&mut mapper, store, folder, plan.export.axes),
         incomplete,
         setup,
         state,

@@ -1,7 +1,7 @@
 //! What to run: the frames, the bounds, the settings.
 
 use super::disk_store::Streaming;
-use super::{CheckpointPlan, RunError, RunFolder};
+use super::{CheckpointPlan, ExportOptions, RunError, RunFolder};
 use crate::evaluate::quantile::median;
 use crate::input::{FrameSource, StopRequest};
 use crate::observe::{Reference, ReferencePlan, Setup};
@@ -40,6 +40,8 @@ pub struct Plan {
     pub streaming: Option<Streaming>,
     /// When checkpoints are written.
     pub checkpoints: Option<CheckpointPlan>,
+    /// What it leaves behind for other programs.
+    pub export: ExportOptions,
     /// Whether the run fails at the first frame that affects the map.
     pub strict: bool,
     /// Resident memory above which the run fails.
@@ -72,6 +74,8 @@ impl Plan {
                 (None, MotionSource::Icp) => "icp",
             },
             save_instances: self.save_instances.as_deref(),
+            axes: self.export.axes,
+            record: self.export.record,
             reference: match self.evaluate {
                 Some(reference) => ReferencePlan::all(dataset, self.frames.listed(), reference, self.evaluation_delay),
                 None => ReferencePlan::sampled(dataset, self.frames.listed()),

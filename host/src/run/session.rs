@@ -204,7 +204,7 @@ impl<'p, 's> Session<'p, 's> {
             progress.warn(&format!("frame {index}: map.blocks cannot grow ({failure}). Blocks evicted from here on are lost"));
         }
         if let Some(failure) = self.state.observers.failure().filter(|_| !files_before) {
-            progress.warn(&format!("frame {index}: {failure}. The run continues without this object's mesh"));
+            progress.warn(&format!("frame {index}: {failure}. The run continues without it"));
         }
     }
 

@@ -1,9 +1,15 @@
 //! The files of a run folder that are written at the end, after the map and the objects. A file that the disk refuses is missing, and the others are written.
 
+use crate::formats::kitti_line;
 use crate::report::{self, Summary};
 use crate::run::{FolderError, Incomplete, RunFolder, RunRecord};
+use crate::scene::{MOST_TRIANGLES, Scene, glb};
+use maud::html;
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
+
+/// Name of the map for viewers of glTF.
+const GLB_FILE: &str = "map.glb";
 
 /// Writes one file.
 type Writer<'a> = Box<dyn Fn(&mut BufWriter<File>) -> Result<()> + 'a>;
@@ -20,8 +26,16 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
             Incomplete::add_missing(&mut incomplete, name, &error.to_string());
         }
     }
+    let scene = Scene::read(folder.path(), MOST_TRIANGLES);
+    if let Ok(scene) = &scene
+        && let Err(error) = folder.write(GLB_FILE, |out| glb::write(out, scene))
+    {
+        Incomplete::add_missing(&mut incomplete, GLB_FILE, &error.to_string());
+    }
     run.incomplete = incomplete;
-    if let Err(error) = folder.write("report.html", |out| report::html::write(out, run)) {
+    let viewer = scene.and_then(|scene| report::viewer::fragment(folder.path(), &run.header.name, &scene));
+    let viewer = viewer.unwrap_or_else(|error| html! { p { b { "The report has no viewer: " (error) } } });
+    if let Err(error) = folder.write("report.html", |out| report::html::write(out, run, &viewer)) {
         Incomplete::add_missing(&mut run.incomplete, "report.html", &error.to_string());
     }
     let summary = Summary::of(run);
@@ -39,6 +53,12 @@ fn files(run: &RunRecord) -> Vec<(&'static str, Writer<'_>)> {
     }
     if let Some(text) = report::rig::calibration_toml(run) {
         files.push(("calibration.toml", Box::new(move |out| out.write_all(text.as_bytes()))));
+    }
+    if let Some(truth) = &sections.trajectory.truth {
+        files.push((
+            "trajectory_truth_kitti.txt",
+            Box::new(|out| truth.iter().try_for_each(|pose| out.write_all(kitti_line(pose).as_bytes()))),
+        ));
     }
     if !sections.tracks.comparisons.is_empty() {
         files.push(("tracks_truth.csv", Box::new(|out| report::write_tracks_truth(out, &sections.tracks))));

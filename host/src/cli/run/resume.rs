@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 40] = [
+pub const FIXED_ARGUMENTS: [&str; 43] = [
     "path",
     "sequence",
     "dataset",
@@ -46,6 +46,9 @@ pub const FIXED_ARGUMENTS: [&str; 40] = [
     "skip_bad_frames",
     "force",
     "faults",
+    "map_objects",
+    "axes",
+    "mcap",
     "out",
     "overwrite",
 ];

@@ -44,6 +44,6 @@ fn cards(run: &RunRecord) -> Vec<(String, &'static str)> {
     let (peak, blocks) = (sections.blocks.totals.peak, run.header.capacity.blocks);
     cards.push((format!("{:.1} MiB", run.header.slab_bytes as f64 / MIB), "slab: all memory of the core"));
     cards.push((format!("{:.0} %", 100.0 * f64::from(peak) / blocks as f64), "peak use of the block pool"));
-    cards.push((grouped(sections.blocks.mesh.triangles), "triangles in map.ply"));
+    cards.push((grouped(sections.blocks.mesh.static_triangles()), "triangles of the static map"));
     cards
 }

@@ -1,4 +1,4 @@
-//! `report.html`: the run on one page, in one file. Pictures and drawings are inside; nothing is fetched, no script runs.
+//! `report.html`: the run on one page, in one file. Pictures and drawings are inside; nothing is fetched, and only the viewer has a script.
 
 mod head;
 mod health;
@@ -35,13 +35,14 @@ pub fn page(title: &str, content: &Markup) -> Markup {
     }
 }
 
-/// Writes the page.
+/// Writes the page, with the viewer in it.
 ///
 /// # Errors
 /// The disk refuses.
-pub fn write(out: &mut impl Write, run: &RunRecord) -> io::Result<()> {
+pub fn write(out: &mut impl Write, run: &RunRecord, viewer: &Markup) -> io::Result<()> {
     let content = html! {
         (head::section(run))
+        (viewer)
         (trajectory::section(run))
         (pictures::section(run))
         (reference::section(run))

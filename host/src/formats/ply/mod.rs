@@ -1,0 +1,10 @@
+//! Triangle meshes as binary PLY files, written and read piece by piece.
+
+mod axes;
+mod read;
+mod records;
+mod write;
+
+pub use axes::Axes;
+pub use read::{PlyMesh, PlyVertex};
+pub use write::{Mesh, PlyWriter};

@@ -1,0 +1,181 @@
+//! Binary little-endian PLY meshes, read triangle by triangle. Faces mostly name vertices near those before, so few of them are in memory.
+
+use super::Axes;
+use super::records::Records;
+use crate::formats::FormatError;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Bytes of a face: the number of its corners, and three of them.
+const FACE_BYTES: usize = 13;
+
+/// A corner of a triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlyVertex {
+    /// Position, m, in the camera's axes.
+    pub position_m: [f32; 3],
+    /// Red, green, blue.
+    pub colour: [u8; 3],
+    /// Number of its object; 0 for the static map.
+    pub object: u32,
+}
+
+/// Where a vertex's properties lie.
+#[derive(Debug, Default)]
+struct VertexLayout {
+    bytes: usize,
+    position: Option<usize>,
+    colour: Option<usize>,
+    object: Option<usize>,
+    axes: Axes,
+}
+
+impl VertexLayout {
+    /// Takes in a property; `None` for a type that is not known.
+    fn add(&mut self, kind: &str, name: &str) -> Option<()> {
+        match (name, kind) {
+            ("x", "float") => self.position = Some(self.bytes),
+            ("red", "uchar") => self.colour = Some(self.bytes),
+            ("object", "int") => self.object = Some(self.bytes),
+            _ => {}
+        }
+        self.bytes += match kind {
+            "char" | "uchar" => 1,
+            "short" | "ushort" => 2,
+            "int" | "uint" | "float" => 4,
+            "double" => 8,
+            _ => return None,
+        };
+        Some(())
+    }
+
+    /// The vertex in so many bytes.
+    fn vertex(&self, bytes: &[u8]) -> Option<PlyVertex> {
+        let word = |at: usize| <[u8; 4]>::try_from(bytes.get(at..at + 4)?).ok();
+        let number = |at: usize| word(at).map(f32::from_le_bytes);
+        let at = self.position?;
+        let colour = self.colour.and_then(|at| bytes.get(at..at + 3)?.try_into().ok()).unwrap_or_default();
+        let object = self.object.and_then(word).map(u32::from_le_bytes).unwrap_or_default();
+        let position_m = self.axes.to_camera([number(at)?, number(at + 4)?, number(at + 8)?]);
+        Some(PlyVertex { position_m, colour, object })
+    }
+}
+
+/// A mesh file whose header is read.
+#[derive(Debug)]
+pub struct PlyMesh {
+    /// Vertices in the file.
+    pub vertices: u64,
+    /// Triangles in the file.
+    pub triangles: u64,
+    layout: VertexLayout,
+    records: Records,
+    faces: BufReader<File>,
+}
+
+impl PlyMesh {
+    /// Opens a mesh as [`super::PlyWriter`] writes it, other properties of vertices allowed.
+    ///
+    /// # Errors
+    /// It cannot be read, or is no such mesh.
+    pub fn open(path: &Path) -> Result<Self, FormatError> {
+        let refuse = |reason: &str| FormatError::content(path, reason, "Give a binary little-endian PLY of triangles");
+        let mut file = BufReader::new(File::open(path).map_err(FormatError::read(path))?);
+        let (mut layout, mut counts, mut element, mut binary) = (VertexLayout::default(), [0u64; 2], String::new(), false);
+        loop {
+            let mut line = String::new();
+            // A file without line breaks is no PLY: 4 KiB of a line are enough.
+            let read = file.by_ref().take(4_096).read_line(&mut line).map_err(FormatError::read(path))?;
+            let words: Vec<&str> = line.split_whitespace().collect();
+            match words[..] {
+                ["end_header"] => break,
+                ["format", "binary_little_endian", _] => binary = true,
+                ["element", name, count] => {
+                    let count = count.parse().map_err(|_| refuse("a number of its header cannot be read"))?;
+                    match name {
+                        "vertex" => counts[0] = count,
+                        "face" => counts[1] = count,
+                        _ => return Err(refuse("it holds more than vertices and faces")),
+                    }
+                    element = name.to_owned();
+                }
+                ["property", "list", "uchar", "uint" | "int", _] if element == "face" => {}
+                ["property", kind, name] if element == "vertex" => {
+                    layout.add(kind, name).ok_or_else(|| refuse("a type of its header is not known"))?;
+                }
+                ["comment", ..] => {
+                    layout.axes = Axes::ALL.into_iter().find(|axes| line.contains(axes.description())).unwrap_or(layout.axes);
+                }
+                ["ply"] => {}
+                _ if read == 0 => return Err(refuse("it has no header of a PLY file")),
+                _ => return Err(refuse("its header cannot be read")),
+            }
+        }
+        if !binary || layout.position.is_none() {
+            return Err(refuse("it is not binary, or its vertices have no positions"));
+        }
+        let ([vertices, triangles], vertices_at) = (counts, file.stream_position().map_err(FormatError::read(path))?);
+        let faces_at = vertices_at + vertices * layout.bytes as u64;
+        let open =
+            |at: u64| File::open(path).and_then(|mut file| file.seek(SeekFrom::Start(at)).map(|_| file)).map_err(FormatError::read(path));
+        let records = Records::new(open(0)?, vertices_at, vertices, layout.bytes);
+        Ok(Self {
+            vertices,
+            triangles,
+            layout,
+            records,
+            faces: BufReader::with_capacity(1 << 16, open(faces_at)?),
+        })
+    }
+
+    /// Hands every triangle to `sink`, once: corners in the file's order.
+    ///
+    /// # Errors
+    /// The file ends early, a face is not a triangle, or names a vertex that is not there.
+    pub fn triangles(mut self, mut sink: impl FnMut([PlyVertex; 3])) -> io::Result<()> {
+        let damaged = || io::Error::new(io::ErrorKind::InvalidData, "the mesh is damaged");
+        let mut face = [0u8; FACE_BYTES];
+        for _ in 0..self.triangles {
+            self.faces.read_exact(&mut face)?;
+            let [3, indices @ ..] = face else { return Err(damaged()) };
+            let mut corners = [PlyVertex::default(); 3];
+            for (corner, index) in corners.iter_mut().zip(indices.chunks_exact(4)) {
+                let index = u32::from_le_bytes([index[0], index[1], index[2], index[3]]);
+                let record = self.records.get(u64::from(index))?.ok_or_else(damaged)?;
+                *corner = self.layout.vertex(record).ok_or_else(damaged)?;
+            }
+            sink(corners);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::PlyWriter;
+
+    #[test]
+    fn gives_the_triangles_that_were_written_and_refuses_what_is_no_mesh() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let path = folder.path().join("map.ply");
+        let mut ply = PlyWriter::begin_in(&path, "a test", Axes::Enu).unwrap();
+        // More vertices than a chunk, and than all chunks share a slot.
+        let corners = |at: u32| [0.0, 0.1, 0.2].map(|d| ([at as f32, d, d * d], [at as u8, 7, 9]));
+        (0..9_000).for_each(|at| ply.triangle(corners(at)));
+        ply.finish().unwrap();
+        let mut read = Vec::new();
+        let mesh = PlyMesh::open(&path).unwrap();
+        assert_eq!((mesh.vertices, mesh.triangles), (27_000, 9_000));
+        mesh.triangles(|triangle| read.push(triangle.map(|corner| (corner.position_m, corner.colour)))).unwrap();
+        assert!(read == (0..9_000).map(corners).collect::<Vec<_>>());
+        let whole = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &whole[..whole.len() - 5]).unwrap();
+        assert!(PlyMesh::open(&path).unwrap().triangles(|_| ()).is_err(), "it ends early");
+        for text in ["", "ply\nformat ascii 1.0\nend_header\n", "ply\nformat binary_little_endian 1.0\nelement tristrips 1\nend_header\n"] {
+            std::fs::write(&path, text).unwrap();
+            assert!(PlyMesh::open(&path).unwrap_err().to_string().contains("Give a binary"), "{text}");
+        }
+    }
+}

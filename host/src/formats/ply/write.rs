@@ -1,0 +1,218 @@
+//! The map as a binary PLY, streamed: triangles go to disk as they come, and the header's counts are filled in at the end.
+//!
+//! A vertex has position, normal (the mean over its triangles by area), colour and the number of the object it belongs to. Memory: a window of
+//! [`WINDOW`] recent vertices, so that triangles share them, and those near them, whose normals grow. The mesh itself is never in memory.
+//! Vertices that fall out of the window are written again when they return, which costs bytes, not correctness.
+
+use super::Axes;
+use super::records::Records;
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Vertices remembered for sharing.
+const WINDOW: usize = 1 << 19;
+/// Digits of a count in the header.
+const DIGITS: usize = 10;
+/// Bytes of a vertex: position and normal of three floats, three bytes of colour, the object's number.
+const VERTEX_BYTES: usize = 31;
+/// Where its normal begins.
+const NORMAL: usize = 12;
+const PROPERTIES: &[u8] =
+    b"property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n\
+    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int object\n";
+
+/// A vertex: position in m and colour.
+pub type Vertex = ([f32; 3], [u8; 3]);
+
+/// What was written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Mesh {
+    /// Vertices in the file.
+    pub vertices: u64,
+    /// Triangles in the file.
+    pub triangles: u64,
+    /// Those of objects among them.
+    pub object_triangles: u64,
+}
+
+impl Mesh {
+    /// Triangles of the static map.
+    pub fn static_triangles(&self) -> u64 {
+        self.triangles - self.object_triangles
+    }
+}
+
+/// Writes one PLY.
+pub struct PlyWriter {
+    vertices: Records,
+    faces: BufWriter<File>,
+    faces_path: PathBuf,
+    axes: Axes,
+    vertex_count_at: u64,
+    face_count_at: u64,
+    window: Vec<Option<(Vertex, u32)>>,
+    /// Number of the object that triangles belong to; 0 for the static map.
+    object: u32,
+    mesh: Mesh,
+    failed: Option<io::Error>,
+}
+
+impl PlyWriter {
+    /// Begins the file. Faces wait in a second file beside it, since they stand after all vertices.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    pub fn begin(path: &Path) -> io::Result<Self> {
+        Self::begin_in(path, "the first camera", Axes::Camera)
+    }
+
+    /// As [`PlyWriter::begin`], with the name of the frame of reference for the header. Triangles come in the camera's axes, and are written in
+    /// `axes`.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    pub fn begin_in(path: &Path, frame: &str, axes: Axes) -> io::Result<Self> {
+        let options = || File::options().read(true).write(true).create(true).truncate(true).to_owned();
+        let mut file = BufWriter::new(options().open(path)?);
+        write!(file, "ply\nformat binary_little_endian 1.0\ncomment metres; {} of {frame}\n", axes.description())?;
+        writeln!(file, "comment object: 0 for the static map, otherwise the number of the object's track")?;
+        let vertex_count_at = count_line(&mut file, "element vertex ")?;
+        file.write_all(PROPERTIES)?;
+        let face_count_at = count_line(&mut file, "element face ")?;
+        file.write_all(b"property list uchar uint vertex_indices\nend_header\n")?;
+        let start = file.stream_position()?;
+        let file = file.into_inner().map_err(|error| error.into_error())?;
+        let faces_path = path.with_extension("faces");
+        let faces = options().open(&faces_path)?;
+        Ok(Self {
+            vertices: Records::new(file, start, 0, VERTEX_BYTES),
+            faces: BufWriter::new(faces),
+            faces_path,
+            axes,
+            vertex_count_at,
+            face_count_at,
+            window: vec![None; WINDOW],
+            object: 0,
+            mesh: Mesh::default(),
+            failed: None,
+        })
+    }
+
+    /// Triangles from here on belong to an object: the number of its track.
+    pub fn begin_object(&mut self, number: u32) {
+        self.object = number;
+        // Its vertices are its own.
+        self.window.fill(None);
+    }
+
+    /// Adds a triangle. [`PlyWriter::finish`] returns a failure, so that callbacks need no error path.
+    pub fn triangle(&mut self, corners: [Vertex; 3]) {
+        if self.failed.is_none() {
+            self.failed = self.try_triangle(corners.map(|(position_m, colour)| (self.axes.of_camera(position_m), colour))).err();
+        }
+    }
+
+    fn try_triangle(&mut self, corners: [Vertex; 3]) -> io::Result<()> {
+        let normal = area_normal(corners.map(|(position_m, _)| position_m));
+        let mut face = [3u8; 13];
+        for (bytes, corner) in face[1..].chunks_exact_mut(4).zip(corners) {
+            let index = self.index_of(corner)?;
+            bytes.copy_from_slice(&index.to_le_bytes());
+            self.vertices.change(u64::from(index), |vertex| add_normal(vertex, normal))?;
+        }
+        self.mesh.triangles += 1;
+        self.mesh.object_triangles += u64::from(self.object != 0);
+        self.faces.write_all(&face)
+    }
+
+    /// The position of a vertex in the file; it is written if it is not among the recent ones.
+    fn index_of(&mut self, vertex: Vertex) -> io::Result<u32> {
+        let key = vertex.0.iter().fold(0u32, |key, value| (key ^ value.to_bits()).wrapping_mul(0x9E37_79B1).rotate_left(13));
+        let slot = &mut self.window[key as usize % WINDOW];
+        if let Some((_, index)) = slot.filter(|(known, _)| *known == vertex) {
+            return Ok(index);
+        }
+        let index = u32::try_from(self.vertices.len()).map_err(|_| io::Error::other("a PLY holds at most 2^32 vertices"))?;
+        *slot = Some((vertex, index));
+        let (position_m, colour) = vertex;
+        let mut record = [0; VERTEX_BYTES];
+        for (bytes, value) in record.chunks_exact_mut(4).zip(position_m) {
+            bytes.copy_from_slice(&value.to_le_bytes());
+        }
+        record[24..27].copy_from_slice(&colour);
+        record[27..].copy_from_slice(&self.object.to_le_bytes());
+        self.vertices.push(&record)?;
+        Ok(index)
+    }
+
+    /// Appends the faces and fills in the counts. After a failure the file of faces is removed, and what is at the path is not a PLY.
+    ///
+    /// # Errors
+    /// The disk refused, now or before.
+    pub fn finish(self) -> io::Result<Mesh> {
+        let faces_path = self.faces_path.clone();
+        self.complete().inspect_err(|_| {
+            // The disk has failed already.
+            let _ = std::fs::remove_file(&faces_path);
+        })
+    }
+
+    fn complete(mut self) -> io::Result<Mesh> {
+        if let Some(error) = self.failed {
+            return Err(error);
+        }
+        self.mesh.vertices = self.vertices.len();
+        let mut file = self.vertices.finish(normalize)?;
+        file.seek(SeekFrom::End(0))?;
+        self.faces.flush()?;
+        let mut faces = self.faces.into_inner().map_err(|error| error.into_error())?;
+        faces.seek(SeekFrom::Start(0))?;
+        io::copy(&mut faces, &mut file)?;
+        drop(faces);
+        std::fs::remove_file(&self.faces_path)?;
+        for (at, count) in [(self.vertex_count_at, self.mesh.vertices), (self.face_count_at, self.mesh.triangles)] {
+            file.seek(SeekFrom::Start(at))?;
+            write!(file, "{count:0DIGITS$}")?;
+        }
+        file.flush()?;
+        Ok(self.mesh)
+    }
+}
+
+/// The normal of a triangle, twice as long as its area is large.
+fn area_normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
+    let [a, b, c] = [a, b, c].map(nalgebra::Vector3::from);
+    (b - a).cross(&(c - a)).into()
+}
+
+fn normal_of(vertex: &[u8]) -> [f32; 3] {
+    [0, 1, 2].map(|axis| {
+        let at = NORMAL + 4 * axis;
+        f32::from_le_bytes([vertex[at], vertex[at + 1], vertex[at + 2], vertex[at + 3]])
+    })
+}
+
+fn set_normal(vertex: &mut [u8], normal: [f32; 3]) {
+    for (bytes, value) in vertex[NORMAL..].chunks_exact_mut(4).zip(normal) {
+        bytes.copy_from_slice(&value.to_le_bytes());
+    }
+}
+
+fn add_normal(vertex: &mut [u8], normal: [f32; 3]) {
+    let sum = normal_of(vertex);
+    set_normal(vertex, [0, 1, 2].map(|axis| sum[axis] + normal[axis]));
+}
+
+fn normalize(vertex: &mut [u8]) {
+    let normal = nalgebra::Vector3::from(normal_of(vertex));
+    set_normal(vertex, normal.try_normalize(f32::MIN_POSITIVE).unwrap_or_default().into());
+}
+
+/// Writes a header line with space for a count and returns the position of the count.
+fn count_line(file: &mut BufWriter<File>, line: &str) -> io::Result<u64> {
+    file.write_all(line.as_bytes())?;
+    let at = file.stream_position()?;
+    writeln!(file, "{:0DIGITS$}", 0)?;
+    Ok(at)
+}

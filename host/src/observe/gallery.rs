@@ -1,0 +1,126 @@
+//! Pictures of some frames and of the finished map as files, for the viewer: a fixed number, however long the run.
+
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, keyframes, pictures, spread};
+use crate::scene::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Frames with pictures, at most.
+const FRAMES: usize = 40;
+
+/// Writes pictures. What the disk refuses ends it, and the run goes on without them.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct GalleryObserver {
+    /// Position and number of the frames that have pictures.
+    taken: Vec<(usize, usize)>,
+    /// Of a stream, whose end is unknown: every so many frames have pictures.
+    every: usize,
+    failure: Option<String>,
+}
+
+impl Default for GalleryObserver {
+    fn default() -> Self {
+        Self { taken: Vec::new(), every: 1, failure: None }
+    }
+}
+
+impl Observer for GalleryObserver {
+    /// Why the pictures could not be written, if so.
+    type Section = Option<String>;
+
+    /// Removes pictures of frames after the checkpoint: they will be taken again.
+    fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
+        let folder = folder(setup);
+        let failed = |source| ObserveError::Write { path: folder.clone(), source };
+        if !folder.is_dir() {
+            return Ok(());
+        }
+        let known: Vec<String> = self.taken.iter().flat_map(|(_, frame)| PictureKind::ALL.map(|kind| kind.file(*frame))).collect();
+        for entry in folder.read_dir().map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            if !known.iter().any(|name| entry.file_name() == name.as_str()) {
+                std::fs::remove_file(entry.path()).map_err(failed)?;
+            }
+        }
+        if self.taken.is_empty() { std::fs::remove_dir(&folder).map_err(failed) } else { Ok(()) }
+    }
+
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        let position = frame.position;
+        let chosen = setup.frames.map_or_else(|| position.is_multiple_of(self.every), |frames| spread(frames, FRAMES)(position));
+        if chosen && self.failure.is_none() {
+            self.taken.push((position, frame.row.frame));
+            self.failure = write_frame(&folder(setup), frame).err().map(|error| error.to_string());
+            self.thin_out(&folder(setup));
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+        let Some(row) = end.last.filter(|_| self.failure.is_none()) else { return Ok(()) };
+        let seen = end.view.raycast(&keyframes::overview_pose(&row.report.t_world_camera));
+        let overview = seen.and_then(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None));
+        let (width, height) = setup.dataset.size();
+        let index = PictureIndex { width, height, frames: self.taken.iter().map(|(_, frame)| *frame).collect() };
+        let written = overview.map_or(Ok(()), |overview| write(&folder(setup).join(OVERVIEW), &pictures::jpeg(&overview)));
+        let index = serde_json::to_vec(&index).unwrap_or_default();
+        self.failure = written.and_then(|()| write(&folder(setup).join(PICTURES_INDEX), &index)).err().map(|error| error.to_string());
+        Ok(())
+    }
+
+    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<Option<String>, ObserveError> {
+        Ok(self.failure)
+    }
+}
+
+impl GalleryObserver {
+    /// Why pictures could not be written, if so.
+    pub fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
+    }
+
+    /// Removes every second picture of a stream when there are too many.
+    fn thin_out(&mut self, folder: &Path) {
+        if self.taken.len() <= FRAMES {
+            return;
+        }
+        self.every *= 2;
+        let every = self.every;
+        self.taken.retain(|&(position, frame)| {
+            let stays = position.is_multiple_of(every);
+            if !stays {
+                // One that stays behind is not in the list of pictures.
+                PictureKind::ALL.iter().for_each(|kind| drop(std::fs::remove_file(folder.join(kind.file(frame)))));
+            }
+            stays
+        });
+    }
+}
+
+fn folder(setup: &Setup<'_>) -> PathBuf {
+    setup.folder.join(PICTURES_FOLDER)
+}
+
+/// Writes the pictures of a frame. One that cannot be made leaves no file.
+fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    std::fs::create_dir_all(folder).map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
+    let t_world_camera = frame.row.report.t_world_camera;
+    let disparity_q8 = frame.view.mapper().disparity_q8();
+    let masks = pictures::masks(frame.view.mapper(), disparity_q8.width(), disparity_q8.height());
+    let disparity = pictures::jpeg(&pictures::disparity(&disparity_q8));
+    let composed = pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera);
+    let seen = |frame: &mut FrameContext<'_, '_>| pictures::map(pictures::SMALL_PX, frame.view.raycast(&t_world_camera)?, |_| None);
+    let map = composed.or_else(|| seen(frame)).as_ref().map(pictures::jpeg).unwrap_or_default();
+    let left = keyframes::left(frame).as_ref().map(pictures::jpeg).unwrap_or_default();
+    let number = frame.row.frame;
+    for (kind, picture) in PictureKind::ALL.into_iter().zip([left, masks, disparity, map]) {
+        if !picture.is_empty() {
+            write(&folder.join(kind.file(number)), &picture)?;
+        }
+    }
+    Ok(())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), ObserveError> {
+    std::fs::write(path, bytes).map_err(|source| ObserveError::Write { path: path.to_path_buf(), source })
+}

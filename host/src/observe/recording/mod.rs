@@ -1,0 +1,151 @@
+//! The run as an MCAP recording, written frame by frame: images, disparity, poses, objects, what the map shows, and figures, in Foxglove's
+//! schemas as JSON. Memory: one chunk of the file, and 100 bytes for each chunk before.
+
+mod messages;
+mod schemas;
+
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, keyframes, pictures};
+use dynvox_core::geometry::Transform;
+use mcap::records::MessageHeader;
+use messages::Stamp;
+use schemas::{TOPICS, Topic};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fs::File;
+use std::io::BufWriter;
+
+/// Name of the file in the run folder.
+pub const RECORDING_FILE: &str = "run.mcap";
+/// What the map shows is in every so many frames.
+const CLOUD_EVERY: usize = 10;
+/// Poses in the trajectory at the end, at most.
+const MOST_POSES: usize = 5_000;
+
+/// Writes the recording. What the disk refuses ends it, and the run goes on without it.
+#[derive(Default, Serialize, Deserialize)]
+pub struct RecordingObserver {
+    #[serde(skip)]
+    recording: Option<Recording>,
+    failure: Option<String>,
+}
+
+impl std::fmt::Debug for RecordingObserver {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.debug_struct("RecordingObserver").field("failure", &self.failure).finish_non_exhaustive()
+    }
+}
+
+/// A file under construction.
+struct Recording {
+    writer: mcap::Writer<BufWriter<File>>,
+    channels: [u16; TOPICS.len()],
+    sequence: u32,
+    /// Every so many frames' poses are in the trajectory, so that there are at most [`MOST_POSES`].
+    poses_every: usize,
+    poses: Vec<Transform>,
+}
+
+impl Recording {
+    fn begin(setup: &Setup<'_>) -> Result<Self, mcap::McapError> {
+        let file = BufWriter::new(File::create(setup.folder.join(RECORDING_FILE))?);
+        let mut writer = mcap::WriteOptions::new().library("dynvox").create(file)?;
+        let mut channels = [0; TOPICS.len()];
+        for (channel, topic) in channels.iter_mut().zip(TOPICS) {
+            let schema = writer.add_schema(topic.schema(), "jsonschema", topic.json_schema().to_string().as_bytes())?;
+            *channel = writer.add_channel(schema, topic.name(), "json", &Default::default())?;
+        }
+        Ok(Self { writer, channels, sequence: 0, poses_every: 1, poses: Vec::new() })
+    }
+
+    fn write(&mut self, topic: Topic, time_ns: u64, message: &Value) -> Result<(), mcap::McapError> {
+        self.sequence += 1;
+        let channel_id = self.channels[topic as usize];
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
+        self.writer.write_to_known_channel(&header, message.to_string().as_bytes())
+    }
+
+    /// Adds a pose to the trajectory, and thins it out when it is long.
+    fn note_pose(&mut self, position: usize, t_world_camera: &Transform) {
+        if position.is_multiple_of(self.poses_every) {
+            self.poses.push(*t_world_camera);
+        }
+        if self.poses.len() > MOST_POSES {
+            self.poses = self.poses.iter().step_by(2).copied().collect();
+            self.poses_every *= 2;
+        }
+    }
+
+    fn frame(&mut self, frame: &mut FrameContext<'_, '_>, setup: &Setup<'_>) -> Result<(), mcap::McapError> {
+        let (time_ns, t_world_camera) = (frame.row.time_ns(), frame.row.report.t_world_camera);
+        let stamp = Stamp(time_ns);
+        self.note_pose(frame.position, &t_world_camera);
+        self.write(Topic::Transform, time_ns, &messages::transform(stamp, &t_world_camera))?;
+        self.write(Topic::Pose, time_ns, &messages::pose(stamp, &t_world_camera))?;
+        if let Some(left) = keyframes::left(frame) {
+            self.write(
+                Topic::Calibration,
+                time_ns,
+                &messages::calibration(stamp, &setup.config.rig, setup.dataset.size(), left.dimensions()),
+            )?;
+            self.write(Topic::Left, time_ns, &messages::image(stamp, &pictures::jpeg(&left)))?;
+        }
+        let disparity = pictures::jpeg(&pictures::disparity(&frame.view.mapper().disparity_q8()));
+        self.write(Topic::Disparity, time_ns, &messages::image(stamp, &disparity))?;
+        self.write(Topic::Objects, time_ns, &messages::objects(stamp, frame.view.mapper()))?;
+        self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
+        if frame.position.is_multiple_of(CLOUD_EVERY)
+            && let Some(cloud) = frame.view.raycast(&t_world_camera).and_then(|seen| messages::cloud(stamp, seen, &setup.config.rig))
+        {
+            self.write(Topic::Map, time_ns, &cloud)?;
+        }
+        Ok(())
+    }
+}
+
+impl RecordingObserver {
+    /// Why there is no recording, if so.
+    pub fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
+    }
+
+    /// Does something with the recording, begun here if need be, unless it has failed.
+    fn with(&mut self, setup: &Setup<'_>, write: impl FnOnce(&mut Recording) -> Result<(), mcap::McapError>) {
+        if !setup.record || self.failure.is_some() {
+            return;
+        }
+        let done = match &mut self.recording {
+            Some(recording) => write(recording),
+            None => Recording::begin(setup).and_then(|recording| write(self.recording.insert(recording))),
+        };
+        if let Err(error) = done {
+            self.recording = None;
+            self.failure = Some(error.to_string());
+            // It may not exist.
+            let _ = std::fs::remove_file(setup.folder.join(RECORDING_FILE));
+        }
+    }
+}
+
+impl Observer for RecordingObserver {
+    /// Why there is no recording, if so.
+    type Section = Option<String>;
+
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        self.with(setup, |recording| recording.frame(frame, setup));
+        Ok(())
+    }
+
+    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+        let Some(last) = end.last else { return Ok(()) };
+        self.with(setup, |recording| {
+            let trajectory = messages::trajectory(Stamp(last.time_ns()), recording.poses.iter());
+            recording.write(Topic::Trajectory, last.time_ns(), &trajectory)?;
+            recording.writer.finish().map(drop)
+        });
+        Ok(())
+    }
+
+    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<Option<String>, ObserveError> {
+        Ok(self.failure)
+    }
+}

@@ -1,0 +1,45 @@
+// Meshes and tables out of the page's elements.
+async function inflate(id) {
+  const element = document.getElementById(id);
+  const text = atob(element.textContent);
+  element.remove();
+  const bytes = new Uint8Array(text.length);
+  for (let at = 0; at < text.length; at++) bytes[at] = text.charCodeAt(at);
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+const readHead = async () => JSON.parse(new TextDecoder().decode(await inflate("dynvox-head")));
+
+// Bytes of a vertex: position 3 x 16 bits, normal 2 x 8, colour 3 x 8, one unused.
+const VERTEX_BYTES = 12;
+
+// A tile's planes as the vertices and indices that WebGL takes.
+function decodeTile(planes, { vertices, triangles }) {
+  const bytes = new Uint8Array(VERTEX_BYTES * vertices), words = new Uint16Array(bytes.buffer);
+  for (let axis = 0; axis < 3; axis++) {
+    const low = 2 * axis * vertices, high = low + vertices;
+    for (let at = 0, value = 0; at < vertices; at++) {
+      const word = planes[low + at] | planes[high + at] << 8;
+      value = value + (word >> 1 ^ -(word & 1)) & 0xffff;
+      words[6 * at + axis] = value;
+    }
+    const colour = (8 + axis) * vertices;
+    for (let at = 0, value = 0; at < vertices; at++) {
+      value = value + planes[colour + at] & 0xff;
+      bytes[VERTEX_BYTES * at + 8 + axis] = value;
+    }
+  }
+  for (let axis = 0; axis < 2; axis++) {
+    const normal = (6 + axis) * vertices;
+    for (let at = 0; at < vertices; at++) bytes[VERTEX_BYTES * at + 6 + axis] = planes[normal + at];
+  }
+  const corners = 3 * triangles, low = 11 * vertices, high = low + corners;
+  const indices = new Uint16Array(corners);
+  for (let at = 0, named = 0; at < corners; at++) {
+    const word = planes[low + at] | planes[high + at] << 8;
+    indices[at] = named - word;
+    if (word === 0) named++;
+  }
+  return { bytes, indices };
+}

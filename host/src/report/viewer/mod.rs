@@ -1,0 +1,125 @@
+//! The viewer: map, objects, paths, pictures and charts of a run over a time line, inside one page that fetches nothing.
+//!
+//! Meshes and tables are deflated and in base64, in elements that the page's script reads one after the other; pictures are read when they are
+//! shown. Without WebGL 2 or scripts the page shows a picture and says so.
+
+mod head;
+mod tiles;
+
+use crate::formats::FormatError;
+use crate::scene::{OVERVIEW, PICTURES_FOLDER, PictureKind, Scene};
+use base64::{Engine, engine::general_purpose::STANDARD};
+use flate2::{Compression, write::ZlibEncoder};
+use head::Head;
+use maud::{Markup, PreEscaped, html};
+use std::io;
+use std::path::Path;
+
+const STYLE: &str = include_str!("viewer.css");
+/// The script in the order in which its parts rely on each other.
+const SCRIPT: [&str; 8] = [
+    include_str!("vector.js"),
+    include_str!("decode.js"),
+    include_str!("shaders.js"),
+    include_str!("renderer.js"),
+    include_str!("camera.js"),
+    include_str!("pictures.js"),
+    include_str!("charts.js"),
+    include_str!("viewer.js"),
+];
+
+/// The viewer of a run folder, as a part of a page.
+///
+/// # Errors
+/// The encoder's.
+pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, FormatError> {
+    let failed = |source| FormatError::Read { path: folder.to_path_buf(), source };
+    let mut tiles = tiles::tiles(&scene.static_map, None).map_err(failed)?;
+    for (at, object) in scene.objects.iter().enumerate() {
+        tiles.extend(tiles::tiles(&object.mesh, Some(at)).map_err(failed)?);
+    }
+    let mut head = Head::of(name, scene);
+    let mut elements = Vec::new();
+    for (at, tile) in tiles.into_iter().enumerate() {
+        elements.push((format!("dynvox-tile-{at}"), STANDARD.encode(&tile.bytes)));
+        head.tiles.push(tile.head);
+    }
+    let head = deflated(&head).map_err(failed)?;
+    Ok(html! {
+        style { (PreEscaped(STYLE)) }
+        (panels(folder))
+        (data("dynvox-head", &STANDARD.encode(head)))
+        @for (id, text) in &elements { (data(id, text)) }
+        @for (id, text) in pictures(folder, scene) { (data(&id, &text)) }
+        script { (PreEscaped(format!("(() => {{\n\"use strict\";\n{}}})();", SCRIPT.concat()))) }
+    })
+}
+
+/// Bytes that a browser does not look at.
+fn data(id: &str, text: &str) -> Markup {
+    html! { script type="text/plain" id=(id) { (PreEscaped(text)) } }
+}
+
+fn deflated(head: &Head<'_>) -> io::Result<Vec<u8>> {
+    let mut out = ZlibEncoder::new(Vec::new(), Compression::default());
+    serde_json::to_writer(&mut out, head)?;
+    out.finish()
+}
+
+/// Pictures as they are in the run folder. One that is missing there is missing here.
+fn pictures(folder: &Path, scene: &Scene) -> Vec<(String, String)> {
+    let names = scene.pictures.frames.iter().flat_map(|&frame| PictureKind::ALL.map(|kind| kind.file(frame)));
+    names.filter_map(|name| Some((format!("dynvox-{name}"), picture(folder, &name)?))).collect()
+}
+
+fn picture(folder: &Path, name: &str) -> Option<String> {
+    std::fs::read(folder.join(PICTURES_FOLDER).join(name)).ok().map(|bytes| STANDARD.encode(bytes))
+}
+
+/// What the script fills, and what stands there without it.
+fn panels(folder: &Path) -> Markup {
+    let overview = picture(folder, OVERVIEW);
+    html! {
+        div #dynvox-viewer .viewer {
+            div.view {
+                canvas tabindex="0" aria-label="map: drag to turn, wheel to zoom, right button or two fingers to move, W A S D Q E to fly" {}
+                figure.still {
+                    @if let Some(jpeg) = &overview { img alt="the finished map from behind and above" src={ "data:image/jpeg;base64," (jpeg) }; }
+                    figcaption.reason { "The map as a picture: turning it needs a browser with scripts and WebGL 2." }
+                }
+                progress max="1" value="0" hidden {}
+                details.controls open hidden {
+                    summary.row { "layers and colours" }
+                    div.row.layers {}
+                    div.row {
+                        label { "colour " select.colour {
+                            option value="0" { "photo" }
+                            option value="1" { "height" }
+                            option value="2" { "normal" }
+                            option value="3" { "state" }
+                        } }
+                        label { "view " select.mode {
+                            option value="orbit" { "orbit" }
+                            option value="fly" { "fly" }
+                            option value="follow" { "follow the camera" }
+                            option value="camera" { "through the camera" }
+                        } }
+                        button.reset type="button" { "reset" }
+                    }
+                }
+                div.note {}
+            }
+            div.side hidden {
+                figure { canvas.left aria-label="left image with masks and tracks" {} figcaption { "left image, masks and tracks" } }
+                figure { img.disparity alt="disparity"; figcaption { "disparity" } }
+                figure { img.map alt="the map from the camera's pose"; figcaption { "map from the camera's pose" } }
+            }
+            div.time hidden {
+                button.play type="button" aria-label="play" { "▶" }
+                input.slider type="range" min="0" value="0" aria-label="frame";
+                output {}
+            }
+            div.charts hidden {}
+        }
+    }
+}

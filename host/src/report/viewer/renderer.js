@@ -1,0 +1,128 @@
+// Tiles and lines on a canvas.
+const NO_TINT = [-1, -1, -1];
+const IDENTITY = poseMatrix([0, 0, 0, 0, 0, 0, 1]);
+
+class Renderer {
+  // Null where the browser has no WebGL 2.
+  static on(canvas) {
+    const gl = canvas.getContext("webgl2", { antialias: true, alpha: false, preserveDrawingBuffer: true });
+    return gl ? new Renderer(canvas, gl) : null;
+  }
+
+  constructor(canvas, gl) {
+    this.canvas = canvas;
+    this.gl = gl;
+    this.mesh = this.program(MESH_VERTEX, MESH_FRAGMENT, ["a_position", "a_normal", "a_colour"]);
+    this.line = this.program(LINE_VERTEX, LINE_FRAGMENT, ["a_from", "a_to"]);
+    this.tiles = [];
+    gl.enable(gl.DEPTH_TEST);
+  }
+
+  program(vertex, fragment, attributes) {
+    const { gl } = this, program = gl.createProgram();
+    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    }
+    attributes.forEach((name, at) => gl.bindAttribLocation(program, at, name));
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program) || "a shader does not link");
+    const uniforms = {};
+    for (let at = 0; at < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); at++) {
+      const { name } = gl.getActiveUniform(program, at);
+      uniforms[name] = gl.getUniformLocation(program, name);
+    }
+    return { program, uniforms };
+  }
+
+  addTile(head, { bytes, indices }) {
+    const { gl } = this, array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, bytes, gl.STATIC_DRAW);
+    [[3, gl.UNSIGNED_SHORT, 0], [2, gl.BYTE, 6], [3, gl.UNSIGNED_BYTE, 8]].forEach(([size, kind, offset], at) => {
+      gl.enableVertexAttribArray(at);
+      gl.vertexAttribPointer(at, size, kind, true, VERTEX_BYTES, offset);
+    });
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => head.low_m.map((low, axis) => (bits >> axis & 1 ? head.high_m[axis] : low)));
+    this.tiles.push({ head, array, count: indices.length, corners });
+  }
+
+  // A line through points, or pieces between pairs of them.
+  addLine(points, colour, widthPx, pairs = false) {
+    const { gl } = this, array = gl.createVertexArray(), buffer = gl.createBuffer();
+    const line = { array, buffer, colour, widthPx, pairs, count: 0 };
+    this.setLine(line, points);
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    for (const at of [0, 1]) {
+      gl.enableVertexAttribArray(at);
+      gl.vertexAttribPointer(at, 3, gl.FLOAT, false, pairs ? 24 : 12, 12 * at);
+      gl.vertexAttribDivisor(at, 1);
+    }
+    gl.bindVertexArray(null);
+    return line;
+  }
+
+  setLine(line, points) {
+    const { gl } = this;
+    line.count = line.pairs ? points.length >> 1 : Math.max(points.length - 1, 0);
+    gl.bindBuffer(gl.ARRAY_BUFFER, line.buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(points.flat()), gl.DYNAMIC_DRAW);
+  }
+
+  // Draws at a share of the canvas's own pixels. `objects` gives pose and tint of each object, or null where it is hidden.
+  draw({ share, clip, colour, heights, background, showStatic, objects, lines }) {
+    const { gl, canvas } = this;
+    const ratio = Math.min(window.devicePixelRatio || 1, 2) * share;
+    const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(...background, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    const triangles = this.drawTiles(clip, colour, heights, showStatic, objects);
+    const { program, uniforms } = this.line;
+    gl.useProgram(program);
+    gl.uniformMatrix4fv(uniforms.u_clip_world, false, clip);
+    gl.uniform2f(uniforms.u_px, width, height);
+    for (const line of lines) {
+      gl.uniform3fv(uniforms.u_colour, line.colour);
+      gl.uniform1f(uniforms.u_width_px, line.widthPx * ratio);
+      gl.bindVertexArray(line.array);
+      if (line.count) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, line.count);
+    }
+    return triangles;
+  }
+
+  drawTiles(clip, colour, heights, showStatic, objects) {
+    const { gl } = this, { program, uniforms } = this.mesh;
+    gl.useProgram(program);
+    gl.uniformMatrix4fv(uniforms.u_clip_world, false, clip);
+    gl.uniform1i(uniforms.u_colour, colour);
+    gl.uniform2fv(uniforms.u_heights, heights);
+    let triangles = 0;
+    for (const { head, array, count, corners } of this.tiles) {
+      const object = head.object === null ? (showStatic ? { matrix: IDENTITY, tint: NO_TINT } : null) : objects[head.object];
+      if (!object || isOutside(multiply(clip, object.matrix), corners)) continue;
+      gl.uniformMatrix4fv(uniforms.u_world_mesh, false, object.matrix);
+      gl.uniform3fv(uniforms.u_low, head.low_m);
+      gl.uniform1f(uniforms.u_size, head.size_m);
+      gl.uniform3fv(uniforms.u_tint, object.tint);
+      gl.bindVertexArray(array);
+      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, 0);
+      triangles += count / 3;
+    }
+    return triangles;
+  }
+}
+
+// Whether all corners of a box lie beyond one side of the view.
+function isOutside(clip, corners) {
+  const seen = corners.map((corner) => [0, 1, 2, 3].map((row) => clip[row] * corner[0] + clip[4 + row] * corner[1] + clip[8 + row] * corner[2] + clip[12 + row]));
+  return [0, 1, 2].some((axis) => seen.every((at) => at[axis] > at[3]) || seen.every((at) => at[axis] < -at[3]));
+}

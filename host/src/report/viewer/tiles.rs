@@ -1,0 +1,217 @@
+//! A mesh in tiles: compact pieces with indices of 16 bits, deflated.
+//!
+//! A tile's bytes are planes, one after the other, each a byte of every vertex or corner: positions (x, y, z as 16 bits of the tile's box, low
+//! bytes before high ones), normals (two bytes, octahedral), colours (red, green, blue), corners (16 bits, low bytes before high ones).
+//! Positions and colours are differences from the vertex before. A corner is the number of vertices named so far less its own number, so
+//! that a vertex named for the first time is 0. Such planes deflate to about a third.
+
+use crate::scene::IndexedMesh;
+use flate2::{Compression, write::ZlibEncoder};
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// Triangles of a tile: it cannot have more vertices than 16 bits count.
+const TRIANGLES: usize = 16_384;
+/// Steps along the longest side of the largest tile. All tiles of a mesh share one step, so that no crack opens between them.
+const STEPS: f32 = 65_534.0;
+/// Bits of a cell's coordinate in the order of triangles.
+const CELL_BITS: u32 = 10;
+
+/// What a tile is, for the page's script.
+#[derive(Debug, Serialize)]
+pub struct TileHead {
+    /// Position of its object among the objects; absent for the static map.
+    pub object: Option<usize>,
+    /// Least corner of its box, m.
+    pub low_m: [f32; 3],
+    /// Greatest corner of its box, m.
+    pub high_m: [f32; 3],
+    /// What 65,535 steps of a position mean, m.
+    pub size_m: f32,
+    /// Vertices.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+}
+
+/// A tile.
+pub struct Tile {
+    /// What it is.
+    pub head: TileHead,
+    /// Its bytes, deflated.
+    pub bytes: Vec<u8>,
+}
+
+/// Divides a mesh; `object` is the position of its object.
+///
+/// # Errors
+/// None in memory: the encoder's.
+pub fn tiles(mesh: &IndexedMesh, object: Option<usize>) -> io::Result<Vec<Tile>> {
+    let Some(bounds_m) = mesh.bounds_m() else { return Ok(Vec::new()) };
+    let normals = mesh.normals();
+    let mut order: Vec<(u32, usize)> =
+        mesh.triangles.iter().enumerate().map(|(at, [first, ..])| (morton(mesh.positions_m[*first as usize], bounds_m), at)).collect();
+    order.sort_unstable();
+    let chunks: Vec<Vec<[u32; 3]>> =
+        order.chunks(TRIANGLES).map(|chunk| chunk.iter().map(|(_, at)| mesh.triangles[*at]).collect()).collect();
+    let longest_m = chunks.iter().map(|chunk| longest_side(box_of(mesh, chunk.iter().flatten()))).fold(1e-3, f32::max);
+    chunks.iter().map(|chunk| tile(mesh, &normals, chunk, (object, longest_m / STEPS))).collect()
+}
+
+/// The box around some vertices, m.
+fn box_of<'c>(mesh: &IndexedMesh, corners: impl Iterator<Item = &'c u32>) -> [[f32; 3]; 2] {
+    let positions_m = corners.map(|&corner| mesh.positions_m[corner as usize]).collect();
+    IndexedMesh { positions_m, ..IndexedMesh::default() }.bounds_m().unwrap_or_default()
+}
+
+fn longest_side([low, high]: [[f32; 3]; 2]) -> f32 {
+    (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max)
+}
+
+/// The number of a point's cell along a curve whose neighbours are near each other in space (Morton order).
+fn morton(position_m: [f32; 3], bounds_m: [[f32; 3]; 2]) -> u32 {
+    let side = longest_side(bounds_m).max(1e-6);
+    let cell = |axis: usize| ((position_m[axis] - bounds_m[0][axis]) / side * ((1 << CELL_BITS) - 1) as f32) as u32;
+    let cells = [0, 1, 2].map(cell);
+    (0..CELL_BITS).rev().flat_map(|bit| cells.map(|cell| cell >> bit & 1)).fold(0, |number, bit| number << 1 | bit)
+}
+
+/// Encodes some triangles, positions to multiples of `step_m`.
+fn tile(mesh: &IndexedMesh, normals: &[[f32; 3]], triangles: &[[u32; 3]], (object, step_m): (Option<usize>, f32)) -> io::Result<Tile> {
+    let (mut numbers, mut vertices, mut corners) = (hashbrown::HashMap::new(), Vec::<usize>::new(), Vec::new());
+    for &corner in triangles.iter().flatten() {
+        let next = vertices.len() as u16;
+        let number = *numbers.entry(corner).or_insert(next);
+        if number == next {
+            vertices.push(corner as usize);
+        }
+        corners.push(next - number);
+    }
+    let [low_m, high_m] = box_of(mesh, triangles.iter().flatten());
+    let lowest = low_m.map(|metres| (f64::from(metres) / f64::from(step_m)).floor());
+    let steps = |at: usize, axis: usize| (f64::from(mesh.positions_m[at][axis]) / f64::from(step_m)).round() - lowest[axis];
+    let quantised = |axis: usize| vertices.iter().map(move |&at| steps(at, axis) as u16);
+    let mut planes = Vec::with_capacity(11 * vertices.len() + 2 * corners.len());
+    (0..3).for_each(|axis| push_words(&mut planes, &differences(quantised(axis)).collect::<Vec<_>>()));
+    let octahedral: Vec<[i8; 2]> = vertices.iter().map(|&at| octahedral(normals[at])).collect();
+    (0..2).for_each(|axis| planes.extend(octahedral.iter().map(|normal| normal[axis] as u8)));
+    for channel in 0..3 {
+        let mut before = 0;
+        planes.extend(
+            vertices.iter().map(|&at| mesh.colours[at][channel].wrapping_sub(std::mem::replace(&mut before, mesh.colours[at][channel]))),
+        );
+    }
+    push_words(&mut planes, &corners);
+    let mut deflated = ZlibEncoder::new(Vec::new(), Compression::default());
+    deflated.write_all(&planes)?;
+    let low_m = lowest.map(|steps| (steps * f64::from(step_m)) as f32);
+    let head = TileHead {
+        object,
+        low_m,
+        high_m,
+        size_m: 65_535.0 * step_m,
+        vertices: vertices.len(),
+        triangles: triangles.len(),
+    };
+    Ok(Tile { head, bytes: deflated.finish()? })
+}
+
+/// Differences of a value from the one before, small ones of either sign as small numbers.
+fn differences(values: impl Iterator<Item = u16>) -> impl Iterator<Item = u16> {
+    values.scan(0u16, |before, value| {
+        let difference = value.wrapping_sub(std::mem::replace(before, value)) as i16;
+        Some((difference << 1 ^ difference >> 15) as u16)
+    })
+}
+
+/// Appends the low bytes of all words, and then the high ones.
+fn push_words(planes: &mut Vec<u8>, words: &[u16]) {
+    planes.extend(words.iter().map(|word| *word as u8));
+    planes.extend(words.iter().map(|word| (word >> 8) as u8));
+}
+
+/// A direction as a point of the octahedron, unfolded to a square (Cigolle et al., 2014).
+fn octahedral(normal: [f32; 3]) -> [i8; 2] {
+    let sum = normal.iter().map(|value| value.abs()).sum::<f32>().max(1e-6);
+    let [x, y, z] = normal.map(|value| value / sum);
+    let signed = |magnitude: f32, of: f32| if of < 0.0 { -magnitude } else { magnitude };
+    let [x, y] = if z < 0.0 { [signed(1.0 - y.abs(), x), signed(1.0 - x.abs(), y)] } else { [x, y] };
+    [x, y].map(|value| (127.0 * value).round() as i8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Read;
+
+    /// Positions, colours and triangles of a tile.
+    type Decoded = (Vec<[f32; 3]>, Vec<[u8; 3]>, Vec<[usize; 3]>);
+
+    /// What the page's script does.
+    fn decoded(tile: &Tile) -> Decoded {
+        let mut bytes = Vec::new();
+        flate2::read::ZlibDecoder::new(&tile.bytes[..]).read_to_end(&mut bytes).unwrap();
+        let (count, corners) = (tile.head.vertices, 3 * tile.head.triangles);
+        assert_eq!(bytes.len(), 11 * count + 2 * corners);
+        let (mut positions, mut colours) = (vec![[0.0; 3]; count], vec![[0u8; 3]; count]);
+        for axis in 0..3 {
+            let (mut at, mut colour) = (0u16, 0u8);
+            for (vertex, (position, tint)) in positions.iter_mut().zip(&mut colours).enumerate() {
+                let word = u16::from(bytes[2 * axis * count + vertex]) | u16::from(bytes[(2 * axis + 1) * count + vertex]) << 8;
+                at = at.wrapping_add(word >> 1 ^ (word & 1).wrapping_neg());
+                position[axis] = tile.head.low_m[axis] + f32::from(at) / 65_535.0 * tile.head.size_m;
+                colour = colour.wrapping_add(bytes[(8 + axis) * count + vertex]);
+                tint[axis] = colour;
+            }
+        }
+        let (mut named, mut triangles) = (0, vec![[0; 3]; tile.head.triangles]);
+        for at in 0..corners {
+            let word = usize::from(bytes[11 * count + at]) | usize::from(bytes[11 * count + corners + at]) << 8;
+            triangles[at / 3][at % 3] = named - word;
+            named += usize::from(word == 0);
+        }
+        (positions, colours, triangles)
+    }
+
+    #[test]
+    fn every_triangle_is_in_one_tile_to_a_millimetre() {
+        let side = 150u32;
+        let at = |x: u32, y: u32| y * (side + 1) + x;
+        let mut mesh = IndexedMesh::default();
+        for (x, y) in (0..(side + 1) * (side + 1)).map(|at| (at % (side + 1), at / (side + 1))) {
+            mesh.positions_m.push([0.1 * x as f32, 0.2 * y as f32 - 7.0, (x * y % 7) as f32]);
+            mesh.colours.push([x as u8, y as u8, (x ^ y) as u8]);
+        }
+        for (x, y) in (0..side * side).map(|at| (at % side, at / side)) {
+            mesh.triangles.extend([[at(x, y), at(x + 1, y), at(x, y + 1)], [at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)]]);
+        }
+        let tiles = tiles(&mesh, Some(3)).unwrap();
+        assert!(tiles.len() == 3 && tiles.iter().all(|tile| tile.head.object == Some(3)));
+        let key =
+            |corners: [([f32; 3], [u8; 3]); 3]| corners.map(|(at, colour)| (at.map(|metres| (1_000.0 * metres).round() as i32), colour));
+        let vertex = |at: u32| (mesh.positions_m[at as usize], mesh.colours[at as usize]);
+        let mut given: Vec<_> = mesh.triangles.iter().map(|triangle| key(triangle.map(vertex))).collect();
+        let mut found = Vec::new();
+        for tile in &tiles {
+            let (positions, colours, triangles) = decoded(tile);
+            found.extend(triangles.iter().map(|triangle| key(triangle.map(|at| (positions[at], colours[at])))));
+        }
+        given.sort();
+        found.sort();
+        assert!(given == found);
+        assert!(super::tiles(&IndexedMesh::default(), None).unwrap().is_empty());
+    }
+
+    #[test]
+    fn normals_come_back_within_a_degree() {
+        for normal in [[0.0, 0.0, 1.0], [0.6, -0.8, 0.0], [-0.36, 0.48, -0.8], [0.0, -1.0, 0.0]] {
+            let [x, y] = octahedral(normal).map(|value| f32::from(value) / 127.0);
+            let z = 1.0 - x.abs() - y.abs();
+            let fold = (-z).max(0.0);
+            let back = [x - fold.copysign(x), y - fold.copysign(y), z];
+            let length = back.iter().map(|value| value * value).sum::<f32>().sqrt();
+            let cosine: f32 = back.iter().zip(normal).map(|(a, b)| a * b / length).sum();
+            assert!(cosine > 0.9998, "{normal:?}: {back:?}");
+        }
+    }
+}

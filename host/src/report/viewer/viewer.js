@@ -1,0 +1,258 @@
+// The viewer: what is shown, and how the parts of the page change it.
+const root = document.getElementById("dynvox-viewer");
+const find = (selector) => root.querySelector(selector);
+const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
+const LINES = { camera: "#2f6fde", truth: "#e5484d", now: "#f5b301" };
+// Where the edges of the camera's picture lie at a depth of 1, and how far its pyramid is drawn, m.
+const PYRAMID = [[-0.85, -0.27], [0.85, -0.27], [0.85, 0.27], [-0.85, 0.27]];
+const PYRAMID_M = 1.6;
+// Drawing slower than this, ms, draws fewer pixels until nothing moves.
+const SLOW_MS = 40;
+
+class Viewer {
+  constructor(head, renderer) {
+    Object.assign(this, { head, renderer, at: Math.floor(head.frames.length / 2), share: 1, triangles: 0, drawn: 0 });
+    this.camera = new Camera();
+    this.pictures = new Pictures(root, head);
+    this.charts = new Charts(find(".charts"), head, (at) => this.go(at));
+    this.states = this.statesOfObjects();
+    this.layers = this.buildLayers();
+    this.readAddress();
+    this.buildTime();
+    if (renderer) this.buildView();
+    this.go(this.at);
+  }
+
+  // Motion state of each object's track at each frame: its last one known there.
+  statesOfObjects() {
+    const states = new Map();
+    this.head.tracks.forEach((tracks, at) => tracks.forEach(([id, , state]) => {
+      if (!states.has(id)) states.set(id, []);
+      states.get(id).push([at, state]);
+    }));
+    return states;
+  }
+
+  stateOf(id) {
+    let state = "uncertain";
+    for (const [at, known] of this.states.get(id) || []) {
+      if (at > this.at) break;
+      state = known;
+    }
+    return state;
+  }
+
+  buildLayers() {
+    const { head } = this, objects = head.objects.length > 0;
+    const known = [
+      ["map", "static map", head.tiles.some(({ object }) => object === null)],
+      ["dynamic", "dynamic objects", objects], ["static", "static objects", objects], ["uncertain", "uncertain objects", objects],
+      ["later", "objects where last seen", objects],
+      ["tracks", "tracks", objects || head.tracks.some((tracks) => tracks.length)],
+      ["masks", "masks", head.pictures.length > 0 && head.tracks.some((tracks) => tracks.length)],
+      ["camera", "camera path", head.poses.length > 0], ["truth", "ground truth", head.truth.length > 0],
+    ];
+    const layers = {};
+    for (const [key, text, there] of known) {
+      layers[key] = there;
+      if (!there) continue;
+      const label = document.createElement("label"), box = document.createElement("input");
+      Object.assign(box, { type: "checkbox", checked: true, value: key });
+      box.addEventListener("change", () => { layers[key] = box.checked; this.show(); });
+      label.append(box, ` ${text}`);
+      find(".layers").append(label);
+    }
+    return layers;
+  }
+
+  // #frame=12&hide=map,tracks&colour=1&view=follow
+  readAddress() {
+    const given = new URLSearchParams(location.hash.slice(1));
+    if (given.has("frame")) this.at = Math.max(0, this.head.frames.findIndex((frame) => frame >= Number(given.get("frame"))));
+    for (const key of (given.get("hide") || "").split(",")) {
+      const box = find(`.layers input[value="${CSS.escape(key)}"]`);
+      if (box) box.checked = this.layers[key] = false;
+    }
+    for (const name of ["colour", "view"]) {
+      const select = find(name === "view" ? ".mode" : ".colour");
+      if ([...select.options].some(({ value }) => value === given.get(name))) select.value = given.get(name);
+    }
+  }
+
+  buildTime() {
+    const slider = find(".slider"), play = find(".play"), last = this.head.frames.length - 1;
+    slider.max = Math.max(last, 0);
+    slider.addEventListener("input", () => this.go(Number(slider.value)));
+    let playing = null;
+    const stop = () => { clearInterval(playing); playing = null; play.textContent = "▶"; };
+    play.addEventListener("click", () => {
+      if (playing) { stop(); return; }
+      if (this.at >= last) this.go(0);
+      play.textContent = "❚❚";
+      playing = setInterval(() => { if (this.at >= last) stop(); else this.go(this.at + 1); }, 100);
+    });
+    find(".time").hidden = last < 1;
+    window.addEventListener("resize", () => this.show());
+  }
+
+  buildView() {
+    const { head, renderer, camera } = this, canvas = find(".view canvas");
+    this.lines = { pyramid: renderer.addLine([], rgb(LINES.now), 1.2, true) };
+    const positions = head.poses.map((pose) => pose.slice(0, 3));
+    if (positions.length > 1) this.lines.camera = renderer.addLine(positions, rgb(LINES.camera), 1.8);
+    if (head.truth.length > 1) this.lines.truth = renderer.addLine(head.truth, rgb(LINES.truth), 1.4);
+    this.tracks = head.objects.map(({ id, poses }) => ({ id, line: renderer.addLine(poses.map((pose) => pose.slice(0, 3)), [1, 1, 1], 2.2) }));
+    steer(canvas, camera, () => find(".mode").value, () => {
+      if (["follow", "camera"].includes(find(".mode").value)) find(".mode").value = "orbit";
+      this.show();
+    });
+    find(".mode").addEventListener("change", () => { this.follow(); this.show(); });
+    find(".colour").addEventListener("change", () => this.show());
+    find(".reset").addEventListener("click", () => { find(".mode").value = "orbit"; this.lookBehind(true); this.show(); });
+    this.lookBehind(true);
+    find(".controls").hidden = false;
+    find(".controls").open = innerWidth > 820;
+  }
+
+  lookBehind(behind) {
+    const pose = this.head.poses[this.at];
+    if (!pose) return;
+    const matrix = poseMatrix(pose);
+    this.camera.lookFrom(pose.slice(0, 3), [matrix[8], matrix[9], matrix[10]], behind);
+  }
+
+  follow() {
+    const mode = find(".mode").value;
+    if (mode === "follow" || mode === "camera") this.lookBehind(mode === "follow");
+  }
+
+  go(at) {
+    this.at = clamp(at, 0, Math.max(this.head.frames.length - 1, 0));
+    if (this.renderer) this.follow();
+    this.show();
+  }
+
+  // Draws with the next picture of the browser.
+  show() {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      this.draw();
+    });
+  }
+
+  draw() {
+    const { head, at } = this, style = getComputedStyle(root), frame = head.frames[at];
+    find(".slider").value = at;
+    find("output").textContent = frame === undefined ? "no frame" : `frame ${frame}, ${head.times_s[at].toFixed(2)} s`;
+    this.pictures.show(frame, this.layers).catch((error) => console.error(error));
+    this.charts.draw(at, { line: style.getPropertyValue("--accent"), cursor: LINES.now });
+    Object.assign(root.dataset, { frame: String(frame) });
+    if (this.renderer) this.draw3d();
+  }
+
+  draw3d() {
+    const { head, renderer, camera, layers } = this, canvas = find(".view canvas"), began = performance.now();
+    const objects = this.posedObjects();
+    const lines = Object.entries(this.lines).filter(([key]) => key === "pyramid" ? layers.camera : layers[key]).map(([, line]) => line);
+    if (layers.tracks) {
+      for (const { id, line } of this.tracks) {
+        line.colour = rgb(STATE_COLOURS[this.stateOf(id)]);
+        lines.push(line);
+      }
+    }
+    renderer.setLine(this.lines.pyramid, this.pyramid());
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+    this.triangles = renderer.draw({
+      share: this.share, clip: camera.clip(canvas.clientWidth / Math.max(canvas.clientHeight, 1)), colour: Number(find(".colour").value),
+      heights: [head.heights_m[0], Math.max(head.heights_m[1], head.heights_m[0] + 0.1)],
+      background: dark ? [0.07, 0.08, 0.09] : [0.90, 0.92, 0.94], showStatic: layers.map, objects, lines,
+    });
+    renderer.gl.readPixels(0, 0, 1, 1, renderer.gl.RGBA, renderer.gl.UNSIGNED_BYTE, new Uint8Array(4));
+    this.adapt(performance.now() - began);
+    Object.assign(root.dataset, { triangles: String(this.triangles), drawn: String(++this.drawn) });
+  }
+
+  // Fewer pixels while drawing is slow, and all of them when nothing has moved for a while.
+  adapt(ms) {
+    clearTimeout(this.settling);
+    if (this.refining) { this.refining = false; return; }
+    if (ms > SLOW_MS) this.share = Math.max(this.share * 0.7, 0.35);
+    if (this.share < 1) {
+      this.settling = setTimeout(() => {
+        const moving = this.share;
+        Object.assign(this, { share: 1, refining: true });
+        this.draw3d();
+        this.share = moving;
+      }, 250);
+    }
+  }
+
+  // Pose and tint of each object at the current frame; null where it is hidden.
+  posedObjects() {
+    const { head, layers } = this, now = head.frames[this.at];
+    return head.objects.map(({ id, frames, poses }) => {
+      let last = -1;
+      while (last + 1 < frames.length && frames[last + 1] <= now) last++;
+      const state = this.stateOf(id), over = now > frames[frames.length - 1];
+      if (last < 0 || !layers[state] || over && !layers.later) return null;
+      return { matrix: poseMatrix(poses[last]), tint: rgb(STATE_COLOURS[state]) };
+    });
+  }
+
+  // The camera's picture as a pyramid, as pairs of points.
+  pyramid() {
+    const pose = this.head.poses[this.at];
+    if (!pose || find(".mode").value === "camera") return [];
+    const matrix = poseMatrix(pose), tip = pose.slice(0, 3);
+    const corners = PYRAMID.map(([x, y]) => transform(matrix, [x * PYRAMID_M, y * PYRAMID_M, PYRAMID_M]));
+    return corners.flatMap((corner, at) => [tip, corner, corner, corners[(at + 1) % 4]]);
+  }
+}
+
+// Lets the browser paint between two steps of loading.
+const breathe = () => new Promise((resolve) => setTimeout(resolve));
+
+async function load() {
+  const began = performance.now(), head = await readHead();
+  let renderer = null, reason = "this browser has no WebGL 2";
+  try {
+    renderer = head.tiles.length + head.poses.length > 0 ? Renderer.on(find(".view canvas")) : null;
+  } catch (error) {
+    reason = `WebGL 2 failed: ${error.message}`;
+  }
+  const viewer = new Viewer(head, renderer);
+  if (renderer) {
+    root.classList.add("live");
+    const bar = find("progress"), triangles = head.tiles.reduce((sum, tile) => sum + tile.triangles, 0);
+    bar.hidden = false;
+    let pause = 0, drawnAt = -Infinity;
+    for (const [at, tile] of head.tiles.entries()) {
+      renderer.addTile(tile, decodeTile(await inflate(`dynvox-tile-${at}`), tile));
+      bar.value = (at + 1) / head.tiles.length;
+      // Drawing takes a quarter of the time at most, however slow it is.
+      if (performance.now() - drawnAt > pause) {
+        const before = performance.now();
+        viewer.draw();
+        drawnAt = performance.now();
+        pause = Math.max(3 * (drawnAt - before), 100);
+        await breathe();
+      }
+    }
+    bar.hidden = true;
+    viewer.draw();
+    const of = head.tiles.length ? `${triangles.toLocaleString("en")} triangles, of ${head.static_triangles.toLocaleString("en")} of the static map` : "The map is empty";
+    find(".note").textContent = of;
+  } else {
+    find(".reason").textContent = head.frames.length ? `The map as a picture: ${reason}.` : "The run has no frames.";
+  }
+  Object.assign(root.dataset, { ready: "true", loadMs: String(Math.round(performance.now() - began)) });
+  return viewer;
+}
+
+load().then((viewer) => { window.dynvoxViewer = viewer; }, (error) => {
+  root.classList.remove("live");
+  find(".reason").textContent = `The map as a picture: the viewer failed (${error.message}).`;
+  console.error(error);
+});

@@ -1,0 +1,183 @@
+//! Mesh simplification by vertex clustering (Rossignac, Borrel, 1993): vertices in one cell of a lattice become their mean.
+//!
+//! Triangles stream in; whenever there are more than may be, the cells grow and what is kept is clustered again. So the memory is bounded by
+//! the result, not by the input, and the order of the input alone decides the result.
+
+use super::IndexedMesh;
+use hashbrown::{HashMap, HashSet};
+
+/// Side of the first cells, m.
+const FIRST_CELL_M: f32 = 0.03;
+/// By how much cells grow: a surface then keeps two thirds of its triangles.
+const GROWTH: f32 = 1.26;
+/// Cells for each triangle that may stay: small fragments have cells and no triangle.
+const CELLS_PER_TRIANGLE: usize = 2;
+
+/// The vertices of one cell.
+#[derive(Clone, Copy, Default)]
+struct Cluster {
+    position_sum_m: [f64; 3],
+    count: f64,
+    colour_sum: [f64; 3],
+    coloured: f64,
+}
+
+impl Cluster {
+    fn of(position_m: [f32; 3], colour: [u8; 3]) -> Self {
+        let coloured = if colour == [0; 3] { 0.0 } else { 1.0 };
+        Self {
+            position_sum_m: position_m.map(f64::from),
+            count: 1.0,
+            colour_sum: colour.map(f64::from),
+            coloured,
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        for axis in 0..3 {
+            self.position_sum_m[axis] += other.position_sum_m[axis];
+            self.colour_sum[axis] += other.colour_sum[axis];
+        }
+        self.count += other.count;
+        self.coloured += other.coloured;
+    }
+
+    fn position_m(&self) -> [f32; 3] {
+        self.position_sum_m.map(|sum| (sum / self.count) as f32)
+    }
+
+    fn colour(&self) -> [u8; 3] {
+        if self.coloured == 0.0 { [0; 3] } else { self.colour_sum.map(|sum| (sum / self.coloured).round() as u8) }
+    }
+}
+
+/// A mesh that is simplified while it comes in.
+pub struct VertexClustering {
+    most_triangles: usize,
+    cell_m: f32,
+    cells: HashMap<[i32; 3], u32>,
+    clusters: Vec<Cluster>,
+    triangles: Vec<[u32; 3]>,
+    /// Corners of the triangles in ascending order: two sides of a thin sheet would flicker.
+    known: HashSet<[u32; 3]>,
+}
+
+impl VertexClustering {
+    /// Keeps at most so many triangles.
+    pub fn new(most_triangles: usize) -> Self {
+        Self {
+            most_triangles,
+            cell_m: FIRST_CELL_M,
+            cells: HashMap::new(),
+            clusters: Vec::new(),
+            triangles: Vec::new(),
+            known: HashSet::new(),
+        }
+    }
+
+    /// Adds a triangle: positions in m, and colours.
+    pub fn add(&mut self, corners: [([f32; 3], [u8; 3]); 3]) {
+        if corners.iter().flat_map(|(position_m, _)| position_m).any(|metres| !metres.is_finite()) {
+            return;
+        }
+        let triangle = corners.map(|(position_m, colour)| self.cluster(position_m, &Cluster::of(position_m, colour)));
+        self.connect(triangle);
+        while self.triangles.len() > self.most_triangles || self.clusters.len() > CELLS_PER_TRIANGLE * self.most_triangles {
+            self.coarsen();
+        }
+    }
+
+    /// Adds vertices to their cell and returns its number.
+    fn cluster(&mut self, position_m: [f32; 3], vertices: &Cluster) -> u32 {
+        let cell = position_m.map(|metres| (metres / self.cell_m).floor() as i32);
+        let number = *self.cells.entry(cell).or_insert(self.clusters.len() as u32);
+        match self.clusters.get_mut(number as usize) {
+            Some(cluster) => cluster.add(vertices),
+            None => self.clusters.push(*vertices),
+        }
+        number
+    }
+
+    /// Adds a triangle between cells, unless it is a line, a point or there already.
+    fn connect(&mut self, triangle: [u32; 3]) {
+        let mut sorted = triangle;
+        sorted.sort_unstable();
+        if sorted[0] < sorted[1] && sorted[1] < sorted[2] && self.known.insert(sorted) {
+            self.triangles.push(triangle);
+        }
+    }
+
+    /// Clusters what there is in larger cells.
+    fn coarsen(&mut self) {
+        let (clusters, triangles) = (std::mem::take(&mut self.clusters), std::mem::take(&mut self.triangles));
+        self.cells.clear();
+        self.known.clear();
+        self.cell_m *= GROWTH;
+        let numbers: Vec<u32> = clusters.iter().map(|cluster| self.cluster(cluster.position_m(), cluster)).collect();
+        triangles.iter().for_each(|triangle| self.connect(triangle.map(|corner| numbers[corner as usize])));
+    }
+
+    /// The mesh: vertices in the order in which triangles name them.
+    pub fn finish(self) -> IndexedMesh {
+        let mut numbers = vec![u32::MAX; self.clusters.len()];
+        let mut mesh = IndexedMesh::default();
+        for triangle in &self.triangles {
+            let corners = triangle.map(|corner| {
+                let (number, cluster) = (&mut numbers[corner as usize], &self.clusters[corner as usize]);
+                if *number == u32::MAX {
+                    *number = mesh.positions_m.len() as u32;
+                    mesh.positions_m.push(cluster.position_m());
+                    mesh.colours.push(cluster.colour());
+                }
+                *number
+            });
+            mesh.triangles.push(corners);
+        }
+        mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square of `side` x `side` squares of 5 cm, two triangles each, that lies at a depth of 2 m.
+    fn plane(side: u32, most_triangles: usize) -> IndexedMesh {
+        let mut clustering = VertexClustering::new(most_triangles);
+        let corner = |x: u32, y: u32| ([0.05 * x as f32, 0.05 * y as f32, 2.0], [200, x as u8, 0]);
+        for (x, y) in (0..side * side).map(|at| (at % side, at / side)) {
+            clustering.add([corner(x, y), corner(x + 1, y), corner(x, y + 1)]);
+            clustering.add([corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)]);
+        }
+        clustering.finish()
+    }
+
+    #[test]
+    fn a_small_mesh_stays_as_it_is() {
+        let mesh = plane(10, 1_000);
+        assert_eq!((mesh.positions_m.len(), mesh.triangles.len()), (121, 200));
+        assert_eq!((mesh.positions_m[1], mesh.colours[1]), ([0.05, 0.0, 2.0], [200, 1, 0]));
+    }
+
+    #[test]
+    fn a_large_mesh_keeps_its_extent_and_surface_within_the_bound() {
+        let mesh = plane(100, 2_000);
+        assert!((1_000..=2_000).contains(&mesh.triangles.len()), "{}", mesh.triangles.len());
+        let [low, high] = mesh.bounds_m().unwrap();
+        assert!(low[0] < 0.2 && high[0] > 4.8 && low[2] == 2.0 && high[2] == 2.0, "{low:?} {high:?}");
+        let area = |[a, b, c]: [[f32; 3]; 3]| 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+        let whole: f32 = mesh.triangles.iter().map(|triangle| area(triangle.map(|corner| mesh.positions_m[corner as usize]))).sum();
+        assert!((22.0..=25.1).contains(&whole), "of 25 square metres {whole} are covered once");
+        assert!(mesh.normals().iter().all(|normal| normal[2] > 0.999));
+    }
+
+    #[test]
+    fn the_two_sides_of_a_sheet_become_one_and_nonsense_is_left_out() {
+        let mut clustering = VertexClustering::new(10);
+        let corners = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(|at| (at, [0; 3]));
+        clustering.add(corners);
+        clustering.add([corners[0], corners[2], corners[1]]);
+        clustering.add([corners[0], corners[1], ([f32::NAN, 0.0, 0.0], [0; 3])]);
+        assert_eq!(clustering.finish().triangles, [[0, 1, 2]]);
+    }
+}

@@ -1,0 +1,62 @@
+//! A finished run as a viewer shows it, read from the run folder and bounded: so many triangles, frames and pictures, however long the run.
+
+mod cluster;
+pub mod glb;
+mod mesh;
+mod pictures;
+mod read;
+mod tables;
+
+pub use cluster::VertexClustering;
+pub use mesh::IndexedMesh;
+pub use pictures::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
+pub use read::object_files;
+pub use tables::{FrameColumns, TrackColumns};
+
+use dynvox_core::geometry::Transform;
+
+/// Name of the folder of objects in the run folder.
+pub const OBJECTS_FOLDER: &str = "objects";
+/// Triangles of all meshes together, unless something else is asked for.
+pub const MOST_TRIANGLES: usize = 500_000;
+
+/// A frame.
+#[derive(Clone, Debug)]
+pub struct SceneFrame {
+    /// What is known of it.
+    pub row: FrameColumns,
+    /// The left camera's pose.
+    pub t_world_camera: Transform,
+    /// Tracks seen in it.
+    pub tracks: Vec<TrackColumns>,
+}
+
+/// A reconstructed object.
+#[derive(Clone, Debug)]
+pub struct SceneObject {
+    /// Name of its files: the track's number; `7-2` for the second object of track 7.
+    pub name: String,
+    /// Number of its track.
+    pub id: u32,
+    /// Its pose in the frames it was fused in, by number of the frame.
+    pub t_world_object: Vec<(usize, Transform)>,
+    /// Its mesh in its own frame.
+    pub mesh: IndexedMesh,
+}
+
+/// A finished run.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// The frames, by number.
+    pub frames: Vec<SceneFrame>,
+    /// True poses of the left camera, where they are known.
+    pub truth: Vec<Transform>,
+    /// The static map.
+    pub static_map: IndexedMesh,
+    /// Triangles of the static map on disk.
+    pub static_triangles: u64,
+    /// The objects, by track.
+    pub objects: Vec<SceneObject>,
+    /// Which frames have pictures.
+    pub pictures: PictureIndex,
+}

@@ -1,0 +1,132 @@
+//! What a run leaves behind for other programs: meshes, glTF, recordings; completions and the manual.
+#![allow(missing_docs)]
+
+mod binary;
+
+use binary::{dynvox, names, output_text, rig};
+use dynvox::formats::{PlyMesh, read_numbered, read_poses};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// A street with traffic whose masks are exact, so that there are objects.
+const STREET: [&str; 12] = [
+    "run",
+    "--quiet",
+    "--profile",
+    "tiny",
+    "--instances",
+    "exact",
+    "--set",
+    "street.width=320",
+    "--set",
+    "street.height=96",
+    "--set",
+    "street.frames=16",
+];
+
+fn run(root: &Path, args: &[&str]) {
+    let done = dynvox(root, args);
+    assert!(done.status.success(), "{}", output_text(&done));
+}
+
+/// Triangles of a mesh by object, and its greatest and least coordinates.
+fn triangles(path: &Path) -> (BTreeMap<u32, u64>, [[f32; 3]; 2]) {
+    let (mut counts, mut bounds) = (BTreeMap::new(), [[f32::MAX; 3], [f32::MIN; 3]]);
+    PlyMesh::open(path)
+        .unwrap()
+        .triangles(|corners| {
+            *counts.entry(corners[0].object).or_default() += 1;
+            for (corner, axis) in corners.iter().flat_map(|corner| (0..3).map(move |axis| (corner, axis))) {
+                bounds[0][axis] = bounds[0][axis].min(corner.position_m[axis]);
+                bounds[1][axis] = bounds[1][axis].max(corner.position_m[axis]);
+            }
+        })
+        .unwrap();
+    (counts, bounds)
+}
+
+#[test]
+fn a_map_has_its_objects_where_they_were_last_seen() {
+    let root = TempDir::new().unwrap();
+    run(root.path(), &[&STREET[..], &["--out", "last"]].concat());
+    let last = root.path().join("last");
+    let (map, bounds) = triangles(&last.join("map.ply"));
+    let summary: serde_json::Value = serde_json::from_slice(&fs::read(last.join("summary.json")).unwrap()).unwrap();
+    assert!(map.len() > 1, "objects: {map:?}");
+    assert_eq!(summary["map"]["triangles"], map[&0]);
+    assert_eq!(summary["map"]["object_triangles"], map.values().sum::<u64>() - map[&0]);
+    let files = names(&last.join("objects"));
+    let objects: Vec<&str> = files.iter().filter_map(|name| name.strip_suffix("_world.ply")).collect();
+    assert!(!objects.is_empty() && files.len() == 4 * objects.len(), "{files:?}");
+    for name in objects {
+        let in_folder = |ending: &str| last.join("objects").join(format!("{name}{ending}"));
+        let (own, own_bounds) = triangles(&in_folder(".ply"));
+        let (world, world_bounds) = triangles(&in_folder("_world.ply"));
+        assert_eq!(own, world);
+        let (by_frame, by_time) = (read_numbered(&in_folder("_kitti.txt")).unwrap(), read_poses(&in_folder("_tum.txt")).unwrap());
+        assert!(by_frame.len() == by_time.poses.len() && by_time.times_s.is_some());
+        let moved = by_frame.last().unwrap().1.transform_point(own_bounds.map(|corner| corner.map(f64::from))[0]);
+        let reach: f32 = (0..3).map(|axis| own_bounds[1][axis] - own_bounds[0][axis]).sum();
+        assert!((0..3).all(|axis| (moved[axis] as f32 - world_bounds[0][axis]).abs() <= reach), "{name}: {moved:?} {world_bounds:?}");
+        assert!((0..3).all(|axis| world_bounds[0][axis] >= bounds[0][axis] && world_bounds[1][axis] <= bounds[1][axis]), "{name}");
+    }
+    assert_eq!(&fs::read(last.join("map.glb")).unwrap()[..4], b"glTF");
+    run(root.path(), &[&STREET[..], &["--out", "none", "--map-objects", "none", "--axes", "enu"]].concat());
+    let (none, none_bounds) = triangles(&root.path().join("none/map.ply"));
+    assert_eq!(none, BTreeMap::from([(0, map[&0])]));
+    assert!(none_bounds[1][1] < 5.0, "y down as readers turn it: the ground is not far below {none_bounds:?}");
+    let header = fs::read(root.path().join("none/map.ply")).unwrap();
+    assert!(String::from_utf8_lossy(&header[..300]).contains("x right, y forward, z up"));
+}
+
+#[test]
+fn a_recording_has_every_frame_of_every_topic() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 12);
+    run(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--out", "result", "--mcap"]);
+    let bytes = fs::read(root.path().join("result/run.mcap")).unwrap();
+    let (mut counts, mut times) = (BTreeMap::<String, usize>::new(), Vec::new());
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+        let schema: serde_json::Value = serde_json::from_slice(&message.channel.schema.as_ref().unwrap().data).unwrap();
+        for key in json.as_object().unwrap().keys() {
+            assert!(!schema["properties"][key].is_null(), "{} is in the schema of {}", key, message.channel.topic);
+        }
+        *counts.entry(message.channel.topic.clone()).or_default() += 1;
+        times.push(message.log_time);
+    }
+    assert!(times.is_sorted());
+    let expected = [
+        ("/camera/disparity", 12),
+        ("/camera/left/calibration", 12),
+        ("/camera/left/image", 12),
+        ("/camera/pose", 12),
+        ("/figures", 12),
+        ("/map/seen", 2),
+        ("/objects", 12),
+        ("/tf", 12),
+        ("/trajectory", 1),
+    ];
+    assert_eq!(counts, expected.map(|(topic, count)| (topic.to_owned(), count)).into());
+    let refused = dynvox(root.path(), &["run", "rig", "--mcap", "--snapshot-every", "4"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", output_text(&refused));
+}
+
+#[test]
+fn completions_and_the_manual_know_every_command() {
+    let root = TempDir::new().unwrap();
+    let text = |args: &[&str]| String::from_utf8(dynvox(root.path(), args).stdout).unwrap();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = text(&["completions", shell]);
+        assert!(["run", "view", "map-objects"].iter().all(|word| script.contains(word)), "{shell}");
+    }
+    assert!(text(&["man"]).contains(".TH dynvox 1"));
+    run(root.path(), &["man", "--out", "man"]);
+    let pages = names(&root.path().join("man"));
+    assert!(["dynvox.1", "dynvox-run.1", "dynvox-view.1"].iter().all(|page| pages.iter().any(|name| name == page)), "{pages:?}");
+    let help = text(&["run", "--help"]);
+    assert!(["Input:", "Frames:", "Mapping:", "Limits:", "Evaluation:", "Results:"].iter().all(|group| help.contains(group)), "{help}");
+}

@@ -1,0 +1,178 @@
+//! The viewer of finished runs, in a browser where one is installed: it draws, scrubs and toggles, without an error on the console.
+#![allow(missing_docs)]
+
+mod binary;
+mod browser;
+mod run_folder;
+
+use binary::{dynvox, output_text, rig};
+use browser::{Browser, Visit, Window};
+use run_folder::FakeRun;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Waits for the viewer, and what the steps of a test have in common.
+const HELPERS: &str = r#"
+const root = document.getElementById("dynvox-viewer"), canvas = root.querySelector(".view canvas"), data = root.dataset;
+const until = async (done) => { while (!done()) await new Promise((resolve) => setTimeout(resolve, 20)); };
+const drawn = async (change) => { const before = data.drawn; change(); await until(() => data.drawn !== before); };
+const layer = (name) => root.querySelector(`.layers input[value=${name}]`);
+const toggle = (name) => drawn(() => layer(name).click());
+const scrub = (at) => drawn(() => { const slider = root.querySelector(".slider"); slider.value = at; slider.dispatchEvent(new Event("input")); });
+const shown = () => {
+  const gl = canvas.getContext("webgl2"), pixels = new Uint8Array(4 * canvas.width * canvas.height);
+  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  let count = 0, red = 0;
+  for (let at = 0; at < pixels.length; at += 4) {
+    if ([0, 1, 2].some((channel) => Math.abs(pixels[at + channel] - pixels[channel]) > 6)) count++;
+    red += pixels[at];
+  }
+  return { share: count / (pixels.length / 4), red };
+};
+await until(() => data.ready);
+"#;
+
+/// The page of a run folder.
+fn viewer(folder: &Path) -> PathBuf {
+    let made = dynvox(folder, &["view", ".", "--no-open"]);
+    assert!(made.status.success(), "{}", output_text(&made));
+    assert_eq!(String::from_utf8_lossy(&made.stdout).trim(), "./viewer.html");
+    folder.join("viewer.html")
+}
+
+/// What a script reports on a page of a desktop's size.
+fn visit(browser: &Browser, page: &Path, before: &str, script: &str) -> serde_json::Value {
+    let script = &[HELPERS, script].concat();
+    browser.visit(&Visit { page, part: "", window: Window::DESKTOP, before, script })
+}
+
+#[test]
+fn view_writes_one_file_that_fetches_nothing_and_refuses_what_is_no_run() {
+    let root = TempDir::new().unwrap();
+    FakeRun { frames: 4, objects: 1, squares: 20, pictures: true }.write(root.path());
+    let page = fs::read_to_string(viewer(root.path())).unwrap();
+    assert!(!page.contains("http") && !page.contains("src=\"/") && !page.contains("@import"));
+    assert!(
+        page.contains("<figcaption class=\"reason\">The map as a picture") && page.contains("data:image/jpeg;base64,"),
+        "without scripts"
+    );
+    fs::write(root.path().join("frames.csv"), "frame\nx\n").unwrap();
+    let damaged = dynvox(root.path(), &["view", ".", "--no-open"]);
+    assert!(!damaged.status.success() && output_text(&damaged).contains("frames.csv cannot be used"), "{}", output_text(&damaged));
+    fs::remove_file(root.path().join("summary.json")).unwrap();
+    let refused = dynvox(root.path(), &["view", ".", "--no-open"]);
+    assert!(!refused.status.success() && output_text(&refused).contains("is not a run folder"), "{}", output_text(&refused));
+}
+
+#[test]
+fn the_viewer_draws_scrubs_and_toggles() {
+    let Some(browser) = Browser::find("the_viewer_draws_scrubs_and_toggles") else { return };
+    let root = TempDir::new().unwrap();
+    FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());
+    let script = r#"
+const all = shown(), result = { share: all.share, triangles: Number(data.triangles), error: data.error };
+await scrub(0);
+result.first = data.frame;
+const caption = () => root.querySelector(".side figcaption").textContent;
+result.caption = caption();
+await scrub(11);
+result.last = data.frame;
+await until(() => caption() !== result.caption);
+result.lastCaption = caption();
+result.left = root.querySelector("canvas.left").width;
+await toggle("map");
+result.objects = Number(data.triangles);
+await toggle("later");
+result.now = Number(data.triangles);
+await toggle("map");
+result.back = Number(data.triangles);
+const photo = shown().red, select = root.querySelector(".colour");
+for (const value of ["1", "2", "3"]) {
+  await drawn(() => { select.value = value; select.dispatchEvent(new Event("change")); });
+  result[`colour${value}`] = shown().red !== photo;
+}
+const turn = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, { pointerId: 1, clientX: x, clientY: 200, buttons: 1, bubbles: true }));
+canvas.setPointerCapture = () => {};
+turn("pointerdown", 200);
+const before = shown().red;
+await drawn(() => turn("pointermove", 320));
+result.turned = shown().red !== before;
+report(result);
+"#;
+    let of = visit(&browser, &viewer(root.path()), "", script);
+    assert!(of["share"].as_f64().unwrap() > 0.1, "the map is drawn: {of}");
+    assert_eq!((&of["first"], &of["last"]), (&"0".into(), &"22".into()), "{of}");
+    assert!(of["caption"].as_str().unwrap().ends_with("frame 0") && of["lastCaption"].as_str().unwrap().ends_with("frame 22"), "{of}");
+    assert_eq!(of["left"], 64, "{of}");
+    let triangles = |key: &str| of[key].as_u64().unwrap();
+    // The first object is last seen in the middle, the second at the end.
+    assert_eq!((triangles("objects"), triangles("now")), (2 * 12, 12), "{of}");
+    assert_eq!(triangles("back"), 2 * 60 * 60 + 12, "{of}");
+    for key in ["colour1", "colour2", "colour3", "turned"] {
+        assert_eq!(of[key], true, "{key}: {of}");
+    }
+}
+
+#[test]
+fn an_address_chooses_the_frame_and_a_phone_shows_it_without_sideways_scrolling() {
+    let Some(browser) = Browser::find("an_address_chooses_the_frame_and_a_phone_shows_it_without_sideways_scrolling") else { return };
+    let root = TempDir::new().unwrap();
+    FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());
+    let script = r#"
+report({ share: shown().share, frame: data.frame, map: layer("map").checked, wide: document.documentElement.scrollWidth - innerWidth });
+"#;
+    let page = viewer(root.path());
+    let script = &[HELPERS, script].concat();
+    let of = browser.visit(&Visit {
+        page: &page,
+        part: "#frame=6&hide=tracks&view=follow",
+        window: Window::PHONE,
+        before: "",
+        script,
+    });
+    assert!(of["share"].as_f64().unwrap() > 0.05 && of["frame"] == "6" && of["map"] == true, "{of}");
+    assert!(of["wide"].as_i64().unwrap() <= 0, "{of}");
+}
+
+#[test]
+fn extremes_give_a_page_that_makes_sense() {
+    let Some(browser) = Browser::find("extremes_give_a_page_that_makes_sense") else { return };
+    let script = r#"
+report({
+  frame: data.frame, note: root.querySelector(".note").textContent, reason: root.querySelector(".reason").textContent,
+  triangles: Number(data.triangles || 0), live: root.classList.contains("live"), frames: root.querySelector(".slider").max,
+});
+"#;
+    let of = |run: FakeRun, before: &str| {
+        let root = TempDir::new().unwrap();
+        run.write(root.path());
+        visit(&browser, &viewer(root.path()), before, script)
+    };
+    let empty = of(FakeRun { frames: 3, objects: 0, squares: 0, pictures: false }, "");
+    assert!(empty["note"] == "The map is empty" && empty["live"] == true, "{empty}");
+    let many = of(FakeRun { frames: 40, objects: 64, squares: 60, pictures: true }, "");
+    assert!(many["triangles"].as_u64().unwrap() > 7_200, "{many}");
+    let long = of(FakeRun { frames: 5_000, objects: 1, squares: 60, pictures: true }, "");
+    assert!(long["frames"] == "4999" && long["live"] == true, "{long}");
+    let none = of(FakeRun { frames: 3, objects: 0, squares: 10, pictures: true }, "HTMLCanvasElement.prototype.getContext = () => null;");
+    assert!(none["live"] == false && none["reason"].as_str().unwrap().contains("no WebGL 2"), "{none}");
+}
+
+#[test]
+fn the_report_of_a_run_has_the_viewer_and_its_pictures() {
+    let root = TempDir::new().unwrap();
+    rig(root.path(), 3);
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--quiet"]);
+    assert!(run.status.success(), "{}", output_text(&run));
+    let result = root.path().join("result");
+    let report = fs::read_to_string(result.join("report.html")).unwrap();
+    assert!(report.contains("id=\"dynvox-viewer\"") && report.contains("dynvox-000002_left.jpg") && !report.contains("no viewer"));
+    let index: serde_json::Value = serde_json::from_slice(&fs::read(result.join("pictures/index.json")).unwrap()).unwrap();
+    assert_eq!(index, serde_json::json!({ "width": 160, "height": 64, "frames": [0, 1, 2] }));
+    let left = image::open(result.join("pictures/000001_left.jpg")).unwrap();
+    assert_eq!((left.width(), left.height()), (160, 64));
+    let Some(browser) = Browser::find("the_report_of_a_run_has_the_viewer_and_its_pictures") else { return };
+    let of = visit(&browser, &result.join("report.html"), "", "report({ share: shown().share });");
+    assert!(of["share"].as_f64().unwrap() > 0.01, "{of}");
+}
