@@ -91,7 +91,7 @@ impl Point {
     }
 }
 
-/// The charted values of a run, in at most [`MOST_POINTS`] points of equally many frames; the last one may have fewer.
+/// The charted values of a run, in at most `MOST_POINTS` points of equally many frames; the last one may have fewer.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ChartValues {
     points: Vec<Point>,

@@ -39,7 +39,7 @@ pub struct TrajectorySection {
     pub failures: Option<TrackingFailures>,
 }
 
-/// A path with at most [`MOST_POINTS`] points: every so many frames one, and the last frame's.
+/// A path with at most `MOST_POINTS` points: every so many frames one, and the last frame's.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ThinnedPath {
     points_m: Vec<[f64; 3]>,
