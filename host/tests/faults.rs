@@ -38,7 +38,8 @@ fn a_frozen_camera_and_a_jump_are_not_taken_for_motion() {
 fn a_stream_and_a_data_set_without_poses_are_refused_with_a_sentence() {
     let root = TempDir::new().unwrap();
     binary::rig(root.path(), 4);
-    let run = dynvox(root.path(), &["evaluate", "faults", "--at", "2", "--frames", "4", "--fault", "black@2", "--", "rig", "--profile", "tiny"]);
+    let run =
+        dynvox(root.path(), &["evaluate", "faults", "--at", "2", "--frames", "4", "--fault", "black@2", "--", "rig", "--profile", "tiny"]);
     assert!(!run.status.success() && output_text(&run).contains("has no true poses"), "{}", output_text(&run));
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--faults", "melt@3"]);
     assert!(run.status.code() == Some(2) && output_text(&run).contains("there is no fault melt"), "{}", output_text(&run));

@@ -156,7 +156,7 @@ impl Egomotion {
 
     #[cfg(test)]
     pub(super) fn pose_mut(&mut self) -> &mut Transform {
-        &mut self.t_world_camera
+        &mut self.t_world_reference
     }
 
     /// Digest of the pose, of the motion to be extrapolated, of the random numbers to come, and of this frame's estimate.
