@@ -238,6 +238,19 @@ fn after_dark_frames_the_camera_is_found_again_from_the_last_frame_that_was_seen
     assert!((camera.t_current_previous().distance_m() - 0.5 / 3.0).abs() < 0.02, "a frame's share of the motion since then");
 }
 
+#[test]
+fn the_time_of_frames_without_matches_counts_in_the_motion_over_them() {
+    let mut slab = Box::new(Slab([0; BYTES]));
+    let (mut estimator, mut camera, mut random) = (estimator(&mut slab), Egomotion::default(), Random::new(5));
+    let config = EgomotionConfig::default();
+    camera.step(&config, &RIG, 0.1, &matches(60, 0, &motion(), &mut random), &mut estimator);
+    camera.hold(0.1);
+    let over_two = matches(60, 30, &(motion() * motion()), &mut random);
+    let estimate = camera.step(&config, &RIG, 0.1, &over_two, &mut estimator);
+    assert_eq!((estimate.status, camera.held_frames()), (MotionStatus::Estimated, 0), "half of the matches agree with what was expected");
+    assert!(between(camera.t_current_previous(), &motion()).0 < 0.05);
+}
+
 /// A camera that moved by `motion()` a frame, and what it makes of one of another motion with `outliers` among 60 matches.
 fn after_one_frame(then: &Transform, outliers: usize) -> (MotionEstimate, Egomotion) {
     let mut slab = Box::new(Slab([0; BYTES]));
@@ -266,7 +279,7 @@ fn a_camera_lost_for_long_goes_on_from_a_guess_and_says_so() {
     camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));
     for frame in 1..=REFERENCE_FRAMES_MAX {
         assert_eq!((camera.segment(), camera.since_reference()), (0, frame - 1));
-        camera.hold();
+        camera.hold(0.1);
     }
     assert_eq!((camera.segment(), camera.since_reference()), (1, 0));
     assert!((camera.t_world_camera().distance_m() - 1.0 - f64::from(REFERENCE_FRAMES_MAX)).abs() < 1e-9);

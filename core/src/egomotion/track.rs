@@ -85,7 +85,7 @@ impl Egomotion {
                 self.held = 0;
                 self.refer_to_last();
             }
-            _ => self.hold(),
+            _ => self.hold_from_reference(),
         }
         estimate
     }
@@ -96,15 +96,21 @@ impl Egomotion {
             Some(motion) => (self.t_current_previous, self.held) = (motion, 0),
             None => self.held = self.held.saturating_add(1),
         }
-        self.t_world_camera = (self.t_world_camera * self.t_current_previous.inverse()).normalized();
+        self.extrapolate();
         self.refer_to_last();
     }
 
-    /// Moves the camera by one frame as before. The reference stays, until it is too long ago.
-    pub fn hold(&mut self) {
+    /// Moves the camera by one frame as before, `interval_s` after the last one. The reference stays, until it is too long ago.
+    pub fn hold(&mut self, interval_s: f32) {
+        self.reference_s += f64::from(interval_s);
+        self.hold_from_reference();
+    }
+
+    /// As [`Egomotion::hold`], where the time since the reference is counted already.
+    fn hold_from_reference(&mut self) {
         self.held = self.held.saturating_add(1);
         self.since_reference += 1;
-        self.t_world_camera = (self.t_world_camera * self.t_current_previous.inverse()).normalized();
+        self.extrapolate();
         if self.since_reference >= REFERENCE_FRAMES_MAX {
             self.refer_to_last();
             self.segment = self.segment.saturating_add(1);
@@ -130,6 +136,10 @@ impl Egomotion {
         let frame_s = self.reference_s / f64::from(self.since_reference + 1);
         let (then, now) = (self.t_current_previous.translation() * (frame_s / self.motion_s), motion.translation());
         (now - then).norm() <= config.acceleration_max_m_s2 * frame_s * frame_s + NOISE_M
+    }
+
+    fn extrapolate(&mut self) {
+        self.t_world_camera = (self.t_world_camera * self.t_current_previous.inverse()).normalized();
     }
 
     fn refer_to_last(&mut self) {

@@ -78,7 +78,7 @@ impl Localization<'_, '_> {
                     (self.origin(true), Some(estimate), None, excluded)
                 }
                 FlowStatus::Frozen => {
-                    self.camera.hold();
+                    self.camera.hold(self.interval_s);
                     (self.origin(true), None, None, 0)
                 }
                 FlowStatus::First | FlowStatus::Refused => (PoseOrigin::First, None, None, 0),
