@@ -134,15 +134,7 @@ impl Executor for Spans {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Burns CPU time on this thread.
-    fn burn(ms: u64) {
-        let begin = ThreadTime::now();
-        let mut sum = 0u64;
-        while begin.elapsed() < Duration::from_millis(ms) {
-            sum = std::hint::black_box(sum.wrapping_mul(31).wrapping_add(7));
-        }
-    }
+    use crate::run::threads::burn;
 
     #[test]
     fn branches_add_up_to_work_and_the_longer_one_to_the_span() {

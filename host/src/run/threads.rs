@@ -120,18 +120,19 @@ impl Executor for Threads {
     }
 }
 
+/// Burns CPU time on this thread.
+#[cfg(test)]
+pub(super) fn burn(ms: u64) {
+    let begin = ThreadTime::now();
+    let mut sum = 0u64;
+    while begin.elapsed() < Duration::from_millis(ms) {
+        sum = std::hint::black_box(sum.wrapping_mul(31).wrapping_add(7));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Burns CPU time on this thread.
-    fn burn(ms: u64) {
-        let begin = ThreadTime::now();
-        let mut sum = 0u64;
-        while begin.elapsed() < Duration::from_millis(ms) {
-            sum = std::hint::black_box(sum.wrapping_mul(31).wrapping_add(7));
-        }
-    }
 
     #[test]
     fn work_of_all_threads_is_charged_once_to_the_stage_it_belongs_to() {

@@ -3,7 +3,7 @@
 use crate::cli::run;
 use crate::evaluate::faults::{EvaluatedFrame, FaultOutcome};
 use crate::input::InstanceMask;
-use crate::run::{Plan, Threads};
+use crate::run::{Plan, Threads, stereo_frame};
 use anyhow::{Context, bail};
 use dynvox_core::memory::SLAB_ALIGN;
 use dynvox_core::{Mapper, StereoFrame};
@@ -135,15 +135,10 @@ fn evaluated(plan: &Plan) -> anyhow::Result<Vec<EvaluatedFrame>> {
     for (_, index) in plan.frames.from_position(0) {
         let images = plan.dataset.frame(index)?;
         let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
-        let (Some(left), Some(right), Some(&true_pose)) = (images.left.view(), images.right.view(), truth.get(index)) else {
+        let (Some(frame), Some(&true_pose)) = (stereo_frame(&images, &detections), truth.get(index)) else {
             bail!("frame {index} has no images or no true pose. Choose other frames with --frames");
         };
-        let frame = StereoFrame {
-            colour: images.colour.as_ref().and_then(|colour| colour.view()),
-            time_ns: plan.dataset.stamp_ns(index),
-            detections: &detections,
-            ..StereoFrame::pair(left, right)
-        };
+        let frame = StereoFrame { time_ns: plan.dataset.stamp_ns(index), ..frame };
         // A frame whose time stamp goes back is refused, and nothing is mapped of it.
         let Ok(report) = threads.run(|| mapper.step(&frame, &threads)) else { continue };
         frames.push(EvaluatedFrame {
