@@ -84,6 +84,19 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
 }
 
 #[test]
+fn bounds_and_settings_are_packed_as_rust_beside_the_clip() {
+    let root = pinned();
+    let packed = dynvox(root.path(), &["fixtures", "pack", "pinned", "--out", "clip.bin", "--rust", "clip.rs"]);
+    assert!(packed.status.success(), "{}", output_text(&packed));
+    let text = fs::read_to_string(root.path().join("clip.rs")).unwrap();
+    for line in ["image_width: 416,", "image_height: 128,", "voxel_size_m: 0.1,", "pub const CAPACITY: Capacity = Capacity {"] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+    let clip = fs::read(root.path().join("clip.bin")).unwrap();
+    assert_eq!(dynvox_clip::Clip::new(&clip).unwrap().len(), 6);
+}
+
+#[test]
 fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
     let root = pinned();
     let root = root.path();

@@ -41,16 +41,19 @@ cross_toolchain() {
   [ -x "$linkers/rust-lld" ] || skip "no rust-lld in $sysroot"
 }
 
-# The fixture as the firmware embeds it, packed from its files.
+# The fixture as the firmware embeds it, packed from its files: ours, or the one in DYNVOX_FIXTURE.
 pack() {
-  export DYNVOX_CLIP=${DYNVOX_CLIP:-$(dirname "$build")/street-320x96.clip}
-  # Digests are not in it.
-  [ -s "$DYNVOX_CLIP" ] && [ -z "$(find "$targets/../../fixtures/street-320x96" -newer "$DYNVOX_CLIP" -type f ! -name '*.txt' -print -quit)" ] &&
-    return 0
+  local root=$targets/../.. fixture
+  fixture=$(realpath "${DYNVOX_FIXTURE:-$root/fixtures/street-320x96}")
+  local packed; packed=$(realpath "$(dirname "$build")")/$(basename "$fixture")
+  export DYNVOX_CLIP=$packed.clip DYNVOX_CONSTANTS=$packed.rs DYNVOX_DIGESTS=$fixture/digests.txt
   # The binary that the tests have built, or one built here.
-  local root=$targets/../..
-  [ -x "$root/target/debug/dynvox" ] || (cd "$root" && cargo build --quiet --locked)
-  "$root/target/debug/dynvox" fixtures pack "$root/fixtures/street-320x96" --out "$DYNVOX_CLIP"
+  dynvox=$root/target/debug/dynvox
+  [ -x "$dynvox" ] || (cd "$root" && cargo build --quiet --locked)
+  # Digests are not in it.
+  [ -s "$DYNVOX_CONSTANTS" ] && [ -z "$(find "$fixture" "$root/core/src" -newer "$DYNVOX_CONSTANTS" -type f ! -name '*.txt' -print -quit)" ] &&
+    return 0
+  "$dynvox" fixtures pack "$fixture" --out "$DYNVOX_CLIP" --rust "$DYNVOX_CONSTANTS"
 }
 
 # hosted FOLDER: the firmware as an ordinary program of this machine, in $elf.

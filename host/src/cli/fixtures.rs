@@ -48,6 +48,9 @@ enum Action {
         /// File to write
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
+        /// Write its bounds and settings as Rust constants, CAPACITY and CONFIG, for the firmware to include
+        #[arg(long, value_name = "FILE")]
+        rust: Option<PathBuf>,
     },
 }
 
@@ -159,8 +162,12 @@ pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
                 outln!("{} {outcome}", fixture.display());
             }
         }
-        Action::Pack { fixture, out } => {
+        Action::Pack { fixture, out, rust } => {
             let bytes = fixtures::pack(fixture)?;
+            if let Some(rust) = rust {
+                let text = fixtures::constants(fixture)?;
+                write_whole(rust, |file| file.write_all(text.as_bytes()))?;
+            }
             write_whole(out, |file| file.write_all(&bytes))?;
             outln!("{} bytes in {}", bytes.len(), out.display());
         }

@@ -5,7 +5,9 @@ use std::{env, fs, path::PathBuf};
 fn main() {
     println!("cargo:rerun-if-changed=link");
     // include_bytes! watches the file it names, cargo the name.
-    println!("cargo:rerun-if-env-changed=DYNVOX_CLIP");
+    for file in ["CLIP", "CONSTANTS", "DIGESTS"] {
+        println!("cargo:rerun-if-env-changed=DYNVOX_{file}");
+    }
     let target = |key: &str| env::var(format!("CARGO_CFG_TARGET_{key}")).unwrap_or_default();
     if target("ARCH") == "arm" && target("OS") == "none" {
         let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets it"));

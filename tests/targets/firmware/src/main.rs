@@ -4,6 +4,7 @@
 
 #[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
 mod faults;
+mod fixture;
 #[cfg(not(feature = "hosted"))]
 mod forbidden;
 mod line;
@@ -19,30 +20,26 @@ mod snapshots;
 #[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "stack/painted.rs")]
 mod stack;
 
-use dynvox_clip::{Clip, FrameDigests, SLAB_BYTES, replay};
+use dynvox_clip::{Clip, FrameDigests, replay_with};
 use dynvox_core::{Serial, memory::Slab};
+use fixture::{CAPACITY, CONFIG};
 use line::Line;
 use stack::Paint;
 use static_cell::ConstStaticCell;
 
-/// The fixture as `dynvox fixtures pack` writes it.
-static CLIP: &[u8] = include_bytes!(env!("DYNVOX_CLIP"));
-/// What it must give.
-static DIGESTS: &str = include_str!("../../../../fixtures/street-320x96/digests.txt");
-
 #[cfg_attr(all(target_arch = "arm", target_os = "none"), unsafe(link_section = ".psram"))]
-static SLAB: ConstStaticCell<Slab<SLAB_BYTES>> = ConstStaticCell::new(Slab::ZERO);
+static SLAB: ConstStaticCell<Slab<{ reach::SLAB_BYTES }>> = ConstStaticCell::new(Slab::ZERO);
 
 /// Most that everything may take of the stack, making the mapper included, bytes.
 const STACK: u32 = 32 * 1024;
 
 /// Replays; returns the exit code: 0, or what of a digest (1), the fixture (2), the stack (3) was wrong.
 fn run() -> u8 {
-    let (Some(slab), Ok(clip)) = (SLAB.try_take(), Clip::new(CLIP)) else { return 2 };
-    let mut expected = Lines(DIGESTS.as_bytes()).filter(|line| line.first() != Some(&b'#'));
+    let (Some(slab), Ok(clip)) = (SLAB.try_take(), Clip::new(fixture::CLIP)) else { return 2 };
+    let mut expected = Lines(fixture::DIGESTS.as_bytes()).filter(|line| line.first() != Some(&b'#'));
     let mut paint = Paint::below();
     let (mut wrong, mut most, mut step) = (0u32, 0, 0);
-    let done = replay(&clip, &mut slab.0, &Serial, |frame| {
+    let done = replay_with(&clip, (&CAPACITY, &CONFIG), &mut slab.0, &Serial, |frame| {
         let bytes = paint.used_below();
         most = paint.used_in_all().max(most);
         // What the first frame shows is mostly the making of the mapper.
@@ -65,7 +62,7 @@ fn run() -> u8 {
     }
     platform::put(&Line::new().str("stack of a step ").decimal(step).str(", of everything ").decimal(most).str("\n"));
     #[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
-    platform::put(&Line::new().hex(faults::all(CLIP.len())).str("\n"));
+    platform::put(&Line::new().hex(faults::all(fixture::CLIP.len())).str("\n"));
     match (done, wrong + missing) {
         (Err(_), _) => 2,
         (Ok(()), 1..) => 1,

@@ -2,7 +2,8 @@
 //! machine as well.
 
 use core::hint::black_box;
-use dynvox_clip::{Clip, Frame, SLAB_BYTES, config};
+use crate::fixture;
+use dynvox_clip::{Clip, Frame};
 use dynvox_core::{
     Capacity, Mapper, Serial, StereoFrame,
     digest::Digest,
@@ -15,8 +16,9 @@ use dynvox_core::{
 /// Frames taken.
 const FRAMES: usize = 6;
 /// So few blocks that some must leave, and with colour.
-const CAPACITY: Capacity = Capacity { blocks: 600, visible_blocks: 600, colour: true, ..Capacity::TINY };
-const _: () = assert!(CAPACITY.bytes() <= SLAB_BYTES);
+const CAPACITY: Capacity = Capacity { blocks: 600, visible_blocks: 600, colour: true, ..fixture::CAPACITY };
+/// Bytes of slab for the fixture and for this.
+pub const SLAB_BYTES: usize = if CAPACITY.bytes() > fixture::CAPACITY.bytes() { CAPACITY.bytes() } else { fixture::CAPACITY.bytes() };
 const PIXELS: usize = CAPACITY.pixels();
 
 static COLOUR: [[u8; 3]; PIXELS] = [[200, 100, 50]; PIXELS];
@@ -48,7 +50,7 @@ impl ObjectSink for Leaving {
 /// Goes every way; 0 where one is closed. What the compiler must not know is hidden from it.
 #[inline(never)]
 pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
-    let mut config = config(clip);
+    let mut config = fixture::CONFIG;
     config.volume.observation_weight = black_box(ObservationWeight::Depth);
     config.stereo.median = black_box(true);
     let mut made = Mapper::new(black_box(&CAPACITY), black_box(&config), slab);

@@ -1,7 +1,8 @@
 //! A snapshot's bytes, and what comes of a mapper made of them, to be compared from machine to machine. Not in every build: a snapshot names
 //! its configuration by a text, and `core::fmt`, which writes it, brings panics along.
 
-use dynvox_clip::{CAPACITY, Clip, Frame, config};
+use crate::fixture::{CAPACITY, CONFIG};
+use dynvox_clip::{Clip, Frame};
 use dynvox_core::{Mapper, Serial, digest::Digest};
 use static_cell::ConstStaticCell;
 
@@ -26,7 +27,7 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
         from += front.len();
         Ok::<(), ()>(())
     };
-    let mut made = Mapper::restore(&CAPACITY, &config(clip), slab, &mut source);
+    let mut made = Mapper::restore(&CAPACITY, &CONFIG, slab, &mut source);
     let Ok(mapper) = made.as_mut() else { return 0 };
     for frame in clip.frames().skip(FRAMES) {
         let Frame::Pair(pair) = frame else { return 0 };
@@ -39,7 +40,7 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
 /// Maps the first frames and saves; how many bytes that took.
 #[inline(never)]
 fn saved(clip: &Clip<'_>, slab: &mut [u8], bytes: &mut [u8]) -> Option<usize> {
-    let mut made = Mapper::new(&CAPACITY, &config(clip), slab);
+    let mut made = Mapper::new(&CAPACITY, &CONFIG, slab);
     let mapper = made.as_mut().ok()?;
     for frame in clip.frames().take(FRAMES) {
         let Frame::Pair(pair) = frame else { return None };
