@@ -1,5 +1,5 @@
 //! What blocks hold: an array of records, and beside it one for what is read without the voxels and one for colour
-//! (docs/decisions/0036-blocks-as-records.md).
+//! (docs/decisions/0017-blocks-as-records.md).
 //!
 //! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and a header of 16.
 
