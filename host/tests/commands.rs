@@ -55,6 +55,26 @@ fn budget_shows_every_profile_and_the_regions_sum_to_the_slab() {
 }
 
 #[test]
+fn a_budget_is_printed_for_every_language_and_summed_up_for_a_target() {
+    let root = TempDir::new().unwrap();
+    let asked = ["budget", "--memory", "48MiB", "--image", "752x480", "--raw", "800x500"];
+    let text = String::from_utf8(dynvox(root.path(), &asked).stdout).unwrap();
+    for line in ["raw_width = 800", "    raw_width: 800,", "  .raw_width = 800,", "  .colour = 0,\n", "pruning window: 64 frames"] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+    let json = |more: &[&str]| -> serde_json::Value {
+        serde_json::from_slice(&dynvox(root.path(), &[&asked[..], more, &["--json"]].concat()).stdout).unwrap()
+    };
+    let (solved, summed) = (json(&[]), json(&["--stack"]));
+    let number = |value: &serde_json::Value| value.as_u64().unwrap();
+    let part = |key: &str| number(&summed[0][key]);
+    assert_eq!(part("slab_bytes"), number(&solved["bytes"]));
+    assert!(part("slab_bytes") > 46 << 20 && part("slab_bytes") <= 48 << 20, "{summed}");
+    assert_eq!(part("sum_bytes"), part("slab_bytes") + part("stack_bytes") + part("code_bytes"));
+    assert!(part("stack_bytes") >= 32 << 10 && part("code_bytes") > 0, "{summed}");
+}
+
+#[test]
 fn files_are_evaluated_without_a_run() {
     let root = TempDir::new().unwrap();
     rig(root.path(), 1);

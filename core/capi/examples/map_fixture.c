@@ -106,12 +106,13 @@ int main(int argc, char **argv) {
     check(dynvox_config_set(&config, argv[i], value), argv[i]);
     if (strcmp(argv[i], "volume.voxel_size_m") == 0) voxel_size_m = strtof(value, NULL);
   }
-  size_t bytes = strtoull(argv[2], NULL, 10), least = 0;
+  DynvoxBudget budget = {.bytes = strtoull(argv[2], NULL, 10), .width = width, .height = height, .voxel_size_m = voxel_size_m};
+  size_t bytes = 0, least = 0;
   DynvoxCapacity capacity;
-  if (bytes == 0)
+  if (budget.bytes == 0)
     check(dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &capacity), "capacity");
   else
-    check(dynvox_capacity_for_budget(bytes, width, height, voxel_size_m, &capacity, &least), "capacity");
+    check(dynvox_capacity_for_budget(&budget, &capacity, &least), "capacity");
   check(dynvox_bytes(&capacity, &bytes), "bytes");
   size_t alignment = dynvox_alignment();
   uint8_t *buffer = aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);

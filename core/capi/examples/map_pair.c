@@ -15,13 +15,14 @@ int main(void) {
     for (int u = 0; u < 320; ++u) left[v][u] = right[v][(u + 310) % 320] = (uint8_t)((u / 3 * 2654435761u ^ v / 3 * 40503777u) >> 7);
   DynvoxRig rig = {200, 159.5, 47.5, 0.5};
   DynvoxConfig config;
+  DynvoxBudget budget = {.bytes = sizeof buffer, .width = 320, .height = 96, .voxel_size_m = 0.1f};
   DynvoxCapacity capacity;
   DynvoxMapper *mapper;
   DynvoxReport report;
   uint64_t time_ns = 0;
   unsigned triangles = 0;
   if (dynvox_config_default(&rig, &config) || dynvox_config_set(&config, "volume.voxel_size_m", "0.1") ||
-      dynvox_capacity_for_budget(sizeof buffer, 320, 96, 0.1f, &capacity, NULL) ||
+      dynvox_capacity_for_budget(&budget, &capacity, NULL) ||
       dynvox_create(&capacity, &config, buffer, sizeof buffer, &mapper))
     return 1;
   DynvoxFrame frame = {.width = 320, .height = 96, .left = {left[0], 320}, .right = {right[0], 320}, .time_ns = &time_ns};

@@ -2,7 +2,8 @@
 //
 //   static _Alignas(64) uint8_t buffer[48u << 20];
 //   DynvoxCapacity capacity;                                        // what the buffer holds for images of a size
-//   dynvox_capacity_for_budget(sizeof buffer, 752, 480, 0.05f, &capacity, NULL);
+//   DynvoxBudget budget = {.bytes = sizeof buffer, .width = 752, .height = 480};
+//   dynvox_capacity_for_budget(&budget, &capacity, NULL);
 //   DynvoxConfig config;
 //   dynvox_config_default(&rig, &config);
 //   dynvox_config_set(&config, "volume.voxel_size_m", "0.05");
@@ -198,6 +199,27 @@ typedef struct {
   // Whether voxels have colour: 0 or 1.
   uint8_t colour;
 } DynvoxCapacity;
+
+// A number of bytes and what they are to hold. In `colour` and `objects` 0 leaves the answer to the rules: colour where 20,000 blocks with
+// colour fit, objects in a fifth of what the image leaves.
+typedef struct {
+  // Bytes of the buffer.
+  size_t bytes;
+  // Widest image, px.
+  size_t width;
+  // Highest image, px.
+  size_t height;
+  // Widest raw image that is rectified, px; 0 where pairs come rectified.
+  size_t raw_width;
+  // Highest raw image, px.
+  size_t raw_height;
+  // Side of a voxel, m, as in the configuration; 0 is the default.
+  float voxel_size_m;
+  // Above 0: with colour; below 0: without.
+  int32_t colour;
+  // Above 0: objects reconstructed at once; below 0: none.
+  int32_t objects;
+} DynvoxBudget;
 
 // An image of one byte a pixel, three for a colour image: red, green, blue.
 typedef struct {
@@ -509,16 +531,12 @@ DynvoxStatus dynvox_config_problem(const DynvoxConfig *config,
 // `capacity` is null or points to a capacity.
 DynvoxStatus dynvox_capacity_of_profile(DynvoxProfile profile, DynvoxCapacity *capacity);
 
-// Divides a buffer of `bytes` bytes between the stages, for images of a size: writes the largest capacity for which dynvox_bytes is at most
-// `bytes`. `voxel_size_m` is that of the configuration. Of too few bytes DYNVOX_STATUS_TOO_SMALL, and the least that works is written to
-// `least`, which may be null.
+// Divides a buffer between the stages: writes the largest capacity for which dynvox_bytes is at most `budget->bytes`. Of too few bytes
+// DYNVOX_STATUS_TOO_SMALL, and the least that works is written to `least`, which may be null.
 //
 // # Safety
-// `capacity` is null or points to a capacity, `least` is null or points to a number.
-DynvoxStatus dynvox_capacity_for_budget(size_t bytes,
-                                        size_t width,
-                                        size_t height,
-                                        float voxel_size_m,
+// `budget` is null or points to a budget, `capacity` is null or points to a capacity, `least` is null or points to a number.
+DynvoxStatus dynvox_capacity_for_budget(const DynvoxBudget *budget,
                                         DynvoxCapacity *capacity,
                                         size_t *least);
 

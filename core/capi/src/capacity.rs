@@ -122,28 +122,57 @@ pub unsafe extern "C" fn dynvox_capacity_of_profile(profile: DynvoxProfile, capa
     }
 }
 
-/// Divides a buffer of `bytes` bytes between the stages, for images of a size: writes the largest capacity for which dynvox_bytes is at most
-/// `bytes`. `voxel_size_m` is that of the configuration. Of too few bytes DYNVOX_STATUS_TOO_SMALL, and the least that works is written to
-/// `least`, which may be null.
+/// A number of bytes and what they are to hold. In `colour` and `objects` 0 leaves the answer to the rules: colour where 20,000 blocks with
+/// colour fit, objects in a fifth of what the image leaves.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct DynvoxBudget {
+    /// Bytes of the buffer.
+    pub bytes: usize,
+    /// Widest image, px.
+    pub width: usize,
+    /// Highest image, px.
+    pub height: usize,
+    /// Widest raw image that is rectified, px; 0 where pairs come rectified.
+    pub raw_width: usize,
+    /// Highest raw image, px.
+    pub raw_height: usize,
+    /// Side of a voxel, m, as in the configuration; 0 is the default.
+    pub voxel_size_m: f32,
+    /// Above 0: with colour; below 0: without.
+    pub colour: i32,
+    /// Above 0: objects reconstructed at once; below 0: none.
+    pub objects: i32,
+}
+
+impl DynvoxBudget {
+    fn options(&self) -> BudgetOptions {
+        BudgetOptions {
+            colour: (self.colour != 0).then_some(self.colour > 0),
+            objects: (self.objects != 0).then(|| usize::try_from(self.objects).unwrap_or(0)),
+            voxel_size_m: (self.voxel_size_m != 0.0).then_some(self.voxel_size_m),
+            raw_image: [self.raw_width, self.raw_height],
+        }
+    }
+}
+
+/// Divides a buffer between the stages: writes the largest capacity for which dynvox_bytes is at most `budget->bytes`. Of too few bytes
+/// DYNVOX_STATUS_TOO_SMALL, and the least that works is written to `least`, which may be null.
 ///
 /// # Safety
-/// `capacity` is null or points to a capacity, `least` is null or points to a number.
+/// `budget` is null or points to a budget, `capacity` is null or points to a capacity, `least` is null or points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_capacity_for_budget(
-    bytes: usize,
-    width: usize,
-    height: usize,
-    voxel_size_m: f32,
+    budget: *const DynvoxBudget,
     capacity: *mut DynvoxCapacity,
     least: *mut usize,
 ) -> DynvoxStatus {
     // SAFETY: only looked at.
-    let capacity = match unsafe { output(capacity) } {
-        Ok(capacity) => capacity,
-        Err(status) => return status,
+    let (budget, capacity) = match unsafe { (read(budget), output(capacity)) } {
+        (Ok(budget), Ok(capacity)) => (budget, capacity),
+        (Err(status), _) | (_, Err(status)) => return status,
     };
-    let options = BudgetOptions { voxel_size_m: Some(voxel_size_m), ..BudgetOptions::default() };
-    match Capacity::for_budget(bytes.saturating_sub(HEAD_BYTES), width, height, &options) {
+    match Capacity::for_budget(budget.bytes.saturating_sub(HEAD_BYTES), budget.width, budget.height, &budget.options()) {
         Ok(solved) => {
             // SAFETY: checked; of the right type by the caller's promise.
             unsafe { capacity.write((&solved).into()) };

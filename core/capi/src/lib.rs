@@ -26,7 +26,7 @@ mod types;
 
 pub use callback::{DynvoxBlock, DynvoxLoadedBlock, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink, DynvoxVertex};
 pub use capacity::{
-    DYNVOX_PROFILE_DESKTOP, DYNVOX_PROFILE_ONBOARD, DYNVOX_PROFILE_SMALL, DYNVOX_PROFILE_TINY, DynvoxCapacity, DynvoxProfile,
+    DYNVOX_PROFILE_DESKTOP, DYNVOX_PROFILE_ONBOARD, DYNVOX_PROFILE_SMALL, DYNVOX_PROFILE_TINY, DynvoxBudget, DynvoxCapacity, DynvoxProfile,
     dynvox_capacity_for_budget, dynvox_capacity_of_profile,
 };
 pub use config::{DYNVOX_SETTINGS_BYTES, DynvoxConfig, DynvoxRig, dynvox_config_default, dynvox_config_problem, dynvox_config_set};

@@ -223,13 +223,22 @@ fn every_setting_has_a_key_and_a_wrong_one_changes_nothing() {
 #[test]
 fn a_budget_is_a_bound_on_the_buffer_and_a_refusal_names_the_least() {
     let (mut capacity, mut least, mut bytes) = (capacity(), 0, 0);
-    let solve = |bytes, capacity: &mut _, least: &mut _| unsafe { dynvox_capacity_for_budget(bytes, 752, 480, 0.05, capacity, least) };
+    let for_752 = |bytes| DynvoxBudget { bytes, width: 752, height: 480, ..unsafe { std::mem::zeroed() } };
+    let solve_for = |budget: &DynvoxBudget, capacity: &mut _, least: &mut _| unsafe { dynvox_capacity_for_budget(budget, capacity, least) };
+    let solve = |bytes, capacity: &mut _, least: &mut _| solve_for(&for_752(bytes), capacity, least);
     assert_eq!(solve(48 << 20, &mut capacity, &mut least), DynvoxStatus::Ok);
     assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut bytes) }, DynvoxStatus::Ok);
     assert!(bytes <= 48 << 20 && bytes > 46 << 20, "{bytes}");
     assert_eq!(solve(1 << 20, &mut capacity, &mut least), DynvoxStatus::TooSmall);
     assert_eq!(solve(least, &mut capacity, &mut bytes), DynvoxStatus::Ok, "{least} bytes are enough");
     assert_eq!(solve(least - 1, &mut capacity, &mut bytes), DynvoxStatus::TooSmall);
+    let raw = DynvoxBudget { raw_width: 800, raw_height: 500, objects: -1, colour: 1, ..for_752(48 << 20) };
+    assert_eq!(solve_for(&raw, &mut capacity, &mut least), DynvoxStatus::Ok);
+    assert_eq!((capacity.raw_width, capacity.raw_height, capacity.objects, capacity.colour), (800, 500, 0, 1));
+    assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut bytes) }, DynvoxStatus::Ok);
+    assert!(bytes <= 48 << 20 && bytes > 46 << 20, "{bytes}");
+    assert_eq!(solve_for(&DynvoxBudget { objects: 1_000, ..raw }, &mut capacity, &mut least), DynvoxStatus::Capacity);
+    assert_eq!(unsafe { dynvox_capacity_for_budget(ptr::null(), &raw mut capacity, ptr::null_mut()) }, DynvoxStatus::Null);
 }
 
 extern "C" fn write(context: *mut c_void, bytes: *const u8, len: usize) -> bool {

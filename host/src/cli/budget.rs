@@ -24,6 +24,9 @@ pub struct BudgetArgs {
     /// Largest image, px: 752x480
     #[arg(long, value_name = "WxH", requires = "memory")]
     image: Option<ImageSize>,
+    /// Largest raw image, px, where images come unrectified
+    #[arg(long, value_name = "WxH", requires = "memory")]
+    raw: Option<ImageSize>,
     /// Side of a voxel, m
     #[arg(long, value_name = "M", requires = "memory", default_value_t = VolumeConfig::default().voxel_size_m)]
     voxel: f32,
@@ -51,7 +54,7 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
             colour,
             objects: args.objects,
             voxel_size_m: Some(args.voxel),
-            ..BudgetOptions::default()
+            raw_image: args.raw.map_or([0; 2], |ImageSize(width, height)| [width, height]),
         };
         let capacity = super::capacity::solve(memory, (width, height), &options)?;
         return if args.stack { targets::show(&[(memory.to_string(), capacity)], args.json) } else { solved(args, memory, &capacity) };
@@ -102,7 +105,7 @@ fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Resu
     Ok(())
 }
 
-/// The capacity as an initialiser in C, where images come rectified.
+/// The capacity as an initialiser in C.
 fn to_c(capacity: &Capacity) -> anyhow::Result<String> {
     let table = to_json(capacity)?;
     let bounds = table["capacity"].as_object().into_iter().flatten();

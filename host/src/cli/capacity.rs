@@ -2,7 +2,7 @@
 
 use crate::formats::CapacityFile;
 use anyhow::{Context, bail};
-use dynvox_core::rectify::{Rectification, RectifiedImages, Rectifier};
+use dynvox_core::rectify::Rectification;
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -49,10 +49,12 @@ impl CapacityArgs {
             return Ok((path.display().to_string(), with_raw(read(path)?)));
         }
         let memory = self.memory.unwrap_or(DEFAULT_MEMORY);
-        let options = BudgetOptions { voxel_size_m: Some(voxel_size_m), ..BudgetOptions::default() };
-        let images = with_raw(Capacity { image_width: size.0, image_height: size.1, colour: true, ..Capacity::TINY });
-        let raw_bytes = Rectifier::bytes(&images) + RectifiedImages::bytes(&images);
-        Ok((memory.to_string(), with_raw(solve(Bytes(memory.0.saturating_sub(raw_bytes)), size, &options)?)))
+        let options = BudgetOptions {
+            voxel_size_m: Some(voxel_size_m),
+            raw_image: [raw_width, raw_height],
+            ..BudgetOptions::default()
+        };
+        Ok((memory.to_string(), solve(memory, size, &options)?))
     }
 }
 
