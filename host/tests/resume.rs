@@ -211,6 +211,7 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
     let path = |name: &str| root.path().join(name);
     let snapshot = "out/it/run.snapshot";
     let whole = fs::read(path(snapshot)).unwrap();
+    fs::remove_file(path("out/it/run.snapshot.previous")).unwrap();
     let refused = |bytes: &[u8], sentence: &str| assert_refused_with(&root, snapshot, bytes, sentence);
     let changed = |at: usize, byte: u8| {
         let mut bytes = whole.clone();
@@ -218,7 +219,7 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
         bytes
     };
     refused(b"P5 3 1 255", "is not a snapshot of a run");
-    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 4");
+    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 5");
     for at in [15, 20, 30, 5_000, whole.len() / 2, whole.len() - 1] {
         refused(&changed(at, !whole[at]), "run.snapshot is damaged");
     }
@@ -239,6 +240,42 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
         assert_refused_with(&root, &format!("out/it/{table}"), &[b"#", &known[1..]].concat(), &sentence);
     }
     assert_resumes(&root);
+}
+
+#[test]
+fn a_run_whose_last_snapshot_is_damaged_resumes_from_the_one_before() {
+    let root = stopped();
+    let snapshot = root.path().join("out/it/run.snapshot");
+    let whole = fs::read(&snapshot).unwrap();
+    fs::write(&snapshot, &whole[..whole.len() - 9]).unwrap();
+    let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
+    let text = output_text(&resumed);
+    assert!(
+        resumed.status.success() && text.contains("run.snapshot is damaged") && text.contains("The snapshot before it is taken"),
+        "{text}"
+    );
+    assert_same(root.path(), "whole", "out/it");
+}
+
+#[test]
+fn objects_written_before_a_snapshot_are_checked() {
+    let root = TempDir::new().unwrap();
+    killed_at(root.path(), &[&STREET[..], &["stopped", "--snapshot-every", "4", "--threads", "2"]].concat(), "frame 24/24");
+    let objects = root.path().join(".stopped.partial/objects");
+    let meshes: Vec<_> = names(&objects).into_iter().filter(|name| name.ends_with(".ply")).collect();
+    let first = objects.join(meshes.first().expect("an object has left"));
+    let whole = fs::read(&first).unwrap();
+    let refused = |sentence: &str| {
+        let run = dynvox(root.path(), &["run", "--resume", "stopped", "--quiet"]);
+        assert!(run.status.code() == Some(1) && output_text(&run).contains(sentence), "{sentence}: {}", output_text(&run));
+    };
+    fs::remove_file(&first).unwrap();
+    refused("is not as the run left it: it is missing");
+    fs::write(&first, &whole[1..]).unwrap();
+    refused("is not as the run left it: it is truncated or changed");
+    fs::write(&first, whole).unwrap();
+    let resumed = dynvox(root.path(), &["run", "--resume", "stopped", "--quiet"]);
+    assert!(resumed.status.success(), "{}", output_text(&resumed));
 }
 
 #[test]

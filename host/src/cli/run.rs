@@ -20,8 +20,8 @@ use crate::observe::Reference;
 use crate::report;
 use crate::report::text::counted;
 use crate::run::{
-    self, BLOCKS_FILE, Checkpoint, FrameNumbers, HOST_OVERHEAD_BYTES, Incomplete, MAP_FILE, Plan, RunError, RunFolder, RunRecord,
-    SNAPSHOT_FILE, Streaming,
+    self, BLOCKS_FILE, Checkpoint, FrameNumbers, HOST_OVERHEAD_BYTES, Incomplete, MAP_FILE, PREVIOUS_SNAPSHOT_FILE, Plan, RunError,
+    RunFolder, RunRecord, SNAPSHOT_FILE, Streaming, has_snapshot,
 };
 use anyhow::bail;
 use instances::InstancesArgs;
@@ -306,7 +306,7 @@ fn map(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> anyho
     run::run(plan, folder, checkpoint).map_err(|error| match error {
         RunError::ImageSize { .. } | RunError::Window { .. } => anyhow::anyhow!("{error}\n\n{}", super::budget::table(&plan.config.volume)),
         error @ (RunError::Resume(_) | RunError::Reopen(_)) => error.into(),
-        error if folder.snapshot().is_file() => {
+        error if folder.has_snapshot() => {
             anyhow::anyhow!("{error}.\nThe last snapshot remains: `dynvox run --resume {}` resumes the run", folder.target().display())
         }
         error => error.into(),
@@ -362,7 +362,7 @@ pub struct IncompleteRun {
 impl IncompleteRun {
     fn new(incomplete: &Incomplete, folder: PathBuf) -> Self {
         let missing = if incomplete.missing.is_empty() { String::new() } else { format!(", without {}", incomplete.missing.join(", ")) };
-        let resume = if folder.join(SNAPSHOT_FILE).is_file() {
+        let resume = if has_snapshot(&folder) {
             format!("; `dynvox run --resume {}` resumes the run", folder.display())
         } else {
             String::new()
@@ -377,10 +377,11 @@ fn finish(args: &RunArgs, plan: &Plan, mut folder: RunFolder, checkpoint: Option
     // From here on there is something to lose.
     folder.keep();
     let summary = results::write(&folder, &mut record)?;
-    let resumable = record.incomplete.is_some() && folder.snapshot().is_file();
+    let resumable = record.incomplete.is_some() && folder.has_snapshot();
     let blocks =
         resumable || record.keeps_blocks() || record.incomplete.as_ref().is_some_and(|of| of.missing.iter().any(|name| name == MAP_FILE));
-    let temporary = [(BLOCKS_FILE, blocks), (SNAPSHOT_FILE, resumable)].into_iter().filter(|(_, stays)| !stays);
+    let snapshots = [SNAPSHOT_FILE, PREVIOUS_SNAPSHOT_FILE].map(|name| (name, resumable));
+    let temporary = [(BLOCKS_FILE, blocks)].into_iter().chain(snapshots).filter(|(_, stays)| !stays);
     let target = folder.commit(&temporary.map(|(name, _)| name).collect::<Vec<_>>())?;
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&summary)?);

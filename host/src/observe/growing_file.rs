@@ -2,9 +2,10 @@
 //! of each; a resumed run truncates what was written after it.
 
 use super::ObserveError;
+use super::written_file::checksum_of;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::io::{ErrorKind, Read, Write};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Bytes that are written at once.
@@ -109,21 +110,6 @@ impl GrowingFile {
             }
         }
         Ok(())
-    }
-}
-
-/// CRC-32 of the first bytes of a file; `None` of a shorter one.
-fn checksum_of(file: &File, bytes: u64) -> std::io::Result<Option<u32>> {
-    let (mut checksum, mut left, mut window) = (crc32fast::Hasher::new(), bytes, vec![0; WRITE_BYTES]);
-    let mut rest = file.take(bytes);
-    loop {
-        match rest.read(&mut window)? {
-            0 => return Ok((left == 0).then(|| checksum.finalize())),
-            read => {
-                checksum.update(&window[..read]);
-                left -= read as u64;
-            }
-        }
     }
 }
 

@@ -20,6 +20,7 @@ mod thumbnail;
 mod tracks;
 mod trajectory;
 mod volume_copy;
+mod written_file;
 
 pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
 pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
@@ -37,6 +38,7 @@ pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, 
 pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
 pub use trajectory::{ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first};
 pub use volume_copy::VolumeCopy;
+pub use written_file::WrittenFile;
 
 use crate::formats::{Axes, Mesh};
 use crate::input::{FrameSource, InputError, StereoImages};
@@ -167,6 +169,14 @@ pub trait Observer {
         Vec::new()
     }
 
+    /// A checkpoint is about to be written: waits until files written since the last one are on the disk.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    fn checkpoint(&mut self, _setup: &Setup<'_>) -> Result<(), ObserveError> {
+        Ok(())
+    }
+
     /// The run is resumed from a checkpoint: checks files written before it, and removes those written after it.
     ///
     /// # Errors
@@ -249,6 +259,10 @@ impl Observer for Observers {
 
     fn files(&mut self) -> Vec<&mut GrowingFile> {
         self.trajectory.files().into_iter().chain(self.tracks.files()).collect()
+    }
+
+    fn checkpoint(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
+        self.objects.checkpoint(setup)
     }
 
     fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {

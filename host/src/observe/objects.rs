@@ -2,7 +2,7 @@
 //! its mesh: its blocks are copied there, and meshed here, after the step.
 
 use super::thumbnail::thumbnail;
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, RetiredVolume, Setup};
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, RetiredVolume, Setup, WrittenFile};
 use crate::evaluate::objects::true_object;
 use crate::evaluate::surfaces::{SeenSide, SurfaceFigures, TrueView};
 use crate::evaluate::swept::Swept;
@@ -73,6 +73,10 @@ pub struct ObjectsObserver {
     /// The true surface seen of each, where that is known.
     sides: BTreeMap<(u32, u32), SeenSide>,
     retired: Vec<ReconstructedObject>,
+    /// Their files at the last checkpoint.
+    files: Vec<WrittenFile>,
+    /// Names of files written since then.
+    unsynced: Vec<String>,
     /// Names of objects whose files could not be written, and why the first of them could not.
     unwritten: Vec<String>,
     failure: Option<String>,
@@ -82,8 +86,17 @@ pub struct ObjectsObserver {
 impl Observer for ObjectsObserver {
     type Section = ObjectsSection;
 
+    fn checkpoint(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
+        while let Some(name) = self.unsynced.last() {
+            self.files.push(WrittenFile::synced(&setup.folder, name.clone())?);
+            self.unsynced.pop();
+        }
+        Ok(())
+    }
+
     /// Removes files of objects that left after the checkpoint: they will leave again.
     fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
+        self.files.iter().try_for_each(|file| file.check(&setup.folder))?;
         let folder = setup.folder.join(OBJECTS_FOLDER);
         let failed = |source| ObserveError::Write { path: folder.clone(), source };
         if !folder.is_dir() {
@@ -195,6 +208,7 @@ impl ObjectsObserver {
             return Ok(());
         }
         write_files(&folder, (summary.id, name), (&triangles, setup.axes), &poses)?;
+        self.unsynced.extend(files(name).map(|file| format!("{OBJECTS_FOLDER}/{file}")));
         self.retired.push(ReconstructedObject {
             id: summary.id,
             segment: summary.segment_id,

@@ -79,6 +79,8 @@ pub enum FolderError {
 
 /// Name of the snapshot in the folder of a run that can be resumed.
 pub const SNAPSHOT_FILE: &str = "run.snapshot";
+/// Name of the snapshot before it.
+pub const PREVIOUS_SNAPSHOT_FILE: &str = "run.snapshot.previous";
 /// Name of a file that keeps disk space for trajectory, rows and summary, should the disk become full during the run.
 const RESERVE_FILE: &str = ".reserve";
 /// Its bytes.
@@ -111,7 +113,7 @@ impl RunFolder {
         let failed = |source| FolderError::Write { path: partial.clone(), source };
         std::fs::create_dir_all(&partial).map_err(failed)?;
         let lock = lock(&partial, &target)?;
-        if partial.join(SNAPSHOT_FILE).is_file() && !overwrite {
+        if has_snapshot(&partial) && !overwrite {
             return Err(FolderError::Interrupted { path: target });
         }
         let folder = Self { partial, overwrite, keep: false, reopened: false, _lock: lock, target };
@@ -129,8 +131,8 @@ impl RunFolder {
         let target = resolved(target)?;
         let partial = sibling(&target, "partial");
         let nothing = |reason| FolderError::NothingToResume { path: target.clone(), reason };
-        let killed = partial.join(SNAPSHOT_FILE).is_file();
-        let ended_early = !partial.is_dir() && target.join(SNAPSHOT_FILE).is_file();
+        let killed = has_snapshot(&partial);
+        let ended_early = !partial.is_dir() && has_snapshot(&target);
         if !killed && !ended_early {
             return Err(nothing(match (partial.is_dir(), target.join("summary.json").is_file()) {
                 (true, _) => "it was interrupted before its first snapshot. Start it again",
@@ -197,6 +199,11 @@ impl RunFolder {
     /// Where the snapshot is, or will be.
     pub fn snapshot(&self) -> PathBuf {
         self.file(SNAPSHOT_FILE)
+    }
+
+    /// Whether there is one, or the one before.
+    pub fn has_snapshot(&self) -> bool {
+        has_snapshot(&self.partial)
     }
 
     /// Where it will be.
@@ -280,7 +287,7 @@ impl Drop for RunFolder {
             return;
         }
         // A failure here changes nothing: the run has failed already.
-        if !self.snapshot().is_file() {
+        if !self.has_snapshot() {
             let _ = std::fs::remove_dir_all(&self.partial);
             return;
         }
@@ -326,9 +333,14 @@ fn clear(folder: &Path) -> Result<(), FolderError> {
     Ok(())
 }
 
+/// Whether a run left a snapshot in a folder.
+pub fn has_snapshot(folder: &Path) -> bool {
+    [SNAPSHOT_FILE, PREVIOUS_SNAPSHOT_FILE].iter().any(|name| folder.join(name).is_file())
+}
+
 /// Refuses a target that is taken.
 fn check_target(target: &Path, overwrite: bool) -> Result<(), FolderError> {
-    if !overwrite && target.join(SNAPSHOT_FILE).is_file() {
+    if !overwrite && has_snapshot(target) {
         return Err(FolderError::Interrupted { path: target.to_path_buf() });
     }
     let empty = !target.exists() || target.read_dir().is_ok_and(|mut entries| entries.next().is_none());

@@ -27,7 +27,7 @@ pub use disk_store::{BLOCKS_FILE, DiskStore, MAP_FILE, MeshOutput, Streaming};
 pub use ending::{Incomplete, IncompleteCause, SkippedFrame, SkippedFrames};
 pub use error::RunError;
 pub use execute::run;
-pub use folder::{FolderError, RunFolder, SNAPSHOT_FILE, write_whole};
+pub use folder::{FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, write_whole};
 pub use map_objects::{ExportOptions, MapObjects};
 pub use plan::{FrameNumbers, HOST_OVERHEAD_BYTES, Plan, frame_interval_s};
 pub use progress::Progress;

@@ -268,7 +268,9 @@ impl<'p, 's> Session<'p, 's> {
 
     fn write_checkpoint(&mut self) -> Result<(), FolderError> {
         let Some(plan) = &self.plan.checkpoints else { return Ok(()) };
-        if let Some((_, ObserveError::Write { path, source })) = self.state.sync(&self.setup.folder).into_iter().next() {
+        let refused = self.state.sync(&self.setup.folder).into_iter().next().map(|(_, error)| error);
+        let refused = refused.or(self.state.observers.checkpoint(&self.setup).err());
+        if let Some(ObserveError::Write { path, source }) = refused {
             return Err(FolderError::Write { path, source });
         }
         let position = self.store.position();

@@ -67,7 +67,10 @@ pub fn checkpoints(plan: &Plan, every: usize) -> anyhow::Result<CheckpointPlan> 
 pub fn run(args: &RunArgs, target: &Path, stop: &StopRequest) -> anyhow::Result<()> {
     let target = std::path::absolute(target)?;
     let mut folder = RunFolder::reopen(&target)?;
-    let checkpoint = Checkpoint::read(&folder)?;
+    let (checkpoint, damage) = Checkpoint::read(&folder)?;
+    if let Some(damage) = damage {
+        eprintln!("warning: {damage}. The snapshot before it is taken");
+    }
     let manifest = checkpoint.manifest().clone();
     // Relative paths among the arguments start at the working directory of the run.
     let working_dir = manifest.working_dir();

@@ -5,9 +5,11 @@
 //! | 8 | `DVXDRIVE` |
 //! | 4 | [`VERSION`], little-endian as all numbers here |
 //! | 8 | length of the host's part |
-//! | 4 | CRC-32 of the 20 bytes before and of the host's part |
 //! | | the host's part, CBOR: manifest, end of the file of blocks, state |
-//! | | the mapper's, to the end: [`dynvox_core::mapper::snapshot`] |
+//! | | the mapper's: [`dynvox_core::mapper::snapshot`] |
+//! | 4 | CRC-32 of all bytes before |
+//!
+//! The checkpoint before the last one stays: where the last is damaged, the run is resumed from that one.
 //!
 //! Evicted blocks and rows are not copied: their files only ever grow, so the length and a checksum of each describe it.
 //!
@@ -23,20 +25,24 @@ pub use manifest::RunManifest;
 
 use super::Plan;
 use super::state::RunState;
-use super::{FolderError, RunFolder, write_whole};
+use super::{FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, write_whole};
 use crate::run::store::Position;
 use dynvox_core::Mapper;
 use dynvox_core::RestoreError;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::io::{self, BufReader, Read, Write};
-use std::path::PathBuf;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Take, Write};
+use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"DVXDRIVE";
 /// Version of the layout and of the host's state. Another one is refused: there is no conversion.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Magic, version, length.
 const HEAD: usize = 20;
+/// Checksum.
+const TAIL: usize = 4;
+/// Bytes read at once to check a file.
+const WINDOW_BYTES: usize = 1 << 16;
 
 /// When a run writes checkpoints.
 #[derive(Clone, Debug)]
@@ -55,7 +61,7 @@ struct Part<B, G> {
     state: G,
 }
 
-/// Writes the checkpoint of a run into its folder, in place of the one before.
+/// Writes the checkpoint of a run into its folder; the last one becomes the one before.
 pub(super) fn write(
     folder: &RunFolder,
     manifest: &RunManifest,
@@ -63,14 +69,20 @@ pub(super) fn write(
     state: &RunState,
     mapper: &mut Mapper<'_>,
 ) -> Result<(), FolderError> {
-    write_whole(&folder.snapshot(), |file| {
+    let last = folder.snapshot();
+    write_whole(&last, |file| {
         let mut part = Vec::new();
         ciborium::into_writer(&Part { manifest, blocks, state }, &mut part).map_err(io::Error::other)?;
-        let head = head(part.len() as u64);
-        file.write_all(&head)?;
-        file.write_all(&checksum(&head, &part).to_le_bytes())?;
-        file.write_all(&part)?;
-        mapper.save(&mut |bytes: &[u8]| file.write_all(bytes))
+        let mut checksum = crc32fast::Hasher::new();
+        let mut write = |bytes: &[u8]| {
+            checksum.update(bytes);
+            file.write_all(bytes)
+        };
+        write(&head(part.len() as u64))?;
+        write(&part)?;
+        mapper.save(&mut write)?;
+        file.write_all(&checksum.finalize().to_le_bytes())?;
+        if last.is_file() { std::fs::rename(&last, folder.file(PREVIOUS_SNAPSHOT_FILE)) } else { Ok(()) }
     })
 }
 
@@ -82,11 +94,41 @@ fn head(len: u64) -> [u8; HEAD] {
     head
 }
 
-fn checksum(head: &[u8; HEAD], part: &[u8]) -> u32 {
-    let mut crc = crc32fast::Hasher::new();
-    crc.update(head);
-    crc.update(part);
-    crc.finalize()
+/// Opens a checkpoint of this version with no byte changed: the file behind its head, and the lengths of its two parts.
+fn open(path: &Path) -> Result<(BufReader<File>, [u64; 2]), ResumeError> {
+    let failed = |source| ResumeError::Read { path: path.to_path_buf(), source };
+    let damaged = || ResumeError::Damaged { path: path.to_path_buf() };
+    let mut file = File::open(path).map_err(failed)?;
+    let len = file.metadata().map_err(failed)?.len();
+    let mut head = [0; HEAD];
+    file.read_exact(&mut head[..8]).map_err(|_| ResumeError::Foreign { path: path.to_path_buf() })?;
+    if head[..8] != MAGIC {
+        return Err(ResumeError::Foreign { path: path.to_path_buf() });
+    }
+    file.read_exact(&mut head[8..]).map_err(|_| damaged())?;
+    let found = u32::from_le_bytes([head[8], head[9], head[10], head[11]]);
+    if found != VERSION {
+        return Err(ResumeError::Version { path: path.to_path_buf(), found, taken: VERSION });
+    }
+    let part_len = head[12..].iter().rev().fold(0, |len, byte| len << 8 | u64::from(*byte));
+    let content_len = len.checked_sub((HEAD + TAIL) as u64).ok_or_else(damaged)?;
+    let mapper_len = content_len.checked_sub(part_len).ok_or_else(damaged)?;
+    let mut checksum = crc32fast::Hasher::new();
+    checksum.update(&head);
+    let (mut window, mut left) = (vec![0; WINDOW_BYTES], content_len);
+    while left > 0 {
+        let piece = &mut window[..left.min(WINDOW_BYTES as u64) as usize];
+        file.read_exact(piece).map_err(failed)?;
+        checksum.update(piece);
+        left -= piece.len() as u64;
+    }
+    let mut tail = [0; TAIL];
+    file.read_exact(&mut tail).map_err(failed)?;
+    if checksum.finalize() != u32::from_le_bytes(tail) {
+        return Err(damaged());
+    }
+    file.seek(SeekFrom::Start(HEAD as u64)).map_err(failed)?;
+    Ok((BufReader::new(file), [part_len, mapper_len]))
 }
 
 /// The last checkpoint of an interrupted run.
@@ -96,46 +138,34 @@ pub struct Checkpoint {
     pub(super) blocks: Option<Position>,
     pub(super) state: RunState,
     /// The mapper's part of the file.
-    rest: BufReader<File>,
+    rest: Take<BufReader<File>>,
 }
 
 impl Checkpoint {
-    /// Reads the checkpoint in a run's folder, but for the mapper's part.
+    /// Reads the last checkpoint in a run's folder that is whole, but for the mapper's part. With it comes what is wrong with a later one.
     ///
     /// # Errors
-    /// The checkpoint is missing, of another version, or damaged.
-    pub fn read(folder: &RunFolder) -> Result<Self, ResumeError> {
-        let path = folder.snapshot();
-        let failed = |source| ResumeError::Read { path: path.clone(), source };
-        let file = File::open(&path).map_err(failed)?;
-        let len = file.metadata().map_err(failed)?.len();
-        let mut rest = BufReader::new(file);
-        let damaged = || ResumeError::Damaged { path: path.clone() };
-        let mut whole = |bytes: &mut [u8]| rest.read_exact(bytes).map_err(|_| damaged());
-        let (mut head, mut sum) = ([0; HEAD], [0; 4]);
-        whole(&mut head[..8]).map_err(|_| ResumeError::Foreign { path: path.clone() })?;
-        if head[..8] != MAGIC {
-            return Err(ResumeError::Foreign { path });
+    /// The last checkpoint is missing, of another version, or damaged, and there is none before it.
+    pub fn read(folder: &RunFolder) -> Result<(Self, Option<ResumeError>), ResumeError> {
+        let last = Self::of_file(folder.snapshot());
+        let error = match last {
+            Ok(checkpoint) => return Ok((checkpoint, None)),
+            Err(error) => error,
+        };
+        match Self::of_file(folder.file(PREVIOUS_SNAPSHOT_FILE)) {
+            Ok(checkpoint) => Ok((checkpoint, Some(error))),
+            Err(_) => Err(error),
         }
-        whole(&mut head[8..])?;
-        let (version, part_len) = (u32::from_le_bytes([head[8], head[9], head[10], head[11]]), &head[12..]);
-        if version != VERSION {
-            return Err(ResumeError::Version { path, found: version, taken: VERSION });
-        }
-        let part_len = part_len.iter().rev().fold(0, |len, byte| len << 8 | u64::from(*byte));
-        if part_len > len {
-            return Err(damaged());
-        }
-        whole(&mut sum)?;
+    }
+
+    fn of_file(path: PathBuf) -> Result<Self, ResumeError> {
+        let (mut file, [part_len, mapper_len]) = open(&path)?;
         let mut part = vec![0; part_len as usize];
-        whole(&mut part)?;
-        if checksum(&head, &part) != u32::from_le_bytes(sum) {
-            return Err(damaged());
-        }
+        file.read_exact(&mut part).map_err(|source| ResumeError::Read { path: path.clone(), source })?;
         let part: Part<RunManifest, RunState> =
             ciborium::from_reader(&part[..]).map_err(|error| ResumeError::Otherwise { path: path.clone(), reason: error.to_string() })?;
         let Part { manifest, blocks, state } = part;
-        Ok(Self { path, manifest, blocks, state, rest })
+        Ok(Self { path, manifest, blocks, state, rest: file.take(mapper_len) })
     }
 
     /// How the run was started.
