@@ -1,5 +1,6 @@
 //! `dynvox run`.
 
+mod examine;
 mod instances;
 mod results;
 mod resume;
@@ -12,7 +13,6 @@ use super::rectified::RectifiedArgs;
 use super::settings::{Settings, on_or_off};
 use crate::input::bags::Topics;
 use crate::input::depth::{self, DepthChoice};
-use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
 use crate::input::faults::{self, Faults};
 use crate::input::stream::WhenLate;
 use crate::input::{self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking, StopRequest};
@@ -20,8 +20,8 @@ use crate::observe::Reference;
 use crate::report;
 use crate::report::text::counted;
 use crate::run::{
-    self, BLOCKS_FILE, Checkpoint, FrameNumbers, HOST_OVERHEAD_BYTES, Incomplete, MAP_FILE, PREVIOUS_SNAPSHOT_FILE, Plan, RunError,
-    RunFolder, RunRecord, SNAPSHOT_FILE, Streaming, has_snapshot,
+    self, BLOCKS_FILE, Checkpoint, FrameNumbers, HOST_OVERHEAD_BYTES, Incomplete, MAP_FILE, PREVIOUS_SNAPSHOT_FILE, Plan, RunError, RunFolder, RunRecord,
+    SNAPSHOT_FILE, Streaming, has_snapshot,
 };
 use anyhow::bail;
 use instances::InstancesArgs;
@@ -217,7 +217,11 @@ impl RunArgs {
             None => super::synth::street(settings)?,
         };
         let dataset = depth::attach(dataset, &self.depth)?;
-        let dataset = if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) };
+        Ok(if self.scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, self.scale)?) })
+    }
+
+    /// With the masks and faults that are asked for.
+    fn dress(&self, dataset: Box<dyn FrameSource>) -> anyhow::Result<Box<dyn FrameSource>> {
         faults::attach(self.masks.attach(dataset)?, self.faults.as_ref()).map_err(anyhow::Error::msg)
     }
 }
@@ -225,22 +229,6 @@ impl RunArgs {
 fn rate_hz(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
     rate.ok_or_else(|| "must be a number above 0".to_owned())
-}
-
-/// Examines the images of a recording: what is doubtful about them.
-fn examined(args: &RunArgs, dataset: &dyn FrameSource, indices: &[usize]) -> anyhow::Result<Vec<String>> {
-    if args.path.is_none() {
-        // The synthetic street knows what it renders.
-        return Ok(Vec::new());
-    }
-    let stream = dataset.stream().is_some();
-    // Of a stream the first frame can be looked at, and a camera may begin in the dark.
-    let findings = diagnosis::examine(dataset, if stream { &[0] } else { indices })?;
-    let refused = |finding: &Finding| finding.refused && !(stream && finding.fault == Fault::Black);
-    if findings.iter().any(refused) && !args.force {
-        return Err(RefusedInput { findings }.into());
-    }
-    Ok(findings.into_iter().map(|finding| finding.message).collect())
 }
 
 /// The plan of a run.
@@ -254,7 +242,10 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
         bail!("--threads, --stride and --frames must be at least 1. Give a larger number");
     }
     settings.set_rectified_size(args.rectified.over(settings.rectified_size()));
-    let dataset = args.open(&settings, stop)?;
+    let recorded = args.open(&settings, stop)?;
+    // Before networks, which would run on every image that is examined.
+    let warnings = examine::warnings(args, recorded.as_ref())?;
+    let dataset = args.dress(recorded)?;
     let (profile, capacity) = args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;
     settings.fit(&capacity);
     let frames = FrameNumbers::of(dataset.as_ref(), args.start, args.stride, args.frames)?;
@@ -275,7 +266,7 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
         None => None,
     };
     Ok(Plan {
-        warnings: examined(args, dataset.as_ref(), frames.listed())?,
+        warnings,
         frames,
         skip_bad_frames: args.skip_bad_frames,
         stop: stop.clone(),
@@ -362,11 +353,8 @@ pub struct IncompleteRun {
 impl IncompleteRun {
     fn new(incomplete: &Incomplete, folder: PathBuf) -> Self {
         let missing = if incomplete.missing.is_empty() { String::new() } else { format!(", without {}", incomplete.missing.join(", ")) };
-        let resume = if has_snapshot(&folder) {
-            format!("; `dynvox run --resume {}` resumes the run", folder.display())
-        } else {
-            String::new()
-        };
+        let resume =
+            if has_snapshot(&folder) { format!("; `dynvox run --resume {}` resumes the run", folder.display()) } else { String::new() };
         Self { reason: incomplete.reason.clone(), more: missing + &resume, folder }
     }
 }
