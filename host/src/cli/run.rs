@@ -20,7 +20,7 @@ use crate::observe::Reference;
 use crate::report;
 use crate::report::text::counted;
 use crate::run::{
-    self, BLOCKS_FILE, Checkpoint, FrameNumbers, HOST_OVERHEAD_BYTES, Incomplete, MAP_FILE, PREVIOUS_SNAPSHOT_FILE, Plan, RunError, RunFolder, RunRecord,
+    self, BLOCKS_FILE, Checkpoint, FrameNumbers, Incomplete, MAP_FILE, PREVIOUS_SNAPSHOT_FILE, Plan, RunError, RunFolder, RunRecord,
     SNAPSHOT_FILE, Streaming, has_snapshot,
 };
 use anyhow::bail;
@@ -137,7 +137,7 @@ pub struct RunArgs {
     /// Map images that are refused as exchanged, unrectified, out of order, black or the same in both cameras
     #[arg(long, help_heading = "Frames")]
     force: bool,
-    /// End when the process uses more than so many MiB [default: the slab and 256]
+    /// End when the process uses more than so many MiB [default: the slab, 256 MiB and 64 bytes for each pixel]
     #[arg(long, value_name = "MIB", help_heading = "Limits")]
     rss_limit_mib: Option<u64>,
     /// Write a snapshot every N frames, from which an interrupted run can be resumed. Cannot be combined with --evaluate
@@ -286,7 +286,9 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
         evaluate: args.evaluate,
         evaluation_delay: args.evaluation_delay,
         save_instances: None,
-        rss_limit_bytes: args.rss_limit_mib.map_or(capacity.bytes() as u64 + HOST_OVERHEAD_BYTES, |mib| mib.saturating_mul(MIB)),
+        rss_limit_bytes: args
+            .rss_limit_mib
+            .map_or_else(|| run::resident_limit_bytes(&capacity, dataset.size()), |mib| mib.saturating_mul(MIB)),
         quiet: args.silent(),
         dataset,
     })

@@ -29,7 +29,7 @@ pub use error::RunError;
 pub use execute::run;
 pub use folder::{FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, write_whole};
 pub use map_objects::{ExportOptions, MapObjects};
-pub use plan::{FrameNumbers, HOST_OVERHEAD_BYTES, Plan, frame_interval_s};
+pub use plan::{FrameNumbers, Plan, frame_interval_s, resident_limit_bytes};
 pub use progress::Progress;
 pub use reader::{AHEAD, ReadFrame, read_ahead, stereo_frame};
 pub use record::{RunHeader, RunRecord, StageStatistics};

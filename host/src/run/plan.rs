@@ -10,9 +10,15 @@ use dynvox_core::geometry::Transform;
 use dynvox_core::{Capacity, Config};
 use std::path::PathBuf;
 
-/// Bytes the host may use in addition to the slab, by default: decoded images, the synthetic street, a row per frame, pictures for the
-/// report, the index of the block file.
-pub const HOST_OVERHEAD_BYTES: u64 = 256 << 20;
+/// Bytes the host may use in addition to the slab, by default: the synthetic street, objects' meshes, the index of the block file.
+const HOST_BYTES: u64 = 256 << 20;
+/// The same for each pixel of an image: frames read ahead, their depth and masks, pictures of the report.
+const HOST_BYTES_PER_PIXEL: u64 = 64;
+
+/// Bytes a run may take in all unless it is told otherwise.
+pub fn resident_limit_bytes(capacity: &Capacity, (width, height): (usize, usize)) -> u64 {
+    capacity.bytes() as u64 + HOST_BYTES + HOST_BYTES_PER_PIXEL * (width * height) as u64
+}
 
 /// What to run.
 pub struct Plan {
