@@ -26,6 +26,21 @@ fn after_blind_frames_the_camera_is_found_again() {
 }
 
 #[test]
+fn images_that_both_repeat_while_the_camera_moves_are_old() {
+    for fault in ["freeze@8..12", "duplicate@8..10"] {
+        let of = outcome(fault);
+        assert_eq!((of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()), (Some(0), Some(0)), "{of}");
+        assert!(of["held"].as_u64() > Some(0), "{of}");
+    }
+}
+
+#[test]
+fn a_camera_a_frame_late_is_noticed() {
+    let of = outcome("delay:left@8..");
+    assert!(of["unreported_frames"].as_u64() <= Some(1) && of["map_affected"].as_u64() >= Some(8), "{of}");
+}
+
+#[test]
 fn a_frozen_camera_and_a_jump_are_not_taken_for_motion() {
     for fault in ["freeze:right@8..", "freeze:left@8..", "jump=20@8"] {
         let of = outcome(fault);

@@ -23,6 +23,10 @@ pub struct EgomotionConfig {
     pub acceleration_max_m_s2: f64,
     /// Share of inliers from which on any motion is believed; in 0..=1.
     pub inlier_share_strong: f32,
+    /// Distance by which the right camera may seem to stand ahead of its place beside the left one, or behind it, m. A larger one comes of
+    /// cameras that do not expose at the same time: a motion is taken only where the share of inliers is at least `inlier_share_strong`, and none
+    /// above four times the distance ([`RightAhead::is_synchronous`](super::RightAhead::is_synchronous)). Above 0. DynSLAM: none.
+    pub right_ahead_max_m: f64,
     /// Most Gauss-Newton steps of a hypothesis; 1..=50. DynSLAM: about 12.
     pub sample_steps: u8,
     /// Most Gauss-Newton steps of a round of refinement; 1..=250. DynSLAM: about 250.
@@ -44,6 +48,7 @@ impl Default for EgomotionConfig {
             inlier_share_min: 0.35,
             acceleration_max_m_s2: 15.0,
             inlier_share_strong: 0.65,
+            right_ahead_max_m: 0.05,
             sample_steps: 12,
             refine_steps: 50,
             side_knee: 0.3,
@@ -65,6 +70,8 @@ impl EgomotionConfig {
         require(problems, is_share(self.inlier_share_strong), "egomotion.inlier_share_strong", "must be in 0..=1");
         let acceleration = self.acceleration_max_m_s2.is_finite() && self.acceleration_max_m_s2 > 0.0;
         require(problems, acceleration, "egomotion.acceleration_max_m_s2", "must be above 0");
+        let ahead = self.right_ahead_max_m.is_finite() && self.right_ahead_max_m > 0.0;
+        require(problems, ahead, "egomotion.right_ahead_max_m", "must be above 0");
         require(problems, (1..=50).contains(&self.sample_steps), "egomotion.sample_steps", "must be in 1..=50");
         require(problems, (1..=250).contains(&self.refine_steps), "egomotion.refine_steps", "must be in 1..=250");
         require(problems, self.side_knee > 0.0 && self.side_knee <= 10.0, "egomotion.side_knee", "must be above 0 and at most 10");

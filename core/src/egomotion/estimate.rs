@@ -4,6 +4,7 @@ use super::{
     EgomotionConfig,
     normal_equations::{NormalEquations, RotationMatrix},
     points::{Point, Points},
+    synchrony::RightAhead,
 };
 use crate::{
     geometry::{StereoRig, Transform},
@@ -35,6 +36,8 @@ pub enum MotionStatus {
     NotConverged,
     /// The camera would have to accelerate too much ([`EgomotionConfig::acceleration_max_m_s2`]), and too few matches agree.
     Implausible,
+    /// The cameras of the pair do not seem to expose at the same time ([`EgomotionConfig::right_ahead_max_m`]), and too few matches agree.
+    Unsynchronized,
     /// The rig cannot be used.
     BadRig,
 }
@@ -60,6 +63,9 @@ pub struct MotionEstimate {
     pub samples: u32,
     /// Gauss-Newton steps of the refinement.
     pub steps: u32,
+    /// Of the camera: how far ahead of its place the right one seems to stand; far where both do not expose at the same time. `None` where too few
+    /// matches tell.
+    pub right_ahead: Option<RightAhead>,
 }
 
 impl MotionEstimate {
@@ -72,6 +78,7 @@ impl MotionEstimate {
             residual_rms_px: 0.0,
             samples,
             steps: 0,
+            right_ahead: None,
         }
     }
 }

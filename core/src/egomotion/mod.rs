@@ -34,10 +34,12 @@ mod estimate;
 pub mod icp;
 mod normal_equations;
 mod points;
+mod synchrony;
 mod track;
 
 pub use config::EgomotionConfig;
 pub use estimate::{Estimator, MotionEstimate, MotionStatus};
+pub use synchrony::RightAhead;
 pub use track::{Egomotion, REFERENCE_FRAMES_MAX};
 
 #[cfg(test)]

@@ -274,6 +274,16 @@ fn a_leap_is_believed_of_many_matches_that_agree_and_not_of_few() {
 }
 
 #[test]
+fn a_camera_stands_at_once_where_it_could_brake() {
+    let config = EgomotionConfig::default();
+    assert!(Egomotion::default().may_stand(&config, 0.1), "nothing is known of its motion");
+    let (_, camera) = after_one_frame(&motion(), 0);
+    let braked_m = config.acceleration_max_m_s2 * 0.1 * 0.1;
+    assert!(motion().distance_m() > braked_m + 0.1);
+    assert!(!camera.may_stand(&config, 0.1) && camera.may_stand(&config, 1.0));
+}
+
+#[test]
 fn a_camera_lost_for_long_goes_on_from_a_guess_and_says_so() {
     let mut camera = Egomotion::default();
     camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));

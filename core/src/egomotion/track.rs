@@ -1,6 +1,6 @@
 //! The camera's motion from frame to frame, also where it cannot be estimated.
 
-use super::{EgomotionConfig, Estimator, MotionEstimate, MotionStatus};
+use super::{EgomotionConfig, Estimator, MotionEstimate, MotionStatus, RightAhead};
 use crate::{
     geometry::{StereoRig, Transform},
     random::Random,
@@ -67,16 +67,18 @@ impl Egomotion {
         config: &EgomotionConfig,
         rig: &StereoRig,
         interval_s: f32,
-        matches: impl IntoIterator<Item = &'m Match>,
+        matches: impl IntoIterator<Item = &'m Match, IntoIter: Clone>,
         estimator: &mut Estimator<'_>,
     ) -> MotionEstimate {
-        let expected = self.expected();
-        let mut estimate = estimator.estimate(config, rig, matches, &mut self.random, Some(&expected));
+        let (expected, matches) = (self.expected(), matches.into_iter());
+        let right_ahead = RightAhead::of(rig, matches.clone());
+        let found = estimator.estimate(config, rig, matches, &mut self.random, Some(&expected));
+        let mut estimate = MotionEstimate { right_ahead, ..found };
         self.reference_s += f64::from(interval_s);
         let frames = self.since_reference + 1;
         let motion = estimate.t_current_previous.map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
-        if motion.is_some_and(|motion| !self.is_plausible(config, &motion, &estimate)) {
-            estimate = MotionEstimate { status: MotionStatus::Implausible, t_current_previous: None, ..estimate };
+        if let Some(status) = motion.and_then(|motion| self.doubt(config, &motion, &estimate)) {
+            estimate = MotionEstimate { status, t_current_previous: None, ..estimate };
         }
         match (&estimate.t_current_previous, motion) {
             (Some(t_current_reference), Some(motion)) => {
@@ -125,17 +127,35 @@ impl Egomotion {
         }
     }
 
-    /// Whether a camera can have moved so since the reference, a frame's share of it being `motion`.
-    fn is_plausible(&self, config: &EgomotionConfig, motion: &Transform, estimate: &MotionEstimate) -> bool {
+    /// Why a camera cannot have moved so since the reference, a frame's share of it being `motion`; `None` where it can.
+    fn doubt(&self, config: &EgomotionConfig, motion: &Transform, estimate: &MotionEstimate) -> Option<MotionStatus> {
         // Few matches can agree on anything.
         let as_many = FEWER_INLIERS_MAX * estimate.inliers >= self.inliers;
         let agree = estimate.inliers as f32 >= config.inlier_share_strong * estimate.matches as f32;
-        if self.motion_s <= 0.0 || as_many && agree {
+        let after_gap = self.since_reference > 0;
+        let is_synchronous = |ahead: RightAhead| ahead.is_synchronous(config.right_ahead_max_m, agree, after_gap);
+        let can_accelerate = || self.can_accelerate_to(config, motion, self.reference_s / f64::from(self.since_reference + 1));
+        if !estimate.right_ahead.is_none_or(is_synchronous) {
+            Some(MotionStatus::Unsynchronized)
+        } else if (as_many && agree) || can_accelerate() {
+            None
+        } else {
+            Some(MotionStatus::Implausible)
+        }
+    }
+
+    /// Whether a camera that moved as it last did can move so in the next `frame_s`.
+    fn can_accelerate_to(&self, config: &EgomotionConfig, motion: &Transform, frame_s: f64) -> bool {
+        if self.motion_s <= 0.0 {
             return true;
         }
-        let frame_s = self.reference_s / f64::from(self.since_reference + 1);
         let (then, now) = (self.t_current_previous.translation() * (frame_s / self.motion_s), motion.translation());
         (now - then).norm() <= config.acceleration_max_m_s2 * frame_s * frame_s + NOISE_M
+    }
+
+    /// Whether a camera that moved as it last did can stand still for the next `interval_s`: if not, images that repeat the last ones are old.
+    pub fn may_stand(&self, config: &EgomotionConfig, interval_s: f32) -> bool {
+        self.can_accelerate_to(config, &Transform::IDENTITY, f64::from(interval_s))
     }
 
     fn extrapolate(&mut self) {

@@ -35,12 +35,23 @@ pub(super) struct Localization<'m, 's> {
 
 /// The camera's pose in a frame.
 pub(super) struct Located {
-    pub origin: PoseOrigin,
     pub camera: CameraMotion,
+    pub found: Found,
+}
+
+/// Where a pose comes from, and what the stage that found it says.
+pub(super) struct Found {
+    pub origin: PoseOrigin,
     pub egomotion: Option<MotionEstimate>,
     pub icp: Option<IcpReport>,
     /// Matches that were excluded because they may move.
     pub matches_excluded: u32,
+}
+
+impl Found {
+    fn new(origin: PoseOrigin) -> Self {
+        Self { origin, egomotion: None, icp: None, matches_excluded: 0 }
+    }
 }
 
 /// Rows by which the left and the right position of a match may differ where it says something about
@@ -64,32 +75,33 @@ impl Localization<'_, '_> {
         executor: &E,
     ) -> Located {
         let (before, over_several) = (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
-        let (origin, egomotion, icp, matches_excluded) = if let Some(t_world_camera) = &frame.t_world_camera {
+        let found = if let Some(t_world_camera) = &frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
-            (if self.frame == 0 { PoseOrigin::First } else { PoseOrigin::Given }, None, None, 0)
+            Found::new(if self.frame == 0 { PoseOrigin::First } else { PoseOrigin::Given })
         } else if self.config.mapper.egomotion == MotionSource::Icp {
-            let report = (self.frame > 0).then(|| self.register_depth([frame.left.width(), frame.left.height()], executor));
-            (self.origin(report.is_some()), None, report, 0)
+            let icp = (self.frame > 0).then(|| self.register_depth([frame.left.width(), frame.left.height()], executor));
+            Found { icp, ..Found::new(self.origin(icp.is_some())) }
         } else {
             match status {
-                FlowStatus::Matched => {
-                    let (estimate, excluded) = self.estimate_from_matches(mask);
-                    (self.origin(true), Some(estimate), None, excluded)
-                }
-                FlowStatus::Frozen => {
-                    self.camera.hold(self.interval_s);
-                    (self.origin(true), None, None, 0)
-                }
-                FlowStatus::First | FlowStatus::Refused => (PoseOrigin::First, None, None, 0),
+                FlowStatus::Frozen => self.hold(),
+                FlowStatus::Repeated if !self.camera.may_stand(&self.config.egomotion, self.interval_s) => self.hold(),
+                FlowStatus::Matched | FlowStatus::Repeated => self.estimate_from_matches(mask),
+                FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
         };
-        let is_measured = matches!(origin, PoseOrigin::Estimated | PoseOrigin::Given);
+        let is_measured = matches!(found.origin, PoseOrigin::Estimated | PoseOrigin::Given);
         // After a guess the motion from the guessed pose, so that motions lead from pose to pose.
         let last_motion = || if over_several { self.camera.t_world_camera().inverse() * before } else { *self.camera.t_current_previous() };
         let t_current_previous: Option<Transform> = is_measured.then(last_motion);
         let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
-        Located { origin, camera, egomotion, icp, matches_excluded }
+        Located { camera, found }
+    }
+
+    /// Moves the camera on as before.
+    fn hold(&mut self) -> Found {
+        self.camera.hold(self.interval_s);
+        Found::new(self.origin(true))
     }
 
     /// The origin of a pose that was estimated, if it was.
@@ -101,8 +113,8 @@ impl Localization<'_, '_> {
         }
     }
 
-    /// Estimates the motion from the matches the mask includes; and how many it excludes.
-    fn estimate_from_matches(&mut self, mask: &EgomotionMask<'_, '_>) -> (MotionEstimate, u32) {
+    /// Estimates the motion from the matches the mask includes.
+    fn estimate_from_matches(&mut self, mask: &EgomotionMask<'_, '_>) -> Found {
         let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
         // Masks are of the frame before; matches over several frames are left to RANSAC.
         let over_several = self.camera.since_reference() > 0;
@@ -115,7 +127,11 @@ impl Localization<'_, '_> {
         if let Some(motion) = estimate.t_current_previous.filter(|_| 2 * estimate.inliers >= estimate.matches) {
             self.self_calibration.update(&rig, matches.filter_map(|m| observations(&rig, m)), &motion);
         }
-        (estimate, excluded as u32)
+        Found {
+            egomotion: Some(estimate),
+            matches_excluded: excluded as u32,
+            ..Found::new(self.origin(true))
+        }
     }
 
     /// Registers the depth with the map as it appears from the last pose. All of the picture counts, what moves as well: the baseline knows

@@ -109,7 +109,7 @@ impl Mapper<'_> {
         let estimate_motions = || assigned.estimate_motions(&rig, &located.camera, search, &mut self.estimator);
         let mut tracked = executor.stage(Stage::Instances, estimate_motions);
         // (E) The static map, without what moves or may move, and the objects' maps; unless the pose is extrapolated.
-        let fused = located.origin != PoseOrigin::Held && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
+        let fused = located.found.origin != PoseOrigin::Held && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
         let mut map = StaticMap { config, disparity_q8, background: &mut self.background, depth_m: self.depth_m };
         let allocation = if fused { map.fuse(frame, &located.camera, &mut tracked, executor, store) } else { AllocationReport::default() };
         let picture = Picture { grey: frame.left, colour: frame.colour };
@@ -128,20 +128,28 @@ impl Mapper<'_> {
 
     /// Reports the frame and counts it.
     fn finish_frame(&mut self, outcome: Outcome) -> Report {
-        let Outcome { stereo, scene_flow, located, tracking, fused, allocation, prune } = outcome;
-        let digests = self.digests(located.egomotion.as_ref());
+        let Outcome {
+            stereo,
+            scene_flow,
+            located: Located { camera, found },
+            tracking,
+            fused,
+            allocation,
+            prune,
+        } = outcome;
+        let digests = self.digests(found.egomotion.as_ref());
         let report = Report {
             frame: self.frame,
-            t_world_camera: located.camera.t_world_camera,
+            t_world_camera: camera.t_world_camera,
             rectification: None,
             stereo,
             scene_flow,
-            pose: located.origin,
+            pose: found.origin,
             segment: self.camera.segment(),
-            egomotion: located.egomotion,
-            icp: located.icp,
+            egomotion: found.egomotion,
+            icp: found.icp,
             self_calibration: self.self_calibration.report(),
-            instances: InstancesReport::of(&tracking, self.objects.report(), located.matches_excluded),
+            instances: InstancesReport::of(&tracking, self.objects.report(), found.matches_excluded),
             fused,
             allocation,
             prune,

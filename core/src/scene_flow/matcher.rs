@@ -279,9 +279,10 @@ impl<'s> FlowMatcher<'s> {
             report.status = FlowStatus::First;
             return report;
         }
-        if self.left.is_repeated(size) != self.right.is_repeated(size) {
-            report.status = FlowStatus::Frozen;
-            return report;
+        match [self.left.is_repeated(size), self.right.is_repeated(size)] {
+            [false, false] => {}
+            [true, true] => report.status = FlowStatus::Repeated,
+            _ => return FlowReport { status: FlowStatus::Frozen, ..report },
         }
         self.matched = true;
         report.sparse = self.sparse_pass(config, size, executor);

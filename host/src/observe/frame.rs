@@ -74,6 +74,7 @@ impl FrameRow {
             Some(MotionStatus::TooFewInliers) => "too_few_inliers",
             Some(MotionStatus::NotConverged) => "not_converged",
             Some(MotionStatus::Implausible) => "implausible",
+            Some(MotionStatus::Unsynchronized) => "unsynchronized_cameras",
             Some(MotionStatus::BadRig) => "bad_rig",
         }
     }

@@ -19,6 +19,8 @@ struct FrameColumns {
     matches: u32,
     inliers: u32,
     residual_px: f64,
+    right_ahead_m: Option<f64>,
+    right_ahead_sigma_m: Option<f64>,
     rig_offset_px: Option<f64>,
     rig_offset_sigma_px: Option<f64>,
     rig_offset_applied_px: f64,
@@ -157,6 +159,7 @@ pub fn read_frame_digests(text: &str) -> Result<Vec<FrameDigests>, csv::Error> {
 fn frame_columns(row: &FrameRow) -> FrameColumns {
     let (matches, inliers, residual_px) = row.matches();
     let icp = row.report.icp.as_ref();
+    let right_ahead = row.report.egomotion.and_then(|motion| motion.right_ahead);
     let known = Some(&row.report.self_calibration).filter(|rig| rig.known);
     FrameColumns {
         frame: row.frame,
@@ -168,6 +171,8 @@ fn frame_columns(row: &FrameRow) -> FrameColumns {
         matches,
         inliers,
         residual_px: rounded(residual_px, 4),
+        right_ahead_m: right_ahead.map(|ahead| rounded(ahead.distance_m, 4)),
+        right_ahead_sigma_m: right_ahead.map(|ahead| rounded(ahead.sigma_m, 4)),
         rig_offset_px: known.map(|rig| rounded(rig.offset_px, 4)),
         rig_offset_sigma_px: known.map(|rig| rounded(rig.offset_sigma_px, 4)),
         rig_offset_applied_px: rounded(row.report.self_calibration.applied_offset_px, 4),
