@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """Speeds and motion states at other frame rates, with irregular time stamps and with dropped frames, against those at 10 Hz.
 
-docs/time_stamps.py DYNVOX FOLDER [SETTING=VALUE ...] renders four seconds of the street at 30 Hz into FOLDER once, links its frames as 10 Hz, 30 Hz,
+docs/time_stamps.py DYNVOX FOLDER [SETTING=VALUE ...] renders twelve seconds of the street at 30 Hz into FOLDER once, links its frames as 10 Hz, 30 Hz,
 irregular and 10 Hz without every seventh frame, maps each with exact masks, and prints the median speed of each moving object.
 """
 import collections, csv, os, pathlib, shutil, statistics, subprocess, sys
 
 dynvox, folder, settings = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3:]
-FRAMES = 120
+FRAMES = 360
+# Speeds are compared where both runs measured an object in so many frames.
+MEASURED_MIN = 8
 STEPS = [1, 3, 2, 4, 1, 5, 3, 2, 6, 3]  # of 1/30 s
 
 
@@ -59,11 +61,11 @@ def truth():
     return {frame: [(boxes[frame, one[0]], *one[1:]) for one in objects if (frame, one[0]) in boxes] for frame, objects in frames.items()}
 
 
-def tracks(out, true):
-    """Speed and state by frame, of each true object."""
+def tracks(out, true, frames):
+    """Speed and state by frame of the street, of each true object; `frames` are the street's that were mapped."""
     seen = collections.defaultdict(dict)
     for row in csv.DictReader(open(out / "tracks.csv")):
-        frame, box = int(row["frame"]), [float(row[key]) for key in ["x1", "y1", "x2", "y2"]]
+        frame, box = frames[int(row["frame"])], [float(row[key]) for key in ["x1", "y1", "x2", "y2"]]
         best = max(true.get(frame, []), key=lambda one: overlap(one[0], box), default=None)
         if best and overlap(best[0], box) > 0.4:
             seen[best[1]][frame] = (float(row["speed_m_s"]) if row["speed_m_s"] and row["measured"] == "1" else None, row["state"], best[2], best[3])
@@ -81,7 +83,7 @@ def main():
         masks = data / "sequences/00/instances"
         subprocess.run([dynvox, "run", data, "--images", "grey", "--instances", f"files:{masks}", "--quiet", "--threads", "1", "--set", "volume.voxel_size_m=0.2", "--overwrite", "--out",
                         data / "run"], check=True)
-        found[name] = tracks(data / "run", true)
+        found[name] = tracks(data / "run", true, frames)
     plain = found["10 Hz"]
     for name, of in found.items():
         worst, same, shared = 0.0, 0, 0
@@ -91,7 +93,7 @@ def main():
             same += sum(frames[frame][1] == of[truth_id][frame][1] for frame in common)
             speeds = [[of_run[frame][0] for frame in common if frames[frame][0] and of[truth_id][frame][0] and frames[frame][1] == "dynamic"
                        and of[truth_id][frame][1] == "dynamic"] for of_run in (frames, of.get(truth_id, {}))]
-            if len(speeds[0]) >= 5:
+            if len(speeds[0]) >= MEASURED_MIN:
                 ours, theirs = (statistics.median(values) for values in (speeds[1], speeds[0]))
                 worst = max(worst, abs(ours / theirs - 1))
                 true_m_s = statistics.median(frames[frame][3] for frame in common)
