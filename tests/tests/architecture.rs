@@ -71,7 +71,8 @@ const HOST: Layers = &[
     ("report", &["evaluate", "formats", "observe", "run", "scene"]),
     ("sweep", &["evaluate", "formats", "observe", "report", "run"]),
     ("fixtures", &["formats", "input", "run", "slab"]),
-    ("cli", &["evaluate", "fixtures", "formats", "input", "observe", "report", "run", "scene", "slab", "sweep", "synth"]),
+    ("fleet", &["formats", "run"]),
+    ("cli", &["evaluate", "fixtures", "fleet", "formats", "input", "observe", "report", "run", "scene", "slab", "sweep", "synth"]),
 ];
 
 #[test]

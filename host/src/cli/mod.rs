@@ -19,6 +19,7 @@ mod egomotion;
 mod evaluate;
 mod export;
 mod fixtures;
+mod fleet;
 mod inspect;
 mod manual;
 mod output;
@@ -58,6 +59,7 @@ Examples:
   dynvox synth --out street --set street.frames=50
   dynvox bench ~/kitti --sequence 06 --frames 60    CPU time of every stage, on one thread and on two
   dynvox fixtures new pinned --from ~/my-rig --memory 32MiB   digests of your own rig, for your CI
+  dynvox fleet plan recordings.toml --out fleet   jobs for many recordings, whose maps become one
   dynvox view out/street-001                    its map in the browser
   dynvox diff out/a out/b                       the first frame and stage in which two runs diverge
 
@@ -98,6 +100,8 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Replay small clips against the digests on file
     Fixtures(fixtures::FixturesArgs),
+    /// Map many recordings, and add their maps in any order
+    Fleet(fleet::FleetArgs),
     /// Write completions for a shell: dynvox completions bash > ~/.local/share/bash-completion/completions/dynvox
     Completions(manual::CompletionsArgs),
     /// Write the manual: dynvox man | man -l -
@@ -124,6 +128,7 @@ pub fn main() -> ExitCode {
         Some(Command::Diff(args)) => return diff::main(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Fixtures(args)) => fixtures::run(&args),
+        Some(Command::Fleet(args)) => fleet::run(&args),
         Some(Command::Completions(args)) => {
             manual::completions(&args, Cli::command());
             Ok(())

@@ -83,12 +83,14 @@ pub struct MeshOutput {
 }
 
 impl MeshOutput {
-    /// Begins `map.ply`. Meshes the pool's blocks when none was evicted, or when nothing more can be stored; otherwise evicts them to the store.
-    pub fn begin(mapper: &mut Mapper<'_>, mut store: DiskStore, folder: &RunFolder, axes: Axes) -> Self {
+    /// Begins `map.ply`. Meshes the pool's blocks when none was evicted and the file is not kept, or when nothing more can be stored; otherwise evicts
+    /// them to the store.
+    pub fn begin(mapper: &mut Mapper<'_>, (mut store, streaming): (DiskStore, Option<Streaming>), folder: &RunFolder, axes: Axes) -> Self {
         let mut ply = PlyWriter::begin_in(&folder.file(MAP_FILE), "the first camera", axes);
         let mut report = EvictionReport::default();
         let mut meshed = HashSet::new();
-        if store.0.as_ref().is_none_or(|file| file.records() == 0 || file.failure().is_some()) {
+        let keeps_file = streaming.is_some_and(|streaming| streaming.keep_file);
+        if store.0.as_ref().is_none_or(|file| file.records() == 0 && !keeps_file || file.failure().is_some()) {
             mapper.triangles(&mut |triangle| add(&mut ply, triangle));
             let volume = mapper.background();
             meshed.extend(volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)));

@@ -43,6 +43,11 @@ impl RunManifest {
         &self.arguments
     }
 
+    /// The resolved settings, and what identifies the data set, by name.
+    pub fn fingerprint(&self) -> &BTreeMap<String, String> {
+        &self.fingerprint
+    }
+
     /// The working directory of the command line.
     pub fn working_dir(&self) -> PathBuf {
         PathBuf::from(&self.working_dir)

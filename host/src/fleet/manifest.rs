@@ -1,0 +1,260 @@
+//! What there is to do: a list of recordings becomes a list of jobs, each with its bytes of memory and a name that is a hash of all that
+//! decides its result, so that what is done is known by its folder.
+
+use super::FleetError;
+use crate::run::write_whole;
+use dynvox_core::digest::Digest;
+use dynvox_core::geometry::Transform;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Name of the list of jobs.
+pub const MANIFEST_FILE: &str = "jobs.json";
+/// A list of recordings, as an example.
+pub const RECORDINGS_EXAMPLE: &str = "\
+arguments = [\"--memory\", \"256MiB\"]   # of `dynvox run`, for all
+
+[[recording]]
+name = \"monday\"
+arguments = [\"recordings/monday\", \"--instances\", \"none\"]
+
+[[recording]]
+name = \"tuesday\"
+arguments = [\"recordings/tuesday\"]
+t_world_camera = [1, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]   # its first camera in the world, a row of KITTI
+";
+
+/// The recordings to map.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recordings {
+    /// Arguments of `dynvox run` for all of them.
+    #[serde(default)]
+    pub arguments: Vec<String>,
+    /// One by one.
+    #[serde(rename = "recording")]
+    pub recordings: Vec<Recording>,
+}
+
+/// A recording.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recording {
+    /// Its name in tables.
+    pub name: String,
+    /// Arguments of `dynvox run`.
+    pub arguments: Vec<String>,
+    /// Its first camera in the world, camera to world; the world's origin where it is absent.
+    #[serde(default)]
+    pub t_world_camera: Option<[f64; 12]>,
+}
+
+/// One run to do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// The recording's name.
+    pub name: String,
+    /// Hash of the arguments, the settings, the images and the place in the world.
+    pub id: String,
+    /// Arguments of `dynvox run`.
+    pub arguments: Vec<String>,
+    /// First camera in the world, camera to world: the rows of a 3 x 4 matrix.
+    pub t_world_camera: [f64; 12],
+    /// Most memory of the run, bytes.
+    pub bytes: u64,
+}
+
+/// What became of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JobState {
+    /// Its map is there.
+    Done,
+    /// A run was begun: it goes on, or ended early.
+    Begun,
+    /// Nothing is there.
+    Open,
+}
+
+/// What identifies the run of some arguments, and what it needs.
+#[derive(Clone, Copy, Debug)]
+pub struct Identity {
+    /// Hash of settings and images.
+    pub digest: u64,
+    /// Most memory of the run, bytes.
+    pub bytes: u64,
+}
+
+/// All jobs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// In the order of the recordings.
+    pub jobs: Vec<Job>,
+}
+
+impl Recordings {
+    /// Reads a list.
+    ///
+    /// # Errors
+    /// It cannot be read, or is none.
+    pub fn read(path: &Path) -> Result<Self, FleetError> {
+        let text = std::fs::read_to_string(path).map_err(FleetError::io(path))?;
+        toml::from_str(&text).map_err(|error| {
+            let why = error.message().replace('\n', " ");
+            FleetError::content(path, format!("is no list of recordings: {why}. An example:\n\n{RECORDINGS_EXAMPLE}"))
+        })
+    }
+}
+
+impl Manifest {
+    /// The jobs of recordings. `identify` says what a run of some arguments is.
+    ///
+    /// # Errors
+    /// A place in the world is no rigid motion, or that of `identify`.
+    pub fn plan<E: From<FleetError>>(
+        path: &Path,
+        recordings: &Recordings,
+        identify: impl Fn(&[String]) -> Result<Identity, E>,
+    ) -> Result<Self, E> {
+        let mut jobs = Vec::new();
+        for Recording { name, arguments, t_world_camera } in &recordings.recordings {
+            let t_world_camera = t_world_camera.unwrap_or([1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+            if transform(&t_world_camera).is_none() {
+                return Err(FleetError::content(path, format!("has no rigid motion as t_world_camera of {name}")).into());
+            }
+            let arguments: Vec<String> = arguments.iter().chain(&recordings.arguments).cloned().collect();
+            let identity = identify(&arguments)?;
+            jobs.push(Job {
+                name: name.clone(),
+                id: id(&arguments, &t_world_camera, identity.digest),
+                arguments,
+                t_world_camera,
+                bytes: identity.bytes,
+            });
+        }
+        Ok(Self { jobs })
+    }
+
+    /// Reads the jobs in a folder.
+    ///
+    /// # Errors
+    /// There are none.
+    pub fn read(folder: &Path) -> Result<Self, FleetError> {
+        let path = folder.join(MANIFEST_FILE);
+        let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
+        serde_json::from_str(&text)
+            .map_err(|error| FleetError::content(&path, format!("is no list of jobs: {error}. Make it with `dynvox fleet plan`")))
+    }
+
+    /// Writes the jobs into a folder.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    pub fn write(&self, folder: &Path) -> Result<(), FleetError> {
+        std::fs::create_dir_all(folder).map_err(FleetError::io(folder))?;
+        let path = folder.join(MANIFEST_FILE);
+        let text = serde_json::to_string_pretty(self).map_err(|error| FleetError::content(&path, error.to_string()))?;
+        write_whole(&path, |file| file.write_all(text.as_bytes())).map_err(|error| FleetError::content(&path, error.to_string()))
+    }
+
+    /// The jobs of one of `shards` workers.
+    pub fn shard(&self, index: usize, shards: usize) -> impl Iterator<Item = &Job> {
+        self.jobs.iter().skip(index).step_by(shards.max(1))
+    }
+}
+
+impl Job {
+    /// Whether settings and images are those it was planned with.
+    pub fn is_of(&self, digest: u64) -> bool {
+        self.id == id(&self.arguments, &self.t_world_camera, digest)
+    }
+
+    /// First camera in the world.
+    pub fn t_world_camera(&self) -> Option<Transform> {
+        transform(&self.t_world_camera)
+    }
+
+    /// Where its map is, below the folder of the jobs.
+    pub fn submap(&self, folder: &Path) -> PathBuf {
+        folder.join("submaps").join(&self.id)
+    }
+
+    /// Where its run is.
+    pub fn run_folder(&self, folder: &Path) -> PathBuf {
+        folder.join("runs").join(&self.id)
+    }
+
+    /// What became of it.
+    pub fn state(&self, folder: &Path) -> JobState {
+        let run = self.run_folder(folder);
+        let begun = run.exists() || run.with_file_name(format!(".{}.partial", self.id)).exists();
+        match (self.submap(folder).is_dir(), begun) {
+            (true, _) => JobState::Done,
+            (false, true) => JobState::Begun,
+            (false, false) => JobState::Open,
+        }
+    }
+}
+
+fn id(arguments: &[String], t_world_camera: &[f64; 12], of_input: u64) -> String {
+    let mut digest = Digest::default();
+    arguments.iter().for_each(|argument| {
+        digest.u64(argument.len() as u64);
+        digest.bytes(argument.as_bytes());
+    });
+    t_world_camera.iter().for_each(|&number| digest.f64(number));
+    digest.u64(of_input);
+    format!("{:016x}", digest.finish())
+}
+
+fn transform(rows: &[f64; 12]) -> Option<Transform> {
+    let row = |at: usize| [rows[4 * at], rows[4 * at + 1], rows[4 * at + 2]];
+    let matrix = [row(0), row(1), row(2)];
+    let is_rotation = (0..3).all(|a| {
+        (0..3).all(|b| {
+            let dot: f64 = (0..3).map(|axis| matrix[a][axis] * matrix[b][axis]).sum();
+            (dot - f64::from(u8::from(a == b))).abs() < 1e-6
+        })
+    });
+    let transform = Transform::from_rotation_matrix(&matrix, [rows[3], rows[7], rows[11]]);
+    (is_rotation && transform.is_finite()).then_some(transform)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn identify(arguments: &[String]) -> Result<Identity, FleetError> {
+        Ok(Identity { digest: arguments.len() as u64, bytes: 7 })
+    }
+
+    #[test]
+    fn the_example_is_planned_written_read_and_sharded() {
+        let root = tempfile::TempDir::new().unwrap();
+        let path = root.path().join("recordings.toml");
+        std::fs::write(&path, RECORDINGS_EXAMPLE).unwrap();
+        let manifest = Manifest::plan(&path, &Recordings::read(&path).unwrap(), identify).unwrap();
+        manifest.write(root.path()).unwrap();
+        assert_eq!(Manifest::read(root.path()).unwrap(), manifest);
+        let [monday, tuesday] = &manifest.jobs[..] else { panic!("{manifest:?}") };
+        assert_eq!(monday.arguments, ["recordings/monday", "--instances", "none", "--memory", "256MiB"]);
+        assert_eq!(tuesday.t_world_camera().unwrap().translation_m, [5.2, 0.0, -3.1]);
+        assert!(monday.is_of(5) && !monday.is_of(4) && monday.id != tuesday.id);
+        assert_eq!(manifest.shard(1, 2).collect::<Vec<_>>(), [tuesday]);
+        assert_eq!(tuesday.state(root.path()), JobState::Open);
+        std::fs::create_dir_all(tuesday.submap(root.path())).unwrap();
+        assert_eq!(tuesday.state(root.path()), JobState::Done);
+    }
+
+    #[test]
+    fn wrong_lists_and_motions_are_refused_with_an_example() {
+        let root = tempfile::TempDir::new().unwrap();
+        let path = root.path().join("recordings.toml");
+        std::fs::write(&path, "[[drives]]\n").unwrap();
+        assert!(Recordings::read(&path).unwrap_err().to_string().contains("[[recording]]"));
+        std::fs::write(&path, RECORDINGS_EXAMPLE.replace("[1, 0, 0, 5.2", "[2, 0, 0, 5.2")).unwrap();
+        let refused = Manifest::plan(&path, &Recordings::read(&path).unwrap(), identify).unwrap_err();
+        assert!(refused.to_string().contains("no rigid motion as t_world_camera of tuesday"), "{refused}");
+        assert!(Manifest::read(root.path()).is_err());
+    }
+}

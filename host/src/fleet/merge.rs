@@ -1,0 +1,176 @@
+//! Adding the sums of several maps, tile by tile and block by block.
+
+use super::FleetError;
+use super::block_sums::BlockSums;
+use super::tile_file::{self, Lattice, TileReader};
+use super::tile_folder::{WorldTile, tiles};
+use crate::formats::DraftFolder;
+use dynvox_core::digest::Digest;
+use dynvox_core::volume::BlockCoord;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What was merged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Merged {
+    /// Tiles written.
+    pub tiles: usize,
+    /// Blocks written.
+    pub blocks: u64,
+    /// The voxels they share; `None` where there is no tile.
+    pub lattice: Option<Lattice>,
+}
+
+/// Adds the maps in the folders `inputs` into a new folder. The result does not depend on the order of the inputs, nor on how they were merged
+/// before. In memory at once is one block of each input.
+///
+/// # Errors
+/// A tile is damaged or of other voxels, the folder exists, or the disk refuses. Nothing half-written stays behind.
+pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
+    if out.exists() {
+        return Err(FleetError::Exists { path: out.to_path_buf() });
+    }
+    let folders = inputs.iter().map(|folder| tiles(folder)).collect::<Result<Vec<_>, _>>()?;
+    let all: BTreeSet<WorldTile> = folders.iter().flat_map(BTreeMap::keys).copied().collect();
+    let draft = DraftFolder::of(out);
+    std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
+    let mut merged = Merged { tiles: 0, blocks: 0, lattice: None };
+    for tile in all {
+        let paths = folders.iter().filter_map(|folder| folder.get(&tile));
+        let mut heads = paths.map(|path| Head::open(path, &mut merged.lattice)).collect::<Result<Vec<_>, _>>()?;
+        let Some(lattice) = merged.lattice else { continue };
+        merged.blocks += u64::from(tile_file::write(&draft.path().join(tile.file_name()), &lattice, || next(&mut heads))?);
+        merged.tiles += 1;
+    }
+    draft.rename(out).map_err(FleetError::io(out))?;
+    Ok(merged)
+}
+
+/// A reader and the block it stands at.
+struct Head {
+    reader: TileReader,
+    block: Option<(BlockCoord, BlockSums)>,
+}
+
+impl Head {
+    /// Opens a tile of the lattice of those before it.
+    fn open(path: &Path, lattice: &mut Option<Lattice>) -> Result<Self, FleetError> {
+        let mut reader = TileReader::open(path)?;
+        let (found, expected) = (reader.lattice(), *lattice.get_or_insert(reader.lattice()));
+        if found != expected {
+            return Err(FleetError::OtherLattice { path: path.to_path_buf(), found, expected });
+        }
+        let block = reader.next()?;
+        Ok(Self { reader, block })
+    }
+}
+
+/// The sum of all blocks at the least coordinates.
+fn next(heads: &mut [Head]) -> Result<Option<(BlockCoord, BlockSums)>, FleetError> {
+    let Some(coord) = heads.iter().filter_map(|head| Some(head.block.as_ref()?.0)).min() else { return Ok(None) };
+    let mut sum: Option<BlockSums> = None;
+    for head in heads.iter_mut().filter(|head| head.block.as_ref().is_some_and(|(at, _)| *at == coord)) {
+        if let Some((_, block)) = std::mem::replace(&mut head.block, head.reader.next()?) {
+            match &mut sum {
+                Some(sum) => sum.add(&block),
+                None => sum = Some(block),
+            }
+        }
+    }
+    Ok(sum.map(|sum| (coord, sum)))
+}
+
+/// Digest of a map: of the sums of all blocks, with their coordinates.
+///
+/// # Errors
+/// A tile is damaged, or cannot be read.
+pub fn digest(folder: &Path) -> Result<u64, FleetError> {
+    let (mut digest, mut bytes) = (Digest::default(), Vec::new());
+    for path in tiles(folder)?.values() {
+        let mut reader = TileReader::open(path)?;
+        while let Some((coord, sums)) = reader.next()? {
+            digest.i16s(&[coord.x, coord.y, coord.z]);
+            sums.write(&mut bytes);
+            digest.bytes(&bytes);
+        }
+    }
+    Ok(digest.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynvox_core::random::Random;
+
+    const LATTICE: Lattice = Lattice { voxel_size_m: 0.2, truncation_m: 1.0, colour: true };
+
+    /// A map of some blocks in four tiles.
+    fn map(folder: &Path, seed: u64, lattice: &Lattice) {
+        let mut random = Random::new(seed);
+        let mut blocks = BTreeMap::new();
+        for _ in 0..30 {
+            let mut side = || random.below(8) as i16 * 10 - 40;
+            let coord = BlockCoord { x: side(), y: 0, z: side() };
+            let mut sums = BlockSums::zero(lattice.colour);
+            for _ in 0..50 {
+                let mixed = random.next_u32();
+                sums.observe((mixed % 512) as usize, (mixed >> 16) as i16, (mixed >> 8) as u8, [1, 2, mixed as u8]);
+            }
+            blocks.insert((WorldTile::of(coord, lattice), coord), sums);
+        }
+        std::fs::create_dir_all(folder).unwrap();
+        for tile in blocks.keys().map(|(tile, _)| *tile).collect::<BTreeSet<_>>() {
+            let mut own = blocks.iter().filter(|((of, _), _)| *of == tile).map(|((_, coord), sums)| (*coord, sums.clone()));
+            tile_file::write(&folder.join(tile.file_name()), lattice, || Ok(own.next())).unwrap();
+        }
+    }
+
+    #[test]
+    fn maps_merged_in_any_order_and_tree_are_one() {
+        let root = tempfile::TempDir::new().unwrap();
+        let path = |name: String| root.path().join(name);
+        for seed in 0..8 {
+            map(&path(format!("map-{seed}")), seed, &LATTICE);
+        }
+        let (mut random, mut expected) = (Random::new(77), None);
+        for trial in 0..100 {
+            let mut maps: Vec<PathBuf> = (0..8).map(|seed| path(format!("map-{seed}"))).collect();
+            let mut step = 0;
+            while maps.len() > 1 {
+                // Some of those that are left, at random, become one.
+                let count = 2 + random.below(maps.len() as u32 - 1) as usize;
+                let chosen: Vec<_> = (0..count).map(|_| maps.swap_remove(random.below(maps.len() as u32) as usize)).collect();
+                let out = path(format!("merged-{trial}-{step}"));
+                merge(&chosen, &out).unwrap();
+                maps.push(out);
+                step += 1;
+            }
+            let found = digest(&maps[0]).unwrap();
+            assert_eq!(*expected.get_or_insert(found), found, "trial {trial}");
+            for step in 0..step {
+                std::fs::remove_dir_all(path(format!("merged-{trial}-{step}"))).unwrap();
+            }
+        }
+        assert_ne!(expected, Some(digest(&path("map-0".to_owned())).unwrap()));
+    }
+
+    #[test]
+    fn other_voxels_damage_and_a_folder_that_exists_are_refused() {
+        let root = tempfile::TempDir::new().unwrap();
+        let path = |name: &str| root.path().join(name);
+        map(&path("a"), 1, &LATTICE);
+        map(&path("b"), 2, &Lattice { colour: false, ..LATTICE });
+        let both = [path("a"), path("b")];
+        assert!(matches!(merge(&both, &path("out")), Err(FleetError::OtherLattice { .. })));
+        assert!(matches!(merge(&both, &path("a")), Err(FleetError::Exists { .. })));
+        let tile = tiles(&path("a")).unwrap().into_values().next().unwrap();
+        let bytes = std::fs::read(&tile).unwrap();
+        std::fs::write(&tile, &bytes[..bytes.len() - 1]).unwrap();
+        assert!(merge(&both[..1], &path("out")).unwrap_err().to_string().contains("is damaged"));
+        std::fs::write(path("a").join("notes.txt"), "").unwrap();
+        assert!(merge(&both[..1], &path("out")).unwrap_err().to_string().contains("notes.txt is no tile"));
+        let mut names: Vec<_> = root.path().read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["a", "b"], "nothing half-written");
+    }
+}

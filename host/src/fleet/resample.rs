@@ -1,0 +1,326 @@
+//! A run's blocks as sums in the world's lattice.
+//!
+//! Each lattice point of the world is carried into the run's map, where distance, weight and colour are interpolated between the eight lattice
+//! points around it. All of them that count must have been seen. Where the lattices coincide the values are taken over as they are; elsewhere
+//! a surface moves by less than a twentieth of a voxel (tests), and a map loses at most one voxel at the rim of what was seen.
+
+use super::FleetError;
+use super::block_sums::BlockSums;
+use super::tile_file::{self, Lattice};
+use super::tile_folder::WorldTile;
+use crate::formats::DraftFolder;
+use crate::run::store::BlockFile;
+use dynvox_core::geometry::Transform;
+use dynvox_core::volume::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, BlockStore, LoadedBlock};
+use std::collections::{HashMap, VecDeque};
+use std::fs::File;
+use std::path::Path;
+
+/// Blocks of the run in memory at once: 3 KiB each, 12 MiB.
+const CACHED_BLOCKS: usize = 4_096;
+/// Share of a voxel that rounding may move a lattice point by.
+const ROUNDING: f64 = 1e-9;
+
+/// What became of a run's map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Submap {
+    /// Tiles written.
+    pub tiles: usize,
+    /// Blocks written.
+    pub blocks: u64,
+    /// Blocks beyond the world's coordinates, which are lost.
+    pub beyond: u64,
+}
+
+/// Writes the blocks of a run as sums in the world's lattice into a new folder; `t_world_map` carries the run's map into the world.
+///
+/// # Errors
+/// The folder exists, a block cannot be read, or the disk refuses. Nothing half-written stays behind.
+pub fn submap(store: &mut BlockFile<File>, lattice: &Lattice, t_world_map: &Transform, out: &Path) -> Result<Submap, FleetError> {
+    if out.exists() {
+        return Err(FleetError::Exists { path: out.to_path_buf() });
+    }
+    let mut map = SourceMap::new(store, lattice.colour);
+    let way = LatticeWay::new(t_world_map, lattice);
+    let (targets, beyond) = targets(map.store, &way, lattice);
+    let draft = DraftFolder::of(out);
+    std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
+    let mut submap = Submap { tiles: 0, blocks: 0, beyond };
+    for of_tile in targets.chunk_by(|a, b| a.0 == b.0) {
+        let path = draft.path().join(of_tile[0].0.file_name());
+        let mut coords = of_tile.iter().map(|(_, coord)| *coord);
+        let blocks = tile_file::write(&path, lattice, || Ok(coords.next().map(|coord| (coord, map.sums_at(coord, &way, lattice.colour)))))?;
+        if blocks == 0 {
+            std::fs::remove_file(&path).map_err(FleetError::io(&path))?;
+            continue;
+        }
+        submap = Submap { tiles: submap.tiles + 1, blocks: submap.blocks + u64::from(blocks), ..submap };
+    }
+    if store.unreadable() > 0 {
+        return Err(FleetError::content(out, format!("is not made: {} blocks of the run cannot be read", store.unreadable())));
+    }
+    draft.rename(out).map_err(FleetError::io(out))?;
+    Ok(submap)
+}
+
+/// The way from the world's lattice to the run's and back, in voxels.
+struct LatticeWay {
+    to_map: Affine,
+    to_world: Affine,
+}
+
+#[derive(Clone, Copy)]
+struct Affine {
+    rows: [[f64; 3]; 3],
+    shift: [f64; 3],
+}
+
+impl Affine {
+    fn new(transform: &Transform, voxel_size_m: f64) -> Self {
+        Self {
+            rows: transform.rotation_matrix(),
+            shift: transform.translation_m.map(|metres| metres / voxel_size_m),
+        }
+    }
+
+    fn apply(&self, p: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|row| {
+            let [a, b, c] = self.rows[row];
+            a * p[0] + b * p[1] + c * p[2] + self.shift[row]
+        })
+    }
+}
+
+impl LatticeWay {
+    fn new(t_world_map: &Transform, lattice: &Lattice) -> Self {
+        let voxel_size_m = f64::from(lattice.voxel_size_m);
+        Self {
+            to_map: Affine::new(&t_world_map.inverse(), voxel_size_m),
+            to_world: Affine::new(t_world_map, voxel_size_m),
+        }
+    }
+}
+
+/// The blocks of the world that blocks of the run reach into, by tile; and how many lie beyond the world's coordinates.
+fn targets(store: &mut BlockFile<File>, way: &LatticeWay, lattice: &Lattice) -> (Vec<(WorldTile, BlockCoord)>, u64) {
+    let (mut targets, mut beyond) = (Vec::new(), 0);
+    for tile in store.tiles() {
+        for source in store.blocks_of(tile) {
+            let [low, high] = reach(source, way);
+            for x in low[0]..=high[0] {
+                for y in low[1]..=high[1] {
+                    for z in low[2]..=high[2] {
+                        match BlockCoord::new(x, y, z) {
+                            Some(coord) => targets.push((WorldTile::of(coord, lattice), coord)),
+                            None => beyond += 1,
+                        }
+                    }
+                }
+            }
+        }
+        // Neighbours reach into the same blocks.
+        targets.sort_unstable();
+        targets.dedup();
+    }
+    (targets, beyond)
+}
+
+/// The first and the last block of the world that a block of the run reaches into, on each axis.
+fn reach(source: BlockCoord, way: &LatticeWay) -> [[i32; 3]; 2] {
+    let side = BLOCK_SIDE as f64;
+    let origin = [source.x, source.y, source.z].map(|c| f64::from(c) * side);
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for corner in 0..8usize {
+        // Lattice points between this block and its neighbours are interpolated with both.
+        let point = std::array::from_fn(|axis| origin[axis] + if corner >> axis & 1 == 1 { side } else { -1.0 });
+        for (axis, value) in way.to_world.apply(point).into_iter().enumerate() {
+            (low[axis], high[axis]) = (low[axis].min(value), high[axis].max(value));
+        }
+    }
+    // Lattice points strictly within.
+    let block = |lattice: f64| (lattice / side).floor() as i32;
+    [low.map(|value| block((value + ROUNDING).ceil())), high.map(|value| block((value - ROUNDING).floor()))]
+}
+
+/// One block of the run.
+struct Source {
+    sdf: [i16; BLOCK_VOXELS],
+    weight: [u8; BLOCK_VOXELS],
+    colour: Option<Box<[[u8; BLOCK_VOXELS]; 3]>>,
+}
+
+/// The run's blocks, the last ones read in memory.
+struct SourceMap<'s> {
+    store: &'s mut BlockFile<File>,
+    colour: bool,
+    blocks: HashMap<BlockCoord, Option<Box<Source>>>,
+    order: VecDeque<BlockCoord>,
+}
+
+impl<'s> SourceMap<'s> {
+    fn new(store: &'s mut BlockFile<File>, colour: bool) -> Self {
+        Self { store, colour, blocks: HashMap::new(), order: VecDeque::new() }
+    }
+
+    fn block(&mut self, coord: BlockCoord) -> Option<&Source> {
+        if !self.blocks.contains_key(&coord) {
+            if self.order.len() >= CACHED_BLOCKS
+                && let Some(oldest) = self.order.pop_front()
+            {
+                self.blocks.remove(&oldest);
+            }
+            let mut source = Box::new(Source {
+                sdf: [0; BLOCK_VOXELS],
+                weight: [0; BLOCK_VOXELS],
+                colour: self.colour.then(|| Box::new([[0; BLOCK_VOXELS]; 3])),
+            });
+            let into = LoadedBlock {
+                coord,
+                sdf: &mut source.sdf,
+                weight: &mut source.weight,
+                colour: source.colour.as_deref_mut(),
+            };
+            let known = self.store.holds(coord) && self.store.load(into);
+            self.blocks.insert(coord, known.then_some(source));
+            self.order.push_back(coord);
+        }
+        self.blocks.get(&coord)?.as_deref()
+    }
+
+    /// Distance, weight and colour at a lattice point of the run; `None` where it was not seen.
+    fn voxel(&mut self, point: [i32; 3]) -> Option<(i16, u8, [u8; 3])> {
+        let block = self.block(BlockCoord::of_lattice(point)?)?;
+        let [x, y, z] = point.map(|c| (c & 7) as usize);
+        let at = x + BLOCK_SIDE * (y + BLOCK_SIDE * z);
+        let colour = block.colour.as_ref().map_or([0; 3], |planes| [planes[0][at], planes[1][at], planes[2][at]]);
+        (block.weight[at] > 0).then_some((block.sdf[at], block.weight[at], colour))
+    }
+
+    /// The sums of a block of the world.
+    fn sums_at(&mut self, coord: BlockCoord, way: &LatticeWay, colour: bool) -> BlockSums {
+        let mut sums = BlockSums::zero(colour);
+        for voxel in 0..BLOCK_VOXELS {
+            let offset = [voxel % BLOCK_SIDE, voxel / BLOCK_SIDE % BLOCK_SIDE, voxel / BLOCK_SIDE / BLOCK_SIDE];
+            let origin = [coord.x, coord.y, coord.z];
+            let point = std::array::from_fn(|axis| f64::from(origin[axis]) * BLOCK_SIDE as f64 + offset[axis] as f64);
+            if let Some((sdf, weight, colour)) = self.interpolated(way.to_map.apply(point)) {
+                sums.observe(voxel, sdf, weight, colour);
+            }
+        }
+        sums
+    }
+
+    /// Distance, weight and colour at a place in the run's lattice.
+    fn interpolated(&mut self, place: [f64; 3]) -> Option<(i16, u8, [u8; 3])> {
+        let near = place.map(f64::round);
+        // A place that rounding moved off a lattice point is on it.
+        let place: [f64; 3] =
+            std::array::from_fn(|axis| if (place[axis] - near[axis]).abs() < ROUNDING { near[axis] } else { place[axis] });
+        let low = place.map(f64::floor);
+        let share: [f64; 3] = std::array::from_fn(|axis| place[axis] - low[axis]);
+        let mut sums = [0.0; 5];
+        for corner in 0..8usize {
+            let ahead: [bool; 3] = std::array::from_fn(|axis| corner >> axis & 1 == 1);
+            let factor = (0..3).fold(1.0, |product, axis| product * if ahead[axis] { share[axis] } else { 1.0 - share[axis] });
+            if factor == 0.0 {
+                continue;
+            }
+            let (sdf, weight, [red, green, blue]) = self.voxel(std::array::from_fn(|axis| low[axis] as i32 + i32::from(ahead[axis])))?;
+            let values = [f64::from(sdf), f64::from(weight), f64::from(red), f64::from(green), f64::from(blue)];
+            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+        }
+        let [sdf, weight, red, green, blue] = sums.map(f64::round);
+        Some((sdf as i16, (weight as u8).max(1), [red as u8, green as u8, blue as u8]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fleet::tile_file::TileReader;
+    use crate::fleet::tile_folder::tiles;
+    use dynvox_core::volume::EvictedBlock;
+
+    const LATTICE: Lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: true };
+    /// Units of distance in a voxel.
+    const UNITS: f64 = 32_767.0 / 5.0;
+
+    /// Distance of a lattice point from a plane through (2, 0, 0), in voxels: its normal leans.
+    fn plane(point: [f64; 3]) -> f64 {
+        0.8 * (point[0] - 2.0) + 0.6 * point[2]
+    }
+
+    /// A map of the plane in six by six blocks, seen within four voxels.
+    fn store(folder: &Path) -> BlockFile<File> {
+        let (mut store, _) = BlockFile::open(&folder.join("map.blocks"), LATTICE.voxel_size_m, LATTICE.truncation_m).unwrap();
+        for block in 0..216 {
+            let coord = BlockCoord { x: block % 6 - 3, y: block / 6 % 6 - 3, z: block / 36 - 3 };
+            let (mut sdf, mut weight) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS]);
+            for at in 0..BLOCK_VOXELS {
+                let offset = [at % 8, at / 8 % 8, at / 64];
+                let point = std::array::from_fn(|axis| f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis] as f64);
+                if plane(point).abs() < 4.0 {
+                    (sdf[at], weight[at]) = ((plane(point) * UNITS).round() as i16, 9);
+                }
+            }
+            assert!(store.store(EvictedBlock { coord, sdf: &sdf, weight: &weight, colour: Some(&[[50; BLOCK_VOXELS]; 3]) }));
+        }
+        store
+    }
+
+    fn all_sums(folder: &Path) -> Vec<(BlockCoord, BlockSums)> {
+        let mut all = Vec::new();
+        for path in tiles(folder).unwrap().values() {
+            let mut reader = TileReader::open(path).unwrap();
+            while let Some(block) = reader.next().unwrap() {
+                all.push(block);
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn lattices_that_coincide_keep_every_value() {
+        let root = tempfile::TempDir::new().unwrap();
+        let mut store = store(root.path());
+        let shifted = Transform::from_translation([1.6 * f64::from(0.1f32) / 0.1, 0.0, -0.8 * f64::from(0.1f32) / 0.1]);
+        for (name, t_world_map, blocks) in [("same", Transform::IDENTITY, [0, 0, 0]), ("shifted", shifted, [2, 0, -1])] {
+            let out = root.path().join(name);
+            submap(&mut store, &LATTICE, &t_world_map, &out).unwrap();
+            let all = all_sums(&out);
+            assert!(all.len() > 60, "{}", all.len());
+            for (coord, sums) in &all {
+                let source = BlockCoord { x: coord.x - blocks[0], y: coord.y - blocks[1], z: coord.z - blocks[2] };
+                let (mut sdf, mut weight, mut colour) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS], [[0; BLOCK_VOXELS]; 3]);
+                assert!(store.load(LoadedBlock { coord: source, sdf: &mut sdf, weight: &mut weight, colour: Some(&mut colour) }));
+                let average = sums.average();
+                assert!(
+                    *average.weight == weight && weight.iter().zip(&*average.sdf).zip(&sdf).all(|((w, a), b)| *w == 0 || a == b),
+                    "{coord:?}"
+                );
+            }
+        }
+        assert!(matches!(submap(&mut store, &LATTICE, &shifted, root.path()), Err(FleetError::Exists { .. })));
+    }
+
+    #[test]
+    fn a_turned_map_shows_the_same_surface() {
+        let root = tempfile::TempDir::new().unwrap();
+        let mut store = store(root.path());
+        let t_world_map = Transform::new([0.1, -0.4, 0.2], [3.03, -1.21, 0.57]);
+        let out = root.path().join("turned");
+        submap(&mut store, &LATTICE, &t_world_map, &out).unwrap();
+        let to_map = LatticeWay::new(&t_world_map, &LATTICE).to_map;
+        let (mut seen, mut worst) = (0, 0.0f64);
+        for (coord, sums) in all_sums(&out) {
+            let average = sums.average();
+            for at in (0..BLOCK_VOXELS).filter(|at| average.weight[*at] > 0) {
+                let offset = [at % 8, at / 8 % 8, at / 64];
+                let point = std::array::from_fn(|axis| f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis] as f64);
+                worst = worst.max((f64::from(average.sdf[at]) / UNITS - plane(to_map.apply(point))).abs());
+                (seen, _) = (seen + 1, assert_eq!(average.weight[at], 9));
+            }
+        }
+        assert!(seen > 10_000 && worst < 0.05, "{seen} voxels, {worst} of a voxel off");
+    }
+}

@@ -1,0 +1,118 @@
+//! Many recordings, one map.
+#![allow(missing_docs)]
+
+mod binary;
+
+use binary::{dynvox, names, output_text};
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Three recordings of small streets; the last stands elsewhere in the world, and is turned.
+const RECORDINGS: &str = r#"
+arguments = ["--profile", "tiny", "--instances", "none", "--set", "street.width=160", "--set", "street.height=64", "--set", "volume.voxel_size_m=0.1"]
+
+[[recording]]
+name = "first"
+arguments = ["--set", "street.frames=4"]
+
+[[recording]]
+name = "second"
+arguments = ["--set", "street.frames=3", "--set", "street.seed=5"]
+
+[[recording]]
+name = "third"
+arguments = ["--set", "street.frames=3", "--set", "street.seed=9"]
+t_world_camera = [0.8, 0, 0.6, 12.5, 0, 1, 0, 0.03, -0.6, 0, 0.8, -3.7]
+"#;
+
+fn done(root: &Path, args: &[&str]) -> String {
+    let run = dynvox(root, args);
+    assert!(run.status.success(), "{args:?}: {}", output_text(&run));
+    String::from_utf8(run.stdout).unwrap()
+}
+
+fn planned() -> TempDir {
+    let root = TempDir::new().unwrap();
+    fs::write(root.path().join("recordings.toml"), RECORDINGS).unwrap();
+    assert!(done(root.path(), &["fleet", "plan", "recordings.toml", "--out", "jobs"]).contains("3 jobs in jobs"));
+    root
+}
+
+fn digest(text: &str) -> &str {
+    text.trim().rsplit_once("digest ").unwrap().1
+}
+
+#[test]
+fn jobs_done_in_shares_are_merged_in_any_order_to_one_map() {
+    let root = planned();
+    let root = root.path();
+    assert!(done(root, &["fleet", "run", "jobs", "--shard", "1/2"]).contains("second is done"));
+    let status: serde_json::Value = serde_json::from_str(&done(root, &["fleet", "status", "jobs", "--json"])).unwrap();
+    let states: Vec<_> = status.as_array().unwrap().iter().map(|job| job["state"].as_str().unwrap()).collect();
+    assert_eq!(states, ["open", "done", "open"]);
+    assert!(status[0]["bytes"].as_u64().unwrap() > 8 << 20);
+    let early = dynvox(root, &["fleet", "merge", "jobs", "--out", "early"]);
+    assert!(output_text(&early).contains("first, third of jobs are not done") && !root.join("early").exists());
+    let rest = done(root, &["fleet", "run", "jobs"]);
+    assert!(rest.contains("first is done") && rest.contains("third is done") && !rest.contains("second"), "{rest}");
+    assert_eq!(done(root, &["fleet", "run", "jobs"]), "", "all is done");
+
+    let whole = done(root, &["fleet", "merge", "jobs", "--out", "whole"]);
+    let maps: Vec<String> = names(&root.join("jobs/submaps")).iter().map(|id| format!("jobs/submaps/{id}")).collect();
+    done(root, &["fleet", "merge", &maps[2], &maps[0], "--out", "two"]);
+    let tree = done(root, &["fleet", "merge", &maps[1], "two", "--out", "tree"]);
+    assert_eq!(digest(&whole), digest(&tree));
+    assert_eq!(names(&root.join("whole")), names(&root.join("tree")));
+    let meshed = done(root, &["fleet", "mesh", "whole", "--out", "world.ply"]);
+    assert!(meshed.contains(" triangles of ") && fs::metadata(root.join("world.ply")).unwrap().len() > 10_000, "{meshed}");
+    let again = dynvox(root, &["fleet", "merge", "jobs", "--out", "whole"]);
+    assert!(output_text(&again).contains("whole exists"), "{}", output_text(&again));
+    assert_eq!(names(root), ["jobs", "recordings.toml", "tree", "two", "whole", "world.ply"], "nothing half-written");
+}
+
+#[test]
+fn the_sums_of_one_map_show_its_own_surface() {
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    let first = RECORDINGS.split("[[recording]]\nname = \"second\"").next().unwrap();
+    fs::write(root.join("recordings.toml"), first).unwrap();
+    done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
+    done(root, &["fleet", "run", "jobs"]);
+    done(root, &["fleet", "merge", "jobs", "--out", "map"]);
+    let meshed = done(root, &["fleet", "mesh", "map", "--out", "map.ply"]);
+    let run = root.join("jobs/runs").join(&names(&root.join("jobs/runs"))[0]);
+    let summary: serde_json::Value = serde_json::from_slice(&fs::read(run.join("summary.json")).unwrap()).unwrap();
+    let triangles: u64 = meshed.split(": ").nth(1).unwrap().split(' ').next().unwrap().replace(',', "").parse().unwrap();
+    assert_eq!(Some(triangles), summary["map"]["triangles"].as_u64());
+    assert!(!run.join("map.blocks").exists(), "the sums are kept in its stead");
+}
+
+#[test]
+fn what_fails_is_named_and_can_be_repeated_alone() {
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    binary::rig(root, 4);
+    let list = "[[recording]]\nname = \"rig\"\narguments = [\"rig\", \"--profile\", \"tiny\"]\n";
+    fs::write(root.join("recordings.toml"), list).unwrap();
+    done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
+    let image = root.join("rig/left/003.png");
+    let whole = fs::read(&image).unwrap();
+    let mut pixels = image::open(&image).unwrap().into_luma8();
+    pixels.get_pixel_mut(80, 40).0[0] ^= 1;
+    pixels.save(&image).unwrap();
+    let changed = dynvox(root, &["fleet", "run", "jobs"]);
+    assert!(
+        !changed.status.success() && output_text(&changed).contains("rig: its settings or images are not those of the plan"),
+        "{}",
+        output_text(&changed)
+    );
+    fs::write(&image, whole).unwrap();
+    done(root, &["fleet", "run", "jobs"]);
+    let refused = dynvox(root, &["fleet", "plan", "rig/calib.txt", "--out", "other"]);
+    assert!(
+        output_text(&refused).contains("is no list of recordings") && output_text(&refused).contains("[[recording]]"),
+        "{}",
+        output_text(&refused)
+    );
+}
