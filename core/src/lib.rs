@@ -24,6 +24,7 @@ pub mod memory;
 pub mod objects;
 pub mod parallel;
 mod part;
+pub mod planning;
 pub mod problem;
 pub mod random;
 pub mod rectify;

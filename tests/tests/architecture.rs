@@ -34,6 +34,7 @@ const CORE: Layers = &[
     ("volume", &["audit", "digest", "geometry", "image", "memory", "parallel", "part", "problem", "state"]),
     ("view", &["geometry", "image", "memory", "parallel", "part", "problem", "volume"]),
     ("objects", &["audit", "digest", "geometry", "image", "masks", "memory", "parallel", "part", "problem", "state", "tracking", "volume"]),
+    ("planning", &["digest", "geometry", "image", "memory", "part", "problem", "state", "tracking", "view", "volume"]),
     (
         "mapper",
         &[
@@ -46,6 +47,7 @@ const CORE: Layers = &[
             "memory",
             "objects",
             "parallel",
+            "planning",
             "problem",
             "rectify",
             "scene_flow",

@@ -52,6 +52,14 @@ pub struct DynvoxCapacity {
     pub object_blocks: usize,
     /// Pixels of crops that wait for their object's motion.
     pub crop_pixels: usize,
+    /// Width of the planner's window, cells, at most 1,024; 0 makes none, and then it costs no byte.
+    pub planning_width: usize,
+    /// Length of the planner's window, cells.
+    pub planning_length: usize,
+    /// Height of the planner's window, cells.
+    pub planning_height: usize,
+    /// Whether distances are kept for every cell of the window, and not for a slice alone: 0 or 1.
+    pub planning_distance_3d: u8,
     /// Whether voxels have colour: 0 or 1.
     pub colour: u8,
 }
@@ -74,6 +82,10 @@ impl From<&Capacity> for DynvoxCapacity {
             objects: of.objects,
             object_blocks: of.object_blocks,
             crop_pixels: of.crop_pixels,
+            planning_width: of.planning_width,
+            planning_length: of.planning_length,
+            planning_height: of.planning_height,
+            planning_distance_3d: u8::from(of.planning_distance_3d),
             colour: u8::from(of.colour),
         }
     }
@@ -98,6 +110,10 @@ impl DynvoxCapacity {
             objects: self.objects,
             object_blocks: self.object_blocks,
             crop_pixels: self.crop_pixels,
+            planning_width: self.planning_width,
+            planning_length: self.planning_length,
+            planning_height: self.planning_height,
+            planning_distance_3d: self.planning_distance_3d != 0,
             colour: self.colour != 0,
         };
         capacity.validate().map(|()| capacity).map_err(|_| DynvoxStatus::Capacity)

@@ -16,6 +16,7 @@ mod config;
 mod given;
 mod handle;
 mod map;
+mod plan;
 mod raw;
 mod retired;
 mod snapshot;
@@ -32,6 +33,9 @@ pub use capacity::{
 pub use config::{DYNVOX_SETTINGS_BYTES, DynvoxConfig, DynvoxRig, dynvox_config_default, dynvox_config_problem, dynvox_config_set};
 pub use handle::{DynvoxMapper, dynvox_alignment, dynvox_bytes, dynvox_create, dynvox_destroy};
 pub use map::{DynvoxPicture, dynvox_finish, dynvox_finish_with, dynvox_pose_matrix, dynvox_raycast, dynvox_stream_out, dynvox_triangles};
+pub use plan::{
+    DynvoxMovingBox, DynvoxRobot, DynvoxWay, DynvoxWayEnd, DynvoxWindow, dynvox_moving_boxes, dynvox_plan, dynvox_ray, dynvox_sweep,
+};
 pub use raw::{
     DYNVOX_LENS_DOUBLE_SPHERE, DYNVOX_LENS_EQUIDISTANT, DYNVOX_LENS_EXTENDED_UNIFIED, DYNVOX_LENS_RADIAL_TANGENTIAL, DynvoxLensModel,
     DynvoxRawCamera, DynvoxRawRig, dynvox_config_raw,

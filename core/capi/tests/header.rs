@@ -7,7 +7,8 @@ use std::{env, fs, path::Path, process::Command};
 fn the_header_is_what_the_source_says() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(here.join("cbindgen.toml")).expect("the configuration can be read");
-    let modules = ["status", "types", "config", "capacity", "callback", "handle", "step", "map", "tracks", "raw", "retired", "snapshot"];
+    let modules =
+        ["status", "types", "config", "capacity", "callback", "handle", "step", "map", "tracks", "plan", "raw", "retired", "snapshot"];
     let builder = modules.iter().fold(cbindgen::Builder::new().with_config(config), |builder, module| {
         builder.with_src(here.join("src").join(module).with_extension("rs"))
     });

@@ -7,6 +7,7 @@
 use super::{MIN_HEIGHT, MIN_WIDTH};
 use crate::memory::Capacity;
 use crate::objects::MAX_OBJECTS;
+use crate::planning::MAX_SIDE_CELLS;
 use crate::tracking::MAX_DETECTIONS;
 use core::fmt;
 
@@ -152,6 +153,12 @@ impl Capacity {
             (self.history_frames > 0, "history_frames", above_0),
             (self.detections <= MAX_DETECTIONS, "detections", "must be at most 64"),
             (self.objects <= MAX_OBJECTS, "objects", "must be at most 16"),
+            (
+                self.planning_width.max(self.planning_length) <= MAX_SIDE_CELLS,
+                "planning_width",
+                "and planning_length must be at most 1,024",
+            ),
+            (self.planning_height <= MAX_SIDE_CELLS, "planning_height", "must be at most 1,024"),
             (self.objects == 0 || self.object_blocks > 0, "object_blocks", "must be above 0 where there are objects"),
         ];
         match rules.iter().find(|(holds, ..)| !holds) {
@@ -217,6 +224,10 @@ impl<'o> Question<'o> {
             objects: 0,
             object_blocks: 0,
             crop_pixels: 0,
+            planning_width: 0,
+            planning_length: 0,
+            planning_height: 0,
+            planning_distance_3d: false,
             colour,
         }
     }

@@ -5,6 +5,7 @@ use crate::{
     egomotion::{EgomotionConfig, icp::IcpConfig},
     geometry::{RigProblem, StereoRig},
     objects::ObjectsConfig,
+    planning::PlanningConfig,
     problem::{Problems, require},
     rectify::Rectification,
     rectify::self_calibration::RigConfig,
@@ -53,6 +54,8 @@ pub struct Config {
     pub raycast: RaycastConfig,
     /// Its triangles.
     pub mesh: MeshConfig,
+    /// Maps for planners, where the capacity has a window for them.
+    pub planning: PlanningConfig,
 }
 
 impl Config {
@@ -72,6 +75,7 @@ impl Config {
             volume: VolumeConfig::default(),
             raycast: RaycastConfig::default(),
             mesh: MeshConfig::default(),
+            planning: PlanningConfig::default(),
         }
     }
 
@@ -108,6 +112,7 @@ impl Config {
         self.volume.validate(&mut problems);
         self.raycast.validate(&mut problems);
         self.mesh.validate(&mut problems);
+        self.planning.validate(&mut problems);
         problems
     }
 }

@@ -7,6 +7,7 @@ mod digests;
 mod error;
 mod frame;
 mod localization;
+mod plan;
 mod raycast;
 mod report;
 mod set;
@@ -36,6 +37,7 @@ use crate::{
     image::View,
     memory::{Carver, region_bytes},
     objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
+    planning::Planning,
     rectify::{RawCamera, RectifiedImages, Rectifier, self_calibration::SelfCalibration},
     scene_flow::FlowMatcher,
     stereo::StereoMatcher,
@@ -74,6 +76,7 @@ pub struct Mapper<'s> {
     depth_m: &'s mut [f32],
     background: Volume<'s>,
     raycaster: Raycaster<'s>,
+    planning: Planning<'s>,
     /// Width and height of the frames, known from the first one on.
     size: Option<[usize; 2]>,
     frame: u32,
@@ -99,6 +102,7 @@ impl Capacity {
             + region_bytes::<f32>(self.pixels())
             + Volume::bytes(self)
             + Raycaster::bytes(self)
+            + Planning::bytes(self)
             + Rectifier::bytes(self)
             + RectifiedImages::bytes(self)
     }
@@ -164,6 +168,7 @@ impl<'s> Mapper<'s> {
             depth_m: carver.alloc("depth_m", capacity.pixels()),
             background: Volume::new_in(capacity, &config.volume, carver),
             raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
+            planning: Planning::new_in(capacity, &config.planning, config.volume.voxel_size_m, carver),
             rectifier: Rectifier::new_in(capacity, carver),
             rectified: RectifiedImages::new_in(capacity, carver),
             size: None,

@@ -5,6 +5,7 @@ use crate::{
     egomotion::{EgomotionConfig, icp::IcpConfig},
     geometry::DisparityCorrection,
     objects::ObjectsConfig,
+    planning::PlanningConfig,
     rectify::self_calibration::{RigConfig, SelfCalibrationMode},
     scene_flow::SceneFlowConfig,
     stereo::StereoConfig,
@@ -75,6 +76,7 @@ impl Config {
             "volume" => volume(&mut self.volume, name),
             "raycast" => raycast(&mut self.raycast, name),
             "mesh" => mesh(&mut self.mesh, name),
+            "planning" => planning(&mut self.planning, name),
             _ => None,
         }
     }
@@ -195,3 +197,7 @@ section!(volume: VolumeConfig {
 });
 section!(raycast: RaycastConfig { near_m, far_m, min_weight });
 section!(mesh: MeshConfig { min_weight });
+section!(planning: PlanningConfig {
+    cell_voxels, up_x, up_y, up_z, below_m, near_m, far_m, margin_px, min_weight, camera_height_m, slope_max, ground_step_m, climb_m, low_m,
+    high_m, level, unknown_is_obstacle, object_sigmas,
+});

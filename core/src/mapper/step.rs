@@ -137,6 +137,9 @@ impl Mapper<'_> {
             allocation,
             prune,
         } = outcome;
+        if fused {
+            self.observe_free_space(&camera.t_world_camera);
+        }
         let digests = self.digests(found.egomotion.as_ref());
         let report = Report {
             frame: self.frame,

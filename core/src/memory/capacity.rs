@@ -40,6 +40,15 @@ pub struct Capacity {
     pub object_blocks: usize,
     /// Pixels of crops that wait for their object's motion. The oldest crops go first, and are counted.
     pub crop_pixels: usize,
+    /// Width of the planner's window, cells, at most [`crate::planning::MAX_SIDE_CELLS`]; 0 makes none, and then it costs no byte. See
+    /// [`crate::planning`].
+    pub planning_width: usize,
+    /// Length of the planner's window, cells; as the width.
+    pub planning_length: usize,
+    /// Height of the planner's window, cells; as the width.
+    pub planning_height: usize,
+    /// Whether distances are kept for every cell of the window, and not for a slice of it alone.
+    pub planning_distance_3d: bool,
     /// Whether voxels have colour: 3,072 bytes a block with, 1,536 without.
     pub colour: bool,
 }
@@ -62,6 +71,10 @@ impl Capacity {
         objects: 2,
         object_blocks: 150,
         crop_pixels: 30_000,
+        planning_width: 0,
+        planning_length: 0,
+        planning_height: 0,
+        planning_distance_3d: false,
         colour: false,
     };
     /// Below 64 MiB: KITTI at half size.
@@ -81,6 +94,10 @@ impl Capacity {
         objects: 4,
         object_blocks: 700,
         crop_pixels: 150_000,
+        planning_width: 0,
+        planning_length: 0,
+        planning_height: 0,
+        planning_distance_3d: false,
         colour: false,
     };
     /// Below 256 MiB: KITTI at full size, in colour.
@@ -100,6 +117,10 @@ impl Capacity {
         objects: 8,
         object_blocks: 1_200,
         crop_pixels: 800_000,
+        planning_width: 0,
+        planning_length: 0,
+        planning_height: 0,
+        planning_distance_3d: false,
         colour: true,
     };
     /// Below 2 GiB: some hundred metres of road at full size, in colour.
@@ -119,6 +140,10 @@ impl Capacity {
         objects: 16,
         object_blocks: 4_000,
         crop_pixels: 4_000_000,
+        planning_width: 0,
+        planning_length: 0,
+        planning_height: 0,
+        planning_distance_3d: false,
         colour: true,
     };
 

@@ -7,6 +7,7 @@ use dynvox_core::egomotion::EgomotionConfig;
 use dynvox_core::egomotion::icp::IcpConfig;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::objects::ObjectsConfig;
+use dynvox_core::planning::PlanningConfig;
 use dynvox_core::rectify::{Rectification, self_calibration::RigConfig};
 use dynvox_core::scene_flow::SceneFlowConfig;
 use dynvox_core::stereo::StereoConfig;
@@ -35,6 +36,7 @@ pub struct Settings {
     volume: VolumeConfig,
     raycast: RaycastConfig,
     mesh: MeshConfig,
+    planning: PlanningConfig,
     /// The synthetic street; absent from the file of a run on other data.
     #[serde(skip_serializing_if = "Option::is_none")]
     street: Option<StreetConfig>,
@@ -84,6 +86,7 @@ impl Settings {
             volume,
             raycast,
             mesh,
+            planning,
             street: _,
         } = self;
         Config {
@@ -100,6 +103,7 @@ impl Settings {
             volume: *volume,
             raycast: *raycast,
             mesh: *mesh,
+            planning: *planning,
         }
     }
 

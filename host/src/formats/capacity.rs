@@ -28,6 +28,14 @@ struct CapacityDef {
     objects: usize,
     object_blocks: usize,
     crop_pixels: usize,
+    #[serde(default)]
+    planning_width: usize,
+    #[serde(default)]
+    planning_length: usize,
+    #[serde(default)]
+    planning_height: usize,
+    #[serde(default)]
+    planning_distance_3d: bool,
     colour: bool,
 }
 

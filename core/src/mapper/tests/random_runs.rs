@@ -28,6 +28,10 @@ const SMALL: Capacity = Capacity {
     objects: 2,
     object_blocks: 12,
     crop_pixels: 1_500,
+    planning_width: 24,
+    planning_length: 20,
+    planning_height: 10,
+    planning_distance_3d: true,
     colour: true,
 };
 const RIG: crate::geometry::StereoRig =

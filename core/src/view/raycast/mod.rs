@@ -30,6 +30,7 @@ mod surface;
 mod tests;
 
 pub use config::RaycastConfig;
+pub(crate) use signs::of_block as signs_of_block;
 
 use crate::{
     geometry::scalar::min_f32,

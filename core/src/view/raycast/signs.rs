@@ -9,14 +9,14 @@ use crate::volume::{
 use bytemuck::{Pod, Zeroable};
 
 /// One bit per lattice point or cell of a block, a word per layer.
-pub(super) type Layers = [u64; BLOCK_SIDE];
+pub(crate) type Layers = [u64; BLOCK_SIDE];
 
 /// The points of a layer with x = 0, and those with x = 0 to 6.
 const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
 const BUT_LAST_COLUMN: u64 = 0x7F7F_7F7F_7F7F_7F7F;
 
 /// The points seen before the surface and those seen at or behind it.
-pub(super) fn of_block(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS], min_weight: u8) -> [Layers; 2] {
+pub(crate) fn of_block(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS], min_weight: u8) -> [Layers; 2] {
     let mut signs = [[0; BLOCK_SIDE]; 2];
     let [before, behind] = &mut signs;
     let layers = sdf.as_chunks::<LAYER_VOXELS>().0.iter().zip(weight.as_chunks::<LAYER_VOXELS>().0);
