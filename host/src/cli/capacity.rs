@@ -2,6 +2,7 @@
 
 use crate::formats::CapacityFile;
 use anyhow::{Context, bail};
+use dynvox_core::planning::{MAX_SIDE_CELLS, Planning};
 use dynvox_core::rectify::Rectification;
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use std::path::{Path, PathBuf};
@@ -22,6 +23,13 @@ pub struct CapacityArgs {
     /// Bounds from a file, as `dynvox budget --memory 48MiB --image 752x480` prints them
     #[arg(long, value_name = "FILE")]
     capacity: Option<PathBuf>,
+    /// Make a map for planners around the camera and write it to planning/: cells to the sides, ahead and behind, and upwards, of
+    /// planning.cell_voxels voxels each: 200x200x20 is 40 x 40 x 4 m
+    #[arg(long, value_name = "CELLS", help_heading = "Results")]
+    planning: Option<WindowSize>,
+    /// Keep distances to obstacles for every cell of that window, and not for a slice of it alone
+    #[arg(long, requires = "planning", help_heading = "Results")]
+    planning_3d: bool,
 }
 
 impl CapacityArgs {
@@ -39,7 +47,7 @@ impl CapacityArgs {
         let with_raw = |capacity: Capacity| Capacity {
             raw_width: capacity.raw_width.max(raw_width),
             raw_height: capacity.raw_height.max(raw_height),
-            ..capacity
+            ..self.with_window(capacity)
         };
         if let Some(name) = &self.profile {
             let (name, capacity) = super::profile(name)?;
@@ -54,7 +62,22 @@ impl CapacityArgs {
             raw_image: [raw_width, raw_height],
             ..BudgetOptions::default()
         };
-        Ok((memory.to_string(), solve(memory, size, &options)?))
+        // A budget's 64 tracks have a box each in the window.
+        let images = Capacity { image_width: size.0, image_height: size.1, tracks: 64, ..Capacity::TINY };
+        let window = Planning::bytes(&self.with_window(images));
+        Ok((memory.to_string(), self.with_window(solve(Bytes(memory.0.saturating_sub(window)), size, &options)?)))
+    }
+
+    /// The bounds with the planner's window, where one is asked for.
+    fn with_window(&self, capacity: Capacity) -> Capacity {
+        let Some(WindowSize([planning_width, planning_length, planning_height])) = self.planning else { return capacity };
+        Capacity {
+            planning_width,
+            planning_length,
+            planning_height,
+            planning_distance_3d: self.planning_3d,
+            ..capacity
+        }
     }
 }
 
@@ -123,6 +146,23 @@ impl FromStr for ImageSize {
     }
 }
 
+/// Cells of a planner's window as `200x200x20`: width, length, height.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WindowSize(pub [usize; 3]);
+
+impl FromStr for WindowSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let sides: Result<Vec<usize>, _> = text.split(['x', 'X', '×']).map(str::parse).collect();
+        let within = |side: &usize| (1..=MAX_SIDE_CELLS).contains(side);
+        match sides.as_deref() {
+            Ok(&[width, length, height]) if [width, length, height].iter().all(within) => Ok(Self([width, length, height])),
+            _ => Err(format!("`{text}` is not a window: write 200x200x20, cells from 1 to {MAX_SIDE_CELLS} to the sides, ahead, upwards")),
+        }
+    }
+}
+
 /// A capacity as TOML, for `--capacity`.
 pub fn to_toml(capacity: &Capacity) -> anyhow::Result<String> {
     Ok(CapacityFile::of(capacity).to_toml()?)
@@ -160,6 +200,23 @@ mod tests {
         assert_eq!([Bytes(48 << 20), Bytes(3 << 30), Bytes(77)].map(|bytes| bytes.to_string()), ["48 MiB", "3 GiB", "77 bytes"]);
         assert_eq!("752x480".parse(), Ok(ImageSize(752, 480)));
         assert!("752".parse::<ImageSize>().is_err() && "x480".parse::<ImageSize>().is_err());
+        assert_eq!("200x100x20".parse(), Ok(WindowSize([200, 100, 20])));
+        assert!(["200x100", "0x1x1", "2000x1x1", "axbxc"].iter().all(|text| text.parse::<WindowSize>().is_err()));
+    }
+
+    #[test]
+    fn a_window_fits_into_the_budget_that_is_asked_for() {
+        let args = CapacityArgs {
+            planning: Some(WindowSize([200, 200, 20])),
+            planning_3d: true,
+            ..CapacityArgs::default()
+        };
+        let (_, with) = args.resolve((1_242, 375), None, 0.05).unwrap();
+        let (_, without) = CapacityArgs::default().resolve((1_242, 375), None, 0.05).unwrap();
+        assert!(with.bytes() <= 256 << 20 && with.blocks < without.blocks && with.planning_distance_3d);
+        let named = CapacityArgs { profile: Some("tiny".to_owned()), ..args };
+        let (_, tiny) = named.resolve((320, 96), None, 0.05).unwrap();
+        assert_eq!(tiny.bytes(), Capacity::TINY.bytes() + Planning::bytes(&tiny), "on top of named bounds");
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod instances;
 mod keyframes;
 mod objects;
 pub mod pictures;
+mod planning;
 mod recording;
 mod reference;
 pub mod tables;
@@ -33,6 +34,7 @@ pub use health::{HealthObserver, HealthSection};
 pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
+pub use planning::{PLANNING_FOLDER, PlanningObserver, write_folder as write_planning};
 pub use recording::{RECORDING_FILE, RecordingObserver};
 pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, ReferenceSection};
 pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
@@ -45,6 +47,7 @@ use crate::input::{FrameSource, InputError, StereoImages};
 use dynvox_core::geometry::Transform;
 use dynvox_core::memory::Region;
 use dynvox_core::objects::ObjectSummary;
+use dynvox_core::planning::PlanningReport;
 use dynvox_core::view::Raycaster;
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Capacity, Config, Mapper};
@@ -109,6 +112,9 @@ pub trait MapView<'s> {
 
     /// The same with every object in its place.
     fn raycast_with_objects(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>>;
+
+    /// Makes the planner's window, with moving objects where they will be so many seconds later.
+    fn plan(&mut self, ahead_s: f32) -> PlanningReport;
 }
 
 /// An object that left the mapper.
@@ -220,6 +226,7 @@ pub struct Observers {
     bounds: BoundsObserver,
     health: HealthObserver,
     instances: InstancesObserver,
+    planning: PlanningObserver,
 }
 
 /// What the observers found.
@@ -281,17 +288,20 @@ impl Observer for Observers {
         self.blocks.frame(setup, frame)?;
         self.bounds.frame(setup, frame)?;
         self.health.frame(setup, frame)?;
-        self.instances.frame(setup, frame)
+        self.instances.frame(setup, frame)?;
+        self.planning.frame(setup, frame)
     }
 
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         self.keyframes.end(setup, end)?;
         self.gallery.end(setup, end)?;
         self.recording.end(setup, end)?;
-        self.objects.end(setup, end)
+        self.objects.end(setup, end)?;
+        self.planning.end(setup, end)
     }
 
     fn finish(self, setup: &Setup<'_>, finished: &Finished) -> Result<Sections, ObserveError> {
+        self.planning.finish(setup, finished)?;
         Ok(Sections {
             trajectory: self.trajectory.finish(setup, finished)?,
             keyframes: self.keyframes.finish(setup, finished)?,

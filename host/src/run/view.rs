@@ -3,6 +3,7 @@
 use super::Threads;
 use crate::observe::{MapView, StageTime};
 use dynvox_core::geometry::Transform;
+use dynvox_core::planning::PlanningReport;
 use dynvox_core::view::Raycaster;
 use dynvox_core::{Mapper, Stage};
 
@@ -29,5 +30,9 @@ impl<'s> MapView<'s> for LiveMap<'_, 's> {
     fn raycast_with_objects(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>> {
         let (mapper, threads) = (&mut *self.mapper, self.threads);
         threads.run(|| mapper.raycast_composed(t_world_camera, threads)).ok()
+    }
+
+    fn plan(&mut self, ahead_s: f32) -> PlanningReport {
+        self.mapper.plan(ahead_s)
     }
 }

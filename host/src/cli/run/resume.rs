@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 43] = [
+pub const FIXED_ARGUMENTS: [&str; 45] = [
     "path",
     "sequence",
     "dataset",
@@ -24,6 +24,8 @@ pub const FIXED_ARGUMENTS: [&str; 43] = [
     "profile",
     "memory",
     "capacity",
+    "planning",
+    "planning_3d",
     "start",
     "frames",
     "stride",

@@ -1,0 +1,272 @@
+//! The planner's window after the last frame, as files: a map for Nav2, heights, distances, a picture of them.
+
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup};
+use dynvox_core::planning::{Cell, CellState, MovingBox, Planning, PlanningReport};
+use image::{ImageBuffer, Luma, Rgb, RgbImage};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Folder of the window in the run folder.
+pub const PLANNING_FOLDER: &str = "planning";
+
+/// Nav2's grey levels of a map in trinary mode.
+const FREE_GREY: u8 = 254;
+const OCCUPIED_GREY: u8 = 0;
+const UNKNOWN_GREY: u8 = 205;
+/// What stands for a distance of 0 in `distance.png`, whose values are centimetres.
+const DISTANCE_ZERO: f32 = 32_768.0;
+
+/// Writes the window after the last frame, with what moves in it; of a stream, whose last frame is known too late, without.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct PlanningObserver {
+    written: bool,
+}
+
+/// What the files' numbers mean.
+#[derive(Clone, Debug, Serialize)]
+struct Description {
+    /// Number of the frame, and its camera's place in the window's axes: m to the right, ahead, upwards.
+    frame: usize,
+    camera_m: [f64; 3],
+    /// Cells along each side, their side, and where the first one begins.
+    cells: [usize; 3],
+    cell_m: f64,
+    origin_m: [f64; 3],
+    /// The world's coordinates of the window's axes' origin and of a metre along each of them.
+    right_world: [f64; 3],
+    ahead_world: [f64; 3],
+    up_world: [f64; 3],
+    /// Height of the value 0 of `height.png`, m, and its unit; 65,535 is no ground.
+    height_zero_m: f64,
+    height_unit_m: f64,
+    /// The value of `distance.png` that is a distance of 0, and its unit; 0 is no distance.
+    distance_zero: u16,
+    distance_unit_m: f64,
+    report: PlanningReport,
+    boxes: Vec<BoxDescription>,
+}
+
+/// A moving object.
+#[derive(Clone, Debug, Serialize)]
+struct BoxDescription {
+    track: u32,
+    center_m: [f32; 3],
+    half_m: [f32; 3],
+    heading: [f32; 2],
+    velocity_m_s: [f32; 2],
+    sigma_m: f32,
+    sigma_m_s: f32,
+}
+
+impl From<&MovingBox> for BoxDescription {
+    fn from(of: &MovingBox) -> Self {
+        let &MovingBox {
+            id: track,
+            unseen_frames: _,
+            center_m,
+            half_m,
+            heading,
+            velocity_m_s,
+            sigma_m,
+            sigma_m_s,
+        } = of;
+        Self { track, center_m, half_m, heading, velocity_m_s, sigma_m, sigma_m_s }
+    }
+}
+
+impl Observer for PlanningObserver {
+    type Section = ();
+
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        if setup.frames == Some(frame.position + 1) {
+            self.write(setup, frame.row.frame, frame.view)?;
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+        match end.last {
+            Some(last) if !self.written => self.write(setup, last.frame, end.view),
+            _ => Ok(()),
+        }
+    }
+
+    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<(), ObserveError> {
+        Ok(())
+    }
+}
+
+impl PlanningObserver {
+    fn write(&mut self, setup: &Setup<'_>, frame: usize, view: &mut dyn super::MapView<'_>) -> Result<(), ObserveError> {
+        if view.mapper().planning().is_empty() {
+            return Ok(());
+        }
+        let report = view.plan(0.0);
+        let camera = view.mapper().t_world_camera().translation_m;
+        write_folder(&setup.folder.join(PLANNING_FOLDER), frame, camera, report, view.mapper().planning())?;
+        self.written = true;
+        Ok(())
+    }
+}
+
+/// Writes all files of a window.
+///
+/// # Errors
+/// The disk refuses.
+pub fn write_folder(
+    folder: &Path,
+    frame: usize,
+    camera_world: [f64; 3],
+    report: PlanningReport,
+    planning: &Planning<'_>,
+) -> Result<(), ObserveError> {
+    std::fs::create_dir_all(folder).map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
+    let write = |name: &str, bytes: &[u8]| {
+        let path: PathBuf = folder.join(name);
+        std::fs::write(&path, bytes).map_err(|source| ObserveError::Write { path, source })
+    };
+    let columns = Columns { planning };
+    let description = describe(&columns, frame, camera_world, report);
+    write("map.pgm", &columns.pgm())?;
+    write("map.yaml", columns.yaml().as_bytes())?;
+    write("height.png", &png(columns.heights(&description)))?;
+    write("distance.png", &png(columns.distances()))?;
+    write("window.png", &png(columns.picture(&description)))?;
+    write("window.json", &serde_json::to_vec_pretty(&description).unwrap_or_default())
+}
+
+fn describe(columns: &Columns<'_, '_>, frame: usize, camera_world: [f64; 3], report: PlanningReport) -> Description {
+    let planning = columns.planning;
+    let grid = planning.grid();
+    let cell_m = grid.cell_m();
+    let axis = |unit: [f64; 3]| grid.to_world(unit.map(|c| c / cell_m));
+    let heights = columns.all().filter_map(|cell| planning.column(cell)?.ground_m()).map(f64::from);
+    let lowest = heights.fold(f64::INFINITY, f64::min);
+    Description {
+        frame,
+        camera_m: grid.of_world(camera_world).map(|c| c * cell_m),
+        cells: planning.size(),
+        cell_m,
+        origin_m: planning.origin().map(|c| f64::from(c) * cell_m),
+        right_world: axis([1.0, 0.0, 0.0]),
+        ahead_world: axis([0.0, 1.0, 0.0]),
+        up_world: axis([0.0, 0.0, 1.0]),
+        height_zero_m: if lowest.is_finite() { lowest } else { 0.0 },
+        height_unit_m: 0.001,
+        distance_zero: DISTANCE_ZERO as u16,
+        distance_unit_m: 0.01,
+        report,
+        boxes: planning.boxes().iter().map(BoxDescription::from).collect(),
+    }
+}
+
+/// The window from above: rows from the farthest ahead to the nearest, as maps are drawn.
+struct Columns<'p, 's> {
+    planning: &'p Planning<'s>,
+}
+
+impl Columns<'_, '_> {
+    fn size(&self) -> (u32, u32) {
+        let [width, length, _] = self.planning.size();
+        (width as u32, length as u32)
+    }
+
+    /// The column at a picture's pixel.
+    fn at(&self, u: u32, v: u32) -> Cell {
+        let [x, y, z] = self.planning.origin();
+        [x + u as i32, y + (self.size().1 - 1 - v) as i32, z]
+    }
+
+    fn all(&self) -> impl Iterator<Item = Cell> {
+        let (width, length) = self.size();
+        (0..length).flat_map(move |v| (0..width).map(move |u| self.at(u, v)))
+    }
+
+    /// The slice as a binary PGM.
+    fn pgm(&self) -> Vec<u8> {
+        let (width, length) = self.size();
+        let mut bytes = format!("P5\n{width} {length}\n255\n").into_bytes();
+        bytes.extend(self.all().map(|cell| match self.planning.slice_state(cell) {
+            CellState::Free => FREE_GREY,
+            CellState::Occupied => OCCUPIED_GREY,
+            _ => UNKNOWN_GREY,
+        }));
+        bytes
+    }
+
+    /// What Nav2's map server reads beside it.
+    fn yaml(&self) -> String {
+        let (cell_m, [x, y, _]) = (self.planning.grid().cell_m(), self.planning.origin());
+        let [x, y] = [x, y].map(|c| f64::from(c) * cell_m);
+        format!(
+            "image: map.pgm\nmode: trinary\nresolution: {cell_m}\norigin: [{x}, {y}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+        )
+    }
+
+    /// Heights of the ground in millimetres above the lowest.
+    fn heights(&self, description: &Description) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+        let (width, length) = self.size();
+        ImageBuffer::from_fn(width, length, |u, v| {
+            let height_m = self.planning.column(self.at(u, v)).and_then(|column| column.ground_m()).map(f64::from);
+            let value = height_m.map(|height_m| (height_m - description.height_zero_m) / description.height_unit_m);
+            Luma([value.map_or(u16::MAX, |value| (value + 0.5).min(65_534.0) as u16)])
+        })
+    }
+
+    /// Distances in centimetres around [`DISTANCE_ZERO`].
+    fn distances(&self) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+        let (width, length) = self.size();
+        ImageBuffer::from_fn(width, length, |u, v| {
+            let distance = self.planning.slice_distance(self.at(u, v));
+            Luma([distance.map_or(0, |distance| (DISTANCE_ZERO + 0.5 + 100.0 * distance.distance_m).clamp(1.0, 65_535.0) as u16)])
+        })
+    }
+
+    /// For people: free ground by height, steps in orange, obstacles black, moving objects red, unknown grey, the camera blue.
+    fn picture(&self, description: &Description) -> RgbImage {
+        let (width, length) = self.size();
+        let [camera_x, camera_y, _] = description.camera_m.map(|c| (c / description.cell_m).floor() as i32);
+        let boxes = |cell: Cell| self.planning.boxes().iter().any(|moving| covers(moving, cell, description.cell_m as f32));
+        RgbImage::from_fn(width, length, |u, v| {
+            let cell = self.at(u, v);
+            let column = self.planning.column(cell).unwrap_or_default();
+            if (cell[0] - camera_x).abs() <= 1 && (cell[1] - camera_y).abs() <= 1 {
+                return Rgb([40, 90, 255]);
+            }
+            if boxes(cell) {
+                return Rgb([220, 40, 40]);
+            }
+            match self.planning.slice_state(cell) {
+                CellState::Occupied => Rgb([0, 0, 0]),
+                CellState::Unknown => Rgb([128, 128, 128]),
+                CellState::Free => match column.ground_m() {
+                    _ if column.step_m > 0.06 => Rgb([255, 160, 40]),
+                    Some(height_m) => {
+                        let above = ((f64::from(height_m) - description.height_zero_m) * 128.0).clamp(0.0, 155.0) as u8;
+                        Rgb([100 + above, 230, 100])
+                    }
+                    None => Rgb([235, 235, 235]),
+                },
+            }
+        })
+    }
+}
+
+/// Whether a box stands over the middle of a column.
+fn covers(moving: &MovingBox, [x, y, _]: Cell, cell_m: f32) -> bool {
+    let [dx, dy] = [(x as f32 + 0.5) * cell_m - moving.center_m[0], (y as f32 + 0.5) * cell_m - moving.center_m[1]];
+    let [cos, sin] = moving.heading;
+    (cos * dx + sin * dy).abs() <= moving.half_m[0] && (cos * dy - sin * dx).abs() <= moving.half_m[1]
+}
+
+/// A picture as a PNG file.
+fn png<P>(picture: ImageBuffer<P, Vec<P::Subpixel>>) -> Vec<u8>
+where
+    P: image::Pixel + image::PixelWithColorType,
+    [P::Subpixel]: image::EncodableLayout,
+{
+    let mut bytes = Vec::new();
+    // Writing to memory cannot fail for a picture with pixels.
+    let written = picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png);
+    if written.is_ok() { bytes } else { Vec::new() }
+}
