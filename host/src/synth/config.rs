@@ -28,6 +28,8 @@ pub struct StreetConfig {
     pub speed_m_s: f64,
     /// Whether the street bends; straight on otherwise.
     pub curvature: bool,
+    /// Steepest rise of the street, rise over run, 0 to 0.3: it goes up and down once in 60 m; 0 is level.
+    pub hills: f64,
     /// Scale of the camera's pitch, roll and bounce; 0 is a rail.
     pub shake: f64,
     /// Noise of one colour channel at mid grey, grey levels (1 sigma): half the variance is read noise, half shot noise; 0 is off.
@@ -59,6 +61,7 @@ impl Default for StreetConfig {
             camera_height_m: 1.65,
             speed_m_s: 9.0,
             curvature: true,
+            hills: 0.0,
             shake: 1.0,
             noise_sigma: 1.6,
             gain_difference: 0.03,
@@ -92,6 +95,7 @@ impl StreetConfig {
         ];
         let held = [
             ("speed_m_s", self.speed_m_s, 0.0, 60.0),
+            ("hills", self.hills, 0.0, 0.3),
             ("shake", self.shake, 0.0, 5.0),
             ("noise_sigma", self.noise_sigma, 0.0, 50.0),
             ("gain_difference", self.gain_difference, -0.5, 0.5),

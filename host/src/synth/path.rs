@@ -14,6 +14,9 @@ use super::random::Rng;
 /// Length of one segment of street, m: what is generated, cached and dropped together.
 pub const SEGMENT_M: f64 = 24.0;
 
+/// Length of a hill and the valley behind it, m.
+const HILL_M: f64 = 60.0;
+
 const TURN: f64 = 2.0 * core::f64::consts::PI;
 const AMPLITUDE_RAD: [f64; 2] = [0.42, 0.15];
 const WAVELENGTH_M: [f64; 2] = [330.0, 141.0];
@@ -31,6 +34,8 @@ const GAUSS: [(f64, f64); 5] = [
 pub struct Centerline {
     amplitude_rad: [f64; 2],
     phase_rad: [f64; 2],
+    /// Steepest rise; 0 is level.
+    hills: f64,
     /// A segment already walked to and its start: driving on costs nothing more. The sum is the same from there as from the start.
     walked: Mutex<(i64, Vector3<f64>)>,
 }
@@ -43,6 +48,7 @@ impl Centerline {
         Self {
             amplitude_rad,
             phase_rad: [TURN * rng.unit(), TURN * rng.unit()],
+            hills: config.hills,
             walked: Mutex::default(),
         }
     }
@@ -54,6 +60,12 @@ impl Centerline {
             self.amplitude_rad[k] * (libm::sin(TURN * s_m / WAVELENGTH_M[k] + phase) - libm::sin(phase))
         };
         if self.amplitude_rad[0] == 0.0 { 0.0 } else { wave(0) + wave(1) }
+    }
+
+    /// Height of the road over the street's start, m, and its rise: 0 both at the start.
+    pub fn height(&self, s_m: f64) -> (f64, f64) {
+        let phase = TURN * s_m / HILL_M;
+        (self.hills * HILL_M / TURN * (1.0 - libm::cos(phase)), self.hills * libm::sin(phase))
     }
 
     fn advance(&self, from_m: f64, to_m: f64) -> Vector3<f64> {
@@ -114,6 +126,13 @@ impl RoadSpan<'_> {
         let right = Vector3::new(libm::cos(heading), 0.0, -libm::sin(heading));
         let mut pose = Transform::new(Vector3::new(0.0, heading + yaw_rad, 0.0), Vector3::zeros());
         pose.translation_m = (self.point(s_m) + right * lateral_m).into();
+        if self.centerline.hills != 0.0 {
+            let (height_m, rise) = self.centerline.height(s_m);
+            let rotation = |x: f64, y: f64| Transform::new(Vector3::new(x, y, 0.0), Vector3::zeros());
+            let tilted = rotation(0.0, heading) * rotation(libm::atan(rise), 0.0) * rotation(0.0, yaw_rad);
+            pose.rotation = tilted.rotation;
+            pose.translation_m[1] -= height_m;
+        }
         pose
     }
 }
@@ -121,6 +140,25 @@ impl RoadSpan<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn hills_rise_as_steeply_as_they_say_and_frames_lie_on_them() {
+        let config = StreetConfig { hills: 0.2, ..StreetConfig::default() };
+        let centerline = Centerline::new(&config);
+        let span = centerline.span(0, 4);
+        let mut steepest = 0.0f64;
+        for step in 0..800 {
+            let s = f64::from(step) * 0.1;
+            let (low, high) = (centerline.height(s), centerline.height(s + 0.01));
+            assert!(((high.0 - low.0) / 0.01 - low.1).abs() < 1e-3);
+            steepest = steepest.max(low.1);
+            let pose = span.t_street_local(s, 0.0, 0.0);
+            assert!((pose.translation_m[1] + low.0).abs() < 1e-9);
+            let ahead = pose.rotate(Vector3::z());
+            assert!((ahead.y + libm::sin(libm::atan(low.1))).abs() < 1e-9, "the frame looks along the road");
+        }
+        assert!((steepest - 0.2).abs() < 1e-3);
+    }
 
     #[test]
     fn the_line_is_smooth_across_pieces_and_as_long_as_it_says() {
