@@ -9,14 +9,24 @@ use dynvox_core::{
     digest::Digest,
     image::View,
     objects::{ObjectSink, RetiredObject},
+    planning::Sweep,
     view::Raycaster,
     volume::{BlockStore, EvictedBlock, LoadedBlock, ObservationWeight},
 };
 
 /// Frames taken.
 const FRAMES: usize = 6;
-/// So few blocks that some must leave, and with colour.
-const CAPACITY: Capacity = Capacity { blocks: 600, visible_blocks: 600, colour: true, ..fixture::CAPACITY };
+/// So few blocks that some must leave, with colour and a window for planners.
+const CAPACITY: Capacity = Capacity {
+    blocks: 600,
+    visible_blocks: 600,
+    planning_width: 40,
+    planning_length: 60,
+    planning_height: 12,
+    planning_distance_3d: true,
+    colour: true,
+    ..fixture::CAPACITY
+};
 /// Bytes of slab for the fixture and for this.
 pub const SLAB_BYTES: usize = if CAPACITY.bytes() > fixture::CAPACITY.bytes() { CAPACITY.bytes() } else { fixture::CAPACITY.bytes() };
 const PIXELS: usize = CAPACITY.pixels();
@@ -83,6 +93,7 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
     hash_view(mapper.raycast(&pose, &Serial).ok());
     hash_view(mapper.raycast_composed(&pose, &Serial).ok());
     hash_view(mapper.raycast_object(black_box(1), &pose, &Serial).ok());
+    plan(mapper, &mut digest);
     let triangles = mapper.triangles(&mut |triangle| {
         triangle.vertices.iter().flat_map(|vertex| vertex.position_m).for_each(|x| digest.f64(f64::from(x)));
     });
@@ -94,4 +105,22 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
     digest.u64(blocks.0.finish());
     digest.u64(objects.0.finish());
     digest.finish()
+}
+
+/// The maps for planners: the window now and later, distances, a ray and a path.
+#[inline(never)]
+fn plan(mapper: &mut Mapper<'_>, digest: &mut Digest) {
+    digest.u64(u64::from(mapper.plan(black_box(0.0)).occupied));
+    digest.u64(mapper.planning().digest());
+    digest.u64(u64::from(mapper.plan_ahead(black_box(0.5)).obstacles));
+    let (planning, volume) = (mapper.planning(), mapper.background());
+    digest.u64(planning.digest());
+    let camera = mapper.t_world_camera().translation_m;
+    let ahead = [camera[0], camera[1], camera[2] + 10.0];
+    digest.f64(planning.ray(volume, black_box(camera), [0.0, 0.1, 1.0], 20.0).free_m);
+    let robot = Sweep { radius_m: 0.4, low_m: -1.0, high_m: 0.5, unknown_ends: true };
+    digest.f64(planning.sweep(volume, black_box(&[camera, ahead]), &robot).free_m);
+    let cell = planning.origin();
+    let gradients = [planning.slice_gradient(cell).map(|[x, y]| [x, y, 0.0]), planning.cell_gradient(cell)];
+    gradients.into_iter().flatten().flatten().for_each(|slope| digest.f64(f64::from(slope)));
 }
