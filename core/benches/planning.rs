@@ -99,8 +99,9 @@ fn windows(criterion: &mut Criterion) {
             t_world_camera,
             disparity_q8: View::new(&disparity_q8, WIDTH, HEIGHT).unwrap(),
         };
-        for n in 0..12 {
-            let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: pose(n) };
+        let poses: Vec<Transform> = (0..12).map(pose).collect();
+        for n in 0..poses.len() {
+            let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: poses[n] };
             let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
             volume.allocate(&view, depth_m, &mut NoStore, &Serial);
             let seen = Observation {
@@ -110,9 +111,9 @@ fn windows(criterion: &mut Criterion) {
                 class: None,
             };
             volume.fuse(&view, seen, &Serial);
-            planning.observe(&sight(&pose(n)));
+            planning.observe(&sight(&poses[n]));
         }
-        measure(criterion, &capacity, (&mut planning, &volume), &sight(&pose(11)));
+        measure(criterion, &capacity, (&mut planning, &volume), &sight(&poses[11]));
     }
 }
 

@@ -97,6 +97,16 @@ typedef enum {
   DYNVOX_MOTION_STATE_DYNAMIC,
 } DynvoxMotionState;
 
+// How a ray or a path ends.
+typedef enum {
+  // It is free as far as was asked.
+  DYNVOX_WAY_END_FREE = 0,
+  // At a surface of the map.
+  DYNVOX_WAY_END_SURFACE,
+  // Where nothing was ever seen.
+  DYNVOX_WAY_END_UNKNOWN,
+} DynvoxWayEnd;
+
 // A mapper; only ever behind a pointer.
 typedef struct DynvoxMapper DynvoxMapper;
 
@@ -196,6 +206,14 @@ typedef struct {
   size_t object_blocks;
   // Pixels of crops that wait for their object's motion.
   size_t crop_pixels;
+  // Width of the planner's window, cells, at most 1,024; 0 makes none, and then it costs no byte.
+  size_t planning_width;
+  // Length of the planner's window, cells.
+  size_t planning_length;
+  // Height of the planner's window, cells.
+  size_t planning_height;
+  // Whether distances are kept for every cell of the window, and not for a slice alone: 0 or 1.
+  uint8_t planning_distance_3d;
   // Whether voxels have colour: 0 or 1.
   uint8_t colour;
 } DynvoxCapacity;
@@ -463,6 +481,75 @@ typedef struct {
   uint32_t blocks;
 } DynvoxTrack;
 
+// The planner's window from above: buffers of the caller, any may be null. Columns are in rows from the nearest ahead to the farthest, in
+// each row from left to right; cells of a column follow each other upwards.
+typedef struct {
+  // Columns that each buffer of columns holds, unless it is null.
+  size_t columns_capacity;
+  // Cells that `cells` holds, unless it is null.
+  size_t cells_capacity;
+  // Of each column between the configured heights: 0 unknown, 1 free, 2 occupied.
+  uint8_t *state;
+  // Distance to the nearest obstacle, m, below 0 inside one; the largest float without an obstacle.
+  float *distance_m;
+  // Height of the ground, m; the largest float where none was found.
+  float *height_m;
+  // Rise over run of the ground; the largest float where it is not known.
+  float *slope;
+  // Height of the step through the column, m.
+  float *step_m;
+  // Of each cell: 0 unknown, 1 free, 2 occupied.
+  uint8_t *cells;
+  // Written: cells to the right, ahead and upwards.
+  size_t size[3];
+  // Written: a cell's side, m.
+  double cell_m;
+  // Written: where the first cell begins, m to the right, ahead and upwards of the world's origin.
+  double origin_m[3];
+  // Written: the world's coordinates of a metre to the right, ahead and upwards, in this order.
+  double axes_world[3][3];
+} DynvoxWindow;
+
+// A moving object in the window's axes: to the right, ahead, upwards of the world's origin.
+typedef struct {
+  // Number of its track.
+  uint32_t id;
+  // Frames since it was last seen.
+  uint32_t unseen_frames;
+  // Centre, m.
+  float center_m[3];
+  // Half its sides, m: along its heading, across it, upwards.
+  float half_m[3];
+  // Heading, a unit vector: right, ahead.
+  float heading[2];
+  // Velocity, m/s: right, ahead.
+  float velocity_m_s[2];
+  // Error of the centre, one sigma, m.
+  float sigma_m;
+  // Error of the velocity, one sigma, m/s.
+  float sigma_m_s;
+} DynvoxMovingBox;
+
+// How far a way is free.
+typedef struct {
+  // What it ends at.
+  DynvoxWayEnd end;
+  // The length of its free part, m.
+  double free_m;
+} DynvoxWay;
+
+// A robot that moves along a path: an upright cylinder.
+typedef struct {
+  // Its radius, m.
+  double radius_m;
+  // From this height over the path, m, on surfaces are in its way.
+  double low_m;
+  // Up to this one.
+  double high_m;
+  // Whether what was never seen is in its way as well: 0 or 1.
+  uint8_t unknown_ends;
+} DynvoxRobot;
+
 // Takes the next bytes of a snapshot; false when it cannot. Must not call the same mapper.
 typedef bool (*DynvoxWrite)(void *context, const uint8_t *bytes, size_t len);
 
@@ -668,6 +755,50 @@ DynvoxStatus dynvox_object_triangles(DynvoxMapper *mapper,
                                      DynvoxTriangleSink sink,
                                      void *context,
                                      uint64_t *count);
+
+// Reads the map into the planner's window, with moving objects where they will be `ahead_s` seconds after the last frame, and copies it
+// to `window`. Of a capacity without a window its size is 0.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `window` is null or points to a
+// window whose buffers are as large as it says and overlap nothing.
+DynvoxStatus dynvox_plan(DynvoxMapper *mapper,
+                         float ahead_s,
+                         DynvoxWindow *window);
+
+// Writes the moving objects of the last dynvox_plan, where they were in the last frame, at most `capacity` of them, and to `count` how many
+// there are.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `boxes` is null or points to
+// `capacity` boxes, `count` is null or points to a number.
+DynvoxStatus dynvox_moving_boxes(DynvoxMapper *mapper,
+                                 DynvoxMovingBox *boxes,
+                                 size_t capacity,
+                                 size_t *count);
+
+// Follows a ray of the world from `origin_m` in `direction` (three numbers each, the direction of any length), at most `far_m`, to the
+// first surface or unknown place.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `origin_m` and `direction` are null
+// or point to three numbers, `way` is null or points to a way.
+DynvoxStatus dynvox_ray(DynvoxMapper *mapper,
+                        const double *origin_m,
+                        const double *direction,
+                        double far_m,
+                        DynvoxWay *way);
+
+// How far a robot may follow a polyline of `count` world points on the ground, three numbers each, before it touches a surface.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `points_m` is null or points to
+// three times `count` numbers, `robot` is null or points to a robot, `way` is null or points to a way.
+DynvoxStatus dynvox_sweep(DynvoxMapper *mapper,
+                          const double *points_m,
+                          size_t count,
+                          const DynvoxRobot *robot,
+                          DynvoxWay *way);
 
 // Writes all defaults for raw cameras, whose pairs the mapper rectifies: frames then have the size of the raw images, and the capacity's
 // `raw_width` and `raw_height` bound it. The rectified rig is in the configuration. DYNVOX_STATUS_CONFIG where the calibration cannot be used.
