@@ -2,16 +2,18 @@
 
 use super::{Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
 use crate::evaluate::reference::{
-    DepthErrors, EvaluatedFrame, Field, PendingFrame, PendingFrames, ProjectedScan, ReferenceFigures, Region, project_scan,
-    sample_exact_depth,
+    DepthErrors, EvaluatedFrame, Field, PendingFrame, PendingFrames, PointOutcomes, ProjectedScan, ReferenceFigures, Region, Sample,
+    project_scan, sample_exact_depth,
 };
 use crate::formats::Image;
 use crate::input::InstanceMask;
 use crate::input::{FrameSource, StereoImages};
 use dynvox_core::Mapper;
+use dynvox_core::geometry::StereoRig;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::{InstanceAt, MotionState, Treatment};
+use dynvox_core::view::NORMAL_ONE;
 use serde::{Deserialize, Serialize};
 
 /// Frames whose errors are drawn at most.
@@ -98,6 +100,8 @@ pub struct ReferenceSection {
     pub figures: Option<ReferenceFigures>,
     /// Frame by frame.
     pub frames: Vec<EvaluatedFrame>,
+    /// What became of each point of the static map.
+    pub outcomes: Vec<PointOutcomes>,
     /// Pictures of some.
     pub pictures: Vec<ErrorPictures>,
 }
@@ -107,6 +111,8 @@ pub struct ReferenceSection {
 pub struct ReferenceObserver {
     frames: Vec<EvaluatedFrame>,
     depth_errors: DepthErrors,
+    #[serde(default)]
+    outcomes: Vec<PointOutcomes>,
     pictures: Vec<ErrorPictures>,
     /// Empty after every frame unless there is a delay, and a run with a delay has no checkpoints.
     #[serde(skip)]
@@ -125,8 +131,8 @@ impl Observer for ReferenceObserver {
             0 => frame.view.raycast_with_objects(&due.t_world_camera),
             _ => frame.view.raycast(&due.t_world_camera),
         };
-        if let Some(depth_m) = seen.and_then(|seen| seen.depth_m()) {
-            self.compare(setup, &due, &depth_m);
+        if let Some((depth_m, normal)) = seen.and_then(|seen| Some((seen.depth_m()?, seen.normal()?))) {
+            self.compare(setup, &due, &depth_m, &normal);
         }
         Ok(())
     }
@@ -135,6 +141,7 @@ impl Observer for ReferenceObserver {
         Ok(setup.reference.as_ref().map(|plan| ReferenceSection {
             figures: ReferenceFigures::of(plan.reference.name(), plan.delay, &self.frames, self.depth_errors.figures()),
             frames: self.frames,
+            outcomes: self.outcomes,
             pictures: self.pictures,
         }))
     }
@@ -142,16 +149,18 @@ impl Observer for ReferenceObserver {
 
 impl ReferenceObserver {
     /// Compares a frame that is due with a view of the map from its pose.
-    fn compare(&mut self, setup: &Setup<'_>, due: &PendingFrame, map_depth_m: &View<'_, f32>) {
-        let focal_baseline_px_m = setup.config.rig.focal_baseline_px_m();
+    fn compare(&mut self, setup: &Setup<'_>, due: &PendingFrame, map_depth_m: &View<'_, f32>, normal: &View<'_, [i8; 3]>) {
+        let rig = &setup.config.rig;
+        let focal_baseline_px_m = rig.focal_baseline_px_m();
         let (size, full_size) = (setup.dataset.size(), setup.dataset.full_size());
         let enlarged = (full_size.0 as f64 / size.0 as f64) as f32;
         let (evaluated, shown_px) = due.compare(map_depth_m, focal_baseline_px_m, enlarged);
         self.frames.push(evaluated);
+        self.outcomes.push(PointOutcomes::of(due, &shown_px, enlarged));
         let depth_m = |px: f32| focal_baseline_px_m / f64::from(px);
         for (sample, &shown_px) in due.samples.iter().zip(&shown_px).filter(|(sample, _)| sample.region == Region::Static) {
             if shown_px > 0.0 {
-                self.depth_errors.add(depth_m(shown_px), depth_m(sample.point.disparity_px));
+                self.depth_errors.add(depth_m(shown_px), depth_m(sample.point.disparity_px), along_normal(rig, normal, sample));
             }
         }
         if let Some(picture) = due.picture.as_ref().and_then(|picture| picture.view()) {
@@ -163,6 +172,13 @@ impl ReferenceObserver {
             });
         }
     }
+}
+
+/// Length of a sample's ray of depth 1 along the normal that the map shows there; `None` where it shows none.
+fn along_normal(rig: &StereoRig, normal: &View<'_, [i8; 3]>, sample: &Sample) -> Option<f64> {
+    let [x, y, z] = normal.get(sample.point.u.into(), sample.point.v.into())?.map(|n| f64::from(n) / f64::from(NORMAL_ONE));
+    let ray = [f64::from(sample.point.u) - rig.center_u_px, f64::from(sample.point.v) - rig.center_v_px].map(|px| px / rig.focal_px);
+    ([x, y, z] != [0.0; 3]).then(|| x * ray[0] + y * ray[1] + z)
 }
 
 /// The points of a frame, with their regions and what the input measured there; `None` without a reference.

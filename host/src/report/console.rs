@@ -68,12 +68,15 @@ fn reference_lines(figures: &ReferenceFigures) -> Vec<(&'static str, String)> {
         (label, format!("against {name} ({}): input {input}; map {map}", figures.rule))
     };
     let mut lines = vec![line("static map", &figures.still)];
-    if figures.dynamic.frames > 0 {
-        lines.push(line("objects", &figures.dynamic));
+    lines.extend(figures.dynamic.iter().filter(|of| of.frames > 0).map(|of| line("objects", of)));
+    if let [Some(input), Some(map)] = [&figures.still.input, &figures.still.fused].map(|of| of.accuracy_alone) {
+        lines.push(("", format!("of all that each shows: input {:.1} %, map {:.1} % accurate", 100.0 * input, 100.0 * map)));
     }
     if let Some(depth) = figures.map_depth_error {
         let (error_cm, depth_m) = (100.0 * depth.median_error_m, depth.median_depth_m);
-        lines.push(("", format!("median depth error of the static map {error_cm:.1} cm at {depth_m:.1} m")));
+        let surface =
+            depth.median_surface_m.map_or_else(String::new, |surface_m| format!("; {:.1} cm from its surface", 100.0 * surface_m));
+        lines.push(("", format!("median depth error of the static map {error_cm:.1} cm at {depth_m:.1} m{surface}")));
     }
     lines
 }

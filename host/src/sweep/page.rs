@@ -1,9 +1,11 @@
 //! The page: every sweep, on every data set, next to the original's numbers. One file, nothing fetched, no script.
 
 use super::figures;
+use super::table::common_accuracy;
 use super::{Kind, Plan, Point, Results, RunResult, published};
 use crate::report::html::page;
 use maud::{Markup, html};
+use std::collections::BTreeMap;
 
 /// A point of a sweep and the result of its run, once there is one.
 pub(super) type Row<'r> = (&'r Point, Option<&'r RunResult>);
@@ -16,7 +18,8 @@ pub fn html(plan: &Plan, results: &Results) -> Markup {
         p.soft {
             (done) " of " (plan.runs.len()) " runs are finished. dynvox " (env!("CARGO_PKG_VERSION")) ". Boxes: quartiles and median over evaluated "
             "frames, whiskers to the last frame within 1.5 box heights. Accuracy is measured at the points that both input and map show: a lost "
-            "map shows few. Dashed lines: the original's published numbers, on other data; compare shapes, not values."
+            "map shows few. \"Map alone\" is of all points the map shows, \"common points\" of those that the maps of all rows show: only these tell one row "
+            "from another, for a map that drops what is hard looks more accurate. Dashed lines: the original's published numbers, on other data; compare shapes, not values."
         }
         @for kind in plan.kinds() {
             section {
@@ -25,7 +28,7 @@ pub fn html(plan: &Plan, results: &Results) -> Markup {
                     @let rows: Vec<Row<'_>> = plan.of(kind, data).map(|point| (point, results.get(&point.run))).collect();
                     h3.apart { (data) " " span.soft.small { (evaluated_against(&rows)) } }
                     (figures::figures(kind, &rows))
-                    (table(kind, &rows))
+                    (table(kind, &rows, &common_accuracy(plan, kind, data, results)))
                 }
                 (originals(kind))
             }
@@ -60,13 +63,15 @@ fn evaluated_against(rows: &[Row<'_>]) -> String {
 }
 
 /// Every value with what was measured.
-fn table(kind: Kind, rows: &[Row<'_>]) -> Markup {
+fn table(kind: Kind, rows: &[Row<'_>], common: &BTreeMap<String, (f64, u64)>) -> Markup {
     let numbers = [
         "input accuracy",
         "input compl.",
         "map accuracy",
         "map compl.",
         "map F1",
+        "map alone",
+        "map, common points",
         "objects: input",
         "objects: map",
         "blocks",
@@ -80,7 +85,7 @@ fn table(kind: Kind, rows: &[Row<'_>]) -> Markup {
                 tr {
                     td { (point.value) }
                     td { (tracking(*result)) }
-                    @for cell in cells(*result) { td.n { (cell) } }
+                    @for cell in cells(*result, common.get(&point.run)) { td.n { (cell) } }
                 }
             }
         } }
@@ -95,7 +100,7 @@ fn tracking(result: Option<&RunResult>) -> Markup {
     }
 }
 
-fn cells(result: Option<&RunResult>) -> Vec<String> {
+fn cells(result: Option<&RunResult>, common: Option<&(f64, u64)>) -> Vec<String> {
     let unknown = || "–".to_owned();
     let shares = [
         ("static", "input", "accuracy"),
@@ -103,18 +108,19 @@ fn cells(result: Option<&RunResult>) -> Vec<String> {
         ("static", "fused", "accuracy"),
         ("static", "fused", "completeness"),
         ("static", "fused", "f1"),
-        ("dynamic", "input", "accuracy"),
-        ("dynamic", "fused", "accuracy"),
+        ("static", "fused", "accuracy_alone"),
     ];
-    let shares = shares.map(|(region, source, name)| {
+    let objects = [("dynamic", "input", "accuracy"), ("dynamic", "fused", "accuracy")];
+    let shown = |(region, source, name): (&str, &str, &str)| {
         let share = result.and_then(|result| result.share(region, source, name));
         share.map_or_else(unknown, |share| format!("{share:.3}"))
-    });
+    };
+    let common = common.map_or_else(unknown, |(accuracy, _)| format!("{accuracy:.3}"));
     let numbers = [("map", "blocks", 0), ("map", "swept_triangles", 0), ("egomotion", "ate_m", 3)].map(|(group, name, digits)| {
         let number = result.and_then(|result| result.summary[group][name].as_f64());
         number.map_or_else(unknown, |number| format!("{number:.digits$}"))
     });
-    shares.into_iter().chain(numbers).collect()
+    shares.map(shown).into_iter().chain([common]).chain(objects.map(shown)).chain(numbers).collect()
 }
 
 /// Tables of the original that are not in the figures.

@@ -1,7 +1,7 @@
 //! The result of a run: its summary, and per frame the numbers that boxes and curves show. One file a run, written atomically.
 
 use super::SweepError;
-use crate::evaluate::reference::{EvaluatedFrame, Region};
+use crate::evaluate::reference::{EvaluatedFrame, PointOutcomes, Region};
 use crate::observe::Charted;
 use crate::report::Summary;
 use crate::run::{RunRecord, write_whole};
@@ -19,6 +19,9 @@ pub struct RunResult {
     pub summary: Value,
     /// Evaluated frames.
     pub samples: Vec<FrameSample>,
+    /// What became of each point of the static map.
+    #[serde(default)]
+    pub outcomes: Vec<PointOutcomes>,
     /// Most blocks in use after each frame, or each few frames of a long run.
     pub blocks: Vec<u32>,
     /// How many frames that are.
@@ -64,6 +67,7 @@ impl RunResult {
             arguments: arguments.to_vec(),
             summary: serde_json::to_value(Summary::of(run))?,
             samples: run.sections.reference.iter().flat_map(|reference| &reference.frames).map(FrameSample::of).collect(),
+            outcomes: run.sections.reference.iter().flat_map(|reference| &reference.outcomes).cloned().collect(),
             blocks: charts.series(Charted::BlocksUsed).into_iter().map(|blocks| blocks as u32).collect(),
             blocks_every: charts.frames_per_point(),
         })

@@ -1,8 +1,10 @@
 //! A sweep as CSV.
 
 use super::{Kind, Plan, Point, Results, RunResult};
+use crate::evaluate::reference::on_common_points;
 use serde::Serialize;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::io;
 
 /// One point. Cells are empty where a value is unknown, all of them where the run is missing.
@@ -20,6 +22,9 @@ struct PointColumns<'a> {
     static_fused_accuracy: Option<f64>,
     static_fused_completeness: Option<f64>,
     static_fused_f1: Option<f64>,
+    static_fused_accuracy_alone: Option<f64>,
+    static_fused_accuracy_common: Option<f64>,
+    static_common_points: Option<u64>,
     dynamic_input_accuracy: Option<f64>,
     dynamic_input_completeness: Option<f64>,
     dynamic_input_f1: Option<f64>,
@@ -45,12 +50,24 @@ struct PointColumns<'a> {
 pub fn csv(plan: &Plan, kind: Kind, results: &Results) -> io::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for point in plan.points.iter().filter(|point| point.kind == kind) {
-        writer.serialize(columns(point, results.get(&point.run))).map_err(io::Error::other)?;
+        let common = common_accuracy(plan, kind, &point.data, results);
+        writer.serialize(columns(point, results.get(&point.run), common.get(&point.run).copied())).map_err(io::Error::other)?;
     }
     writer.into_inner().map_err(|error| io::Error::other(error.to_string()))
 }
 
-fn columns<'a>(point: &'a Point, result: Option<&'a RunResult>) -> PointColumns<'a> {
+/// By run: accuracy of the static map on the points that the maps of all finished runs of a sweep on one data set show, and how many these are.
+pub(super) fn common_accuracy(plan: &Plan, kind: Kind, data: &str, results: &Results) -> BTreeMap<String, (f64, u64)> {
+    // What the tracker lost shows nothing that could be compared.
+    let is_whole = |result: &&RunResult| !result.outcomes.is_empty() && result.tracking_failures().is_none();
+    let runs: BTreeMap<&String, &RunResult> =
+        plan.of(kind, data).filter_map(|point| Some((&point.run, results.get(&point.run).filter(is_whole)?))).collect();
+    let outcomes: Vec<_> = runs.values().map(|result| result.outcomes.as_slice()).collect();
+    let Some((accuracy, points)) = on_common_points(&outcomes).filter(|_| runs.len() > 1) else { return BTreeMap::new() };
+    runs.into_keys().zip(accuracy).map(|(run, accuracy)| (run.clone(), (accuracy, points))).collect()
+}
+
+fn columns<'a>(point: &'a Point, result: Option<&'a RunResult>, common: Option<(f64, u64)>) -> PointColumns<'a> {
     let value = |group: &str, name: &str| -> Option<&'a Value> { result?.summary.get(group)?.get(name) };
     let number = |group: &str, name: &str| value(group, name).and_then(Value::as_f64);
     let whole = |group: &str, name: &str| value(group, name).and_then(Value::as_u64);
@@ -68,6 +85,9 @@ fn columns<'a>(point: &'a Point, result: Option<&'a RunResult>) -> PointColumns<
         static_fused_accuracy: share("static", "fused", "accuracy"),
         static_fused_completeness: share("static", "fused", "completeness"),
         static_fused_f1: share("static", "fused", "f1"),
+        static_fused_accuracy_alone: share("static", "fused", "accuracy_alone"),
+        static_fused_accuracy_common: common.map(|(accuracy, _)| accuracy),
+        static_common_points: common.map(|(_, points)| points),
         dynamic_input_accuracy: share("dynamic", "input", "accuracy"),
         dynamic_input_completeness: share("dynamic", "input", "completeness"),
         dynamic_input_f1: share("dynamic", "input", "f1"),

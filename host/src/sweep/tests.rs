@@ -29,6 +29,7 @@ fn result(arguments: &[String], digest: &str, accuracy: f64) -> RunResult {
             "lidar": {"source": "exact", "frames": 2, "delay_frames": 0, "static": {"input": share, "fused": share}},
             "egomotion": {"status": "tracking failure", "tracking_failures": 2, "ate_m": 0.5},
         }),
+        outcomes: Vec::new(),
         samples: [accuracy - 0.01, accuracy, accuracy + 0.01]
             .map(|accuracy| FrameSample { frame: 1, accuracy: [Some(accuracy); 2], completeness: [Some(0.9), None] })
             .to_vec(),

@@ -17,6 +17,10 @@ pub struct DepthErrorFigures {
     pub median_error_m: f64,
     /// Median reference depth of the same points, m, to a centimetre.
     pub median_depth_m: f64,
+    /// Median distance of the reference points from the plane the map shows at their pixel, m, to half a millimetre: on a road seen from low above it is a
+    /// small part of the depth error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub median_surface_m: Option<f64>,
 }
 
 /// Collects depth errors.
@@ -25,13 +29,19 @@ pub struct DepthErrors {
     /// Empty until the first point.
     errors: Vec<u64>,
     depths: Vec<u64>,
+    #[serde(default)]
+    surfaces: Vec<u64>,
 }
 
 impl DepthErrors {
-    /// Takes in a point that the map shows.
-    pub fn add(&mut self, shown_m: f64, true_m: f64) {
-        count(&mut self.errors, (shown_m - true_m).abs() / ERROR_BIN_M);
+    /// Takes in a point that the map shows. `along_normal` is the length of a ray of depth 1 along the surface's normal, where there is a normal.
+    pub fn add(&mut self, shown_m: f64, true_m: f64, along_normal: Option<f64>) {
+        let error_m = (shown_m - true_m).abs();
+        count(&mut self.errors, error_m / ERROR_BIN_M);
         count(&mut self.depths, true_m / DEPTH_BIN_M);
+        if let Some(along_normal) = along_normal {
+            count(&mut self.surfaces, error_m * along_normal.abs() / ERROR_BIN_M);
+        }
     }
 
     /// The figures; `None` without a point.
@@ -40,6 +50,7 @@ impl DepthErrors {
         Some(DepthErrorFigures {
             median_error_m: median(&self.errors, ERROR_BIN_M)?,
             median_depth_m: median(&self.depths, DEPTH_BIN_M)?,
+            median_surface_m: median(&self.surfaces, ERROR_BIN_M),
         })
     }
 }
@@ -60,9 +71,10 @@ mod tests {
         let mut errors = DepthErrors::default();
         assert_eq!(errors.figures(), None);
         for (shown_m, true_m) in [(10.1, 10.0), (9.9, 10.0), (400.0, 12.0)] {
-            errors.add(shown_m, true_m);
+            errors.add(shown_m, true_m, Some(-0.2));
         }
         let figures = errors.figures().unwrap();
         assert!((figures.median_error_m - 0.1).abs() < 0.001 && (figures.median_depth_m - 10.0).abs() < 0.02, "{figures:?}");
+        assert!((figures.median_surface_m.unwrap() - 0.02).abs() < 0.001, "{figures:?}");
     }
 }

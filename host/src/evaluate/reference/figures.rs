@@ -60,8 +60,9 @@ pub struct ReferenceFigures {
     /// The static background.
     #[serde(rename = "static")]
     pub still: PairFigures,
-    /// Objects with a volume of their own.
-    pub dynamic: PairFigures,
+    /// Objects with a volume of their own; `None` when the map is evaluated later, for the places of objects in a past frame are not kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dynamic: Option<PairFigures>,
     /// Points on objects without a volume: not in the figures above.
     pub ignored_points: u64,
     /// Points nearer or farther than what is fused, and points outside the image.
@@ -83,7 +84,7 @@ impl ReferenceFigures {
             delay_frames,
             frames: frames.len(),
             still: pair(frames, Region::Static),
-            dynamic: pair(frames, Region::Dynamic),
+            dynamic: (delay_frames == 0).then(|| pair(frames, Region::Dynamic)),
             ignored_points: counted(|frame| frame.regions[Region::Ignored as usize].total),
             left_out_points: counted(|frame| frame.count.out_of_range + frame.count.outside),
             map_depth_error: depth,

@@ -15,13 +15,16 @@
 //! 5. A disparity is right by the first of the [`ACCEPTANCE_RULES`]: off by at most 3 px or 5 %. `accuracy = correct / (total - missing)`,
 //!    `completeness = 1 - missing_alone / total`, `f1 = 2 a c / (a + c)`, per frame; a run's figure is the mean over the frames that have it.
 //!
+//! Maps of several runs are compared on the points all of them show ([`on_common_points`]): a map that drops what is hard is not more accurate for it.
+//!
 //! Exact depth is sampled at no more than [`EXACT_POINTS`] pixels, evenly.
 //!
-//! Memory: 16 bytes a point for each frame that waits for its evaluation, 500 bytes a region for each evaluated frame.
+//! Memory: 16 bytes a point for each frame that waits for its evaluation, 500 bytes a region and two bits a point for each evaluated frame.
 
 mod counts;
 mod depth_error;
 mod figures;
+mod outcomes;
 mod pending;
 mod projection;
 mod region;
@@ -31,6 +34,7 @@ mod tests;
 pub use counts::{ACCEPTANCE_RULES, Counts, Rule};
 pub use depth_error::{DepthErrorFigures, DepthErrors};
 pub use figures::{EvaluatedFrame, PairFigures, ReferenceFigures, SourceFigures};
+pub use outcomes::{PointOutcomes, on_common_points};
 pub use pending::{PendingFrame, PendingFrames, Sample};
 pub use projection::{EPIPOLAR_PX, EXACT_POINTS, Field, ProjectedPoint, ProjectedScan, ScanCount, project_scan, sample_exact_depth};
 pub use region::Region;

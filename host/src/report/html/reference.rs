@@ -41,6 +41,9 @@ fn explanation(figures: &ReferenceFigures) -> Markup {
                 " Static map: median depth error {:.1} cm at a median depth of {:.1} m.",
                 100.0 * depth.median_error_m, depth.median_depth_m
             ))
+            @if let Some(surface_m) = depth.median_surface_m {
+                (format!(" Median distance of the reference's points from the surface: {:.1} cm.", 100.0 * surface_m))
+            }
         }
     }
 }
@@ -58,7 +61,8 @@ fn table_of(figures: &ReferenceFigures) -> Markup {
         ("points", true),
     ];
     let mut rows = Vec::new();
-    for (name, PairFigures { input, fused, .. }) in [("static", &figures.still), ("dynamic objects", &figures.dynamic)] {
+    let dynamic = figures.dynamic.iter().map(|of| ("dynamic objects", of));
+    for (name, PairFigures { input, fused, .. }) in std::iter::once(("static", &figures.still)).chain(dynamic) {
         rows.push(row(name, "input", input));
         rows.push(row("", "map", fused));
     }
