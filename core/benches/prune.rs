@@ -56,6 +56,7 @@ fn bench(criterion: &mut Criterion) {
             grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
             colour: None,
             class: None,
+            noted: false,
         };
         volume.fuse(&view, seen, &Serial);
     };

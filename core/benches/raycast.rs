@@ -89,6 +89,7 @@ fn fill(volume: &mut Volume<'_>) {
                 grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
                 colour: None,
                 class: None,
+                noted: false,
             },
             &Serial,
         );

@@ -99,7 +99,7 @@ fn bench(criterion: &mut Criterion) {
                     at += 1;
                     let depth_m = View::new(&frame.depth_m, frame.view.width, frame.view.height).unwrap();
                     let grey = View::new(&frame.grey, frame.view.width, frame.view.height).unwrap();
-                    let seen = Observation { depth_m, grey, colour: None, class: None };
+                    let seen = Observation { depth_m, grey, colour: None, class: None, noted: false };
                     let begin = std::time::Instant::now();
                     volume.allocate(&frame.view, depth_m, &mut NoStore, &Serial);
                     let middle = std::time::Instant::now();

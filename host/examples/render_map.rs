@@ -1,7 +1,7 @@
 //! How does the finished map look from each pose, as disparity images? Written as KITTI's 16-bit PNG, 1/256 px, 0 none; what self-calibration
 //! added is taken off again, so that they can be compared with any matcher of the same images.
 //!
-//! `cargo run --release -p dynvox --example render_map -- KITTI-ODOMETRY 06 OUT [apply|off]`
+//! `cargo run --release -p dynvox --example render_map -- KITTI-ODOMETRY 06 OUT [apply|off] [KEY=VALUE ...]`
 
 use dynvox::input::{FrameSource, OpenOptions, open};
 use dynvox_core::geometry::{DisparityCorrection, StereoRig, Transform};
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [path, sequence, out, rest @ ..] = arguments.as_slice() else {
-        anyhow::bail!("render_map KITTI-ODOMETRY SEQUENCE OUT [apply|off]")
+        anyhow::bail!("render_map KITTI-ODOMETRY SEQUENCE OUT [apply|off] [KEY=VALUE ...]")
     };
     let mode = if rest.first().is_some_and(|mode| mode == "off") { SelfCalibrationMode::Off } else { SelfCalibrationMode::Apply };
     let source = open(path.as_ref(), &OpenOptions { sequence: Some(sequence.clone()), ..OpenOptions::default() })?;
@@ -22,6 +22,9 @@ fn main() -> anyhow::Result<()> {
     let capacity = Capacity::for_budget(1 << 30, width, height, &BudgetOptions::default())?;
     let mut config = Config::for_rig(source.rig());
     config.rig_settings.self_calibration = mode;
+    for set in rest.iter().filter_map(|argument| argument.split_once('=')) {
+        config.set(set.0, set.1).map_err(|error| anyhow::anyhow!("{}={}: {error}", set.0, set.1))?;
+    }
     let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(&capacity, &config, &mut slab)?;
     let (poses, correction) = map(source.as_ref(), &mut mapper)?;

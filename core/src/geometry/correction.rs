@@ -1,7 +1,7 @@
 //! What is left of a calibration's error in the disparity, and how it is taken out.
 
 use super::StereoRig;
-use crate::image::DISPARITY_ONE_PX;
+use crate::image::{DISPARITY_FILLED, DISPARITY_ONE_PX};
 
 /// What must be added to a disparity, by where the right camera sees the point.
 ///
@@ -72,7 +72,7 @@ impl ColumnCorrection {
     }
 
     /// Corrects a row of disparities, 1/256 px, 0 none. What would be less than 1/256 px after it
-    /// becomes none.
+    /// becomes none. The lowest bit stays: it marks what the matcher filled in.
     pub(crate) fn correct_row(&self, disparity_q8: &mut [u16]) {
         const ONE_PX: f32 = DISPARITY_ONE_PX as f32;
         let mut u = 0.0;
@@ -80,7 +80,8 @@ impl ColumnCorrection {
             let px = f32::from(*disparity) / ONE_PX;
             // Casts saturate, so that values below 0 become 0, which is none.
             let corrected = ((px + self.at(u - px)) * ONE_PX + 0.5) as u16;
-            *disparity = if *disparity == 0 { 0 } else { corrected };
+            let (corrected, mark) = (corrected & !DISPARITY_FILLED, *disparity & DISPARITY_FILLED);
+            *disparity = if *disparity == 0 || corrected == 0 { 0 } else { corrected | mark };
             u += 1.0;
         }
     }

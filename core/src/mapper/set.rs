@@ -8,10 +8,10 @@ use crate::{
     planning::PlanningConfig,
     rectify::self_calibration::{RigConfig, SelfCalibrationMode},
     scene_flow::SceneFlowConfig,
-    stereo::StereoConfig,
+    stereo::{GapEnds, StereoConfig},
     tracking::{MotionConfig, Overlap, SegmentationConfig, StateConfig, TrackingConfig},
     view::{MeshConfig, RaycastConfig},
-    volume::{ObservationWeight, VolumeConfig, WhenFull},
+    volume::{DistanceAlong, ObservationWeight, VolumeConfig, WhenFull},
 };
 use core::fmt;
 
@@ -128,6 +128,8 @@ macro_rules! choices {
 choices! {
     MotionSource { "stereo" = Stereo, "icp" = Icp }
     Overlap { "mask" = Mask, "box" = Box }
+    GapEnds { "surface" = Surface, "farther" = Farther }
+    DistanceAlong { "ray" = Ray, "normal" = Normal }
     ObservationWeight { "one" = One, "depth" = Depth }
     WhenFull { "evict" = Evict, "refuse" = Refuse }
     SelfCalibrationMode { "apply" = Apply, "report" = Report, "off" = Off }
@@ -158,7 +160,8 @@ section!(disparity_correction: DisparityCorrection { offset_px, slope_px, quarti
 section!(stereo: StereoConfig {
     disparity_max, support_ratio, support_texture, candidate_step, plausible_window, plausible_threshold, plausible_min, redundant_distance,
     redundant_threshold, grid_size, beta, gamma, sigma, plane_radius_sigmas, plane_slope_max, match_texture, subpixel, consistency_threshold,
-    speckle_similarity, speckle_size, gap_width, gap_discontinuity, adaptive_mean, median,
+    speckle_similarity, speckle_size, gap_width, gap_discontinuity, gap_ends,
+    adaptive_mean, median,
 });
 section!(scene_flow: SceneFlowConfig {
     response_min, search_radius_px, stereo_tolerance_px, disparity_tolerance_px, flow_tolerance_px, support_min, refine, bucket_px,
@@ -193,7 +196,7 @@ section!(objects: ObjectsConfig {
 });
 section!(volume: VolumeConfig {
     voxel_size_m, truncation_m, near_m, far_m, max_weight, observation_weight, class_weight, colour_band, when_full, prune_weight, prune_lag,
-    prune_distance, prune_blocks_per_frame,
+    prune_distance, prune_blocks_per_frame, edge_reach_px, distance, behind_m,
 });
 section!(raycast: RaycastConfig { near_m, far_m, min_weight });
 section!(mesh: MeshConfig { min_weight });

@@ -3,10 +3,9 @@
 use super::{Config, StereoFrame};
 use crate::{
     Executor, Stage,
-    geometry::depth_from_disparity,
     image::{View, ViewMut},
     tracking::{CameraMotion, Tracked},
-    volume::{AllocationReport, BlockStore, Observation, Viewpoint, Volume},
+    volume::{AllocationReport, BlockStore, Observation, ObservedDepth, Viewpoint, Volume},
 };
 
 /// The parts of a mapper that fuse a frame into the static map.
@@ -38,14 +37,15 @@ impl StaticMap<'_, '_> {
             debug_assert!(false, "the depth image has the capacity's size");
             return AllocationReport::default();
         };
-        let volume = &self.config.volume;
-        depth_from_disparity(&view.rig, volume.near_m, volume.far_m, self.disparity_q8, &mut depth_m);
+        let observed = ObservedDepth { config: &self.config.volume, rig: &view.rig, disparity_q8: self.disparity_q8 };
+        observed.write(&mut depth_m, executor);
         tracked.mask_dynamic_depth(&mut depth_m);
         let observation = Observation {
             depth_m: depth_m.as_view(),
             grey: frame.left,
             colour: frame.colour,
             class: frame.class,
+            noted: true,
         };
         let allocation = executor.stage(Stage::Allocate, || self.background.allocate(&view, observation.depth_m, store, executor));
         executor.stage(Stage::Fuse, || self.background.fuse(&view, observation, executor));

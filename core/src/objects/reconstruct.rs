@@ -215,6 +215,7 @@ fn fuse_crop<E: Executor>(
         grey: picture.grey,
         colour: picture.colour,
         class: None,
+        noted: false,
     };
     let allocation = object.volume.allocate(&view, observation.depth_m, &mut NoStore, executor);
     object.volume.fuse(&view, observation, executor);

@@ -11,7 +11,19 @@ pub const MIN_GRID_SIZE: usize = 10;
 /// Widest search around the prior plane, px.
 pub const MAX_PLANE_RADIUS: usize = 16;
 
-/// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving; [`Default`] is DynSLAM's, which fills wider gaps.
+/// What fills a gap whose ends are two surfaces: they differ by [`StereoConfig::gap_discontinuity`] or more.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum GapEnds {
+    /// Nothing: only gaps within a surface are filled.
+    #[default]
+    Surface,
+    /// The farther one, as published: what is hidden from one camera is background.
+    Farther,
+}
+
+/// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving, [`StereoConfig::dynslam`] DynSLAM's, which fills wider
+/// gaps; [`Default`] fills wider ones still, but only within a surface (docs/decisions/0028-gaps-within-a-surface.md).
 ///
 /// ```
 /// use dynvox_core::stereo::StereoConfig;
@@ -65,10 +77,12 @@ pub struct StereoConfig {
     pub speckle_similarity: u16,
     /// Segments smaller than this are removed, px; 0 or 1 keeps all. Published: 200.
     pub speckle_size: u32,
-    /// Widest gap filled along rows and columns, px; 0 fills none. Published: 3; DynSLAM: 21.
+    /// Widest gap filled along rows and columns, px; 0 fills none. 40; published: 3; DynSLAM: 21.
     pub gap_width: usize,
-    /// Ends of a gap that differ by less than this are one surface, px; otherwise the farther one is continued. Published: 3.
+    /// Ends of a gap that differ by less than this are one surface, px. Published: 3.
     pub gap_discontinuity: u16,
+    /// What fills a gap between two surfaces. Nothing; published: the farther one.
+    pub gap_ends: GapEnds,
     /// Whether an edge-preserving mean smooths the result; published: yes. It also yields fractions of a pixel.
     pub adaptive_mean: bool,
     /// Whether a 3 x 3 median follows. Published: no.
@@ -101,6 +115,7 @@ impl StereoConfig {
             speckle_size: 200,
             gap_width: 3,
             gap_discontinuity: 3,
+            gap_ends: GapEnds::Farther,
             adaptive_mean: true,
             median: false,
         }
@@ -138,6 +153,6 @@ impl StereoConfig {
 
 impl Default for StereoConfig {
     fn default() -> Self {
-        Self::dynslam()
+        Self { gap_width: 40, gap_ends: GapEnds::Surface, ..Self::robotics() }
     }
 }

@@ -24,6 +24,8 @@ use crate::part::{part, part_mut};
 pub(super) const WORKING_ONE_PX: i16 = 64;
 /// No disparity, in the working images: so far from any that no difference of two disparities comes near.
 pub(super) const NONE: i16 = i16::MIN / 2;
+/// Set in a working disparity that was filled in; beyond what 255 px take.
+pub(super) const FILLED: i16 = 1 << 14;
 
 /// All that dense matching reads.
 pub(super) struct DenseMatching<'a> {

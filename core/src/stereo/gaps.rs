@@ -1,9 +1,12 @@
-//! Small gaps between disparities are filled, along rows and then along columns.
+//! Small gaps between disparities are filled, along rows and then along columns, and marked so.
 //!
-//! If both ends are one surface the gap gets their mean, otherwise the farther one's disparity: what is hidden from one camera is background.
-//! Memory: four bytes a column. Time: two walks over the image.
+//! If both ends are one surface the gap gets their mean. Otherwise it stays, or, as published, gets the farther one's disparity: what is
+//! hidden from one camera is background. Memory: four bytes a column. Time: two walks over the image.
 
-use super::dense::NONE;
+use super::{
+    GapEnds,
+    dense::{FILLED, NONE},
+};
 
 /// What fills a gap.
 #[derive(Clone, Copy)]
@@ -12,12 +15,21 @@ pub(super) struct Filling {
     pub width: usize,
     /// Ends that differ by less are one surface, in the unit of the pixels.
     pub discontinuity: u16,
+    /// What fills a gap between two surfaces.
+    pub ends: GapEnds,
 }
 
 impl Filling {
-    fn value(self, a: i16, b: i16) -> i16 {
+    /// What fills a gap between two ends; `None` leaves it.
+    fn value(self, a: i16, b: i16) -> Option<i16> {
+        // A gap along a column may end at what was filled along a row.
+        let (a, b) = (a & !FILLED, b & !FILLED);
         // Both are disparities, at most 255 x 64: their sum fits.
-        if a.abs_diff(b) < self.discontinuity { (a + b) / 2 } else { a.min(b) }
+        match self.ends {
+            _ if a.abs_diff(b) < self.discontinuity => Some((a + b) / 2 | FILLED),
+            GapEnds::Surface => None,
+            GapEnds::Farther => Some(a.min(b) | FILLED),
+        }
     }
 }
 
@@ -30,12 +42,13 @@ pub(super) fn fill_rows(disparity: &mut [i16], width: usize, filling: Filling) -
         while let Some(gap) = row.get(start..).and_then(|rest| rest.iter().position(|&d| d == NONE)).map(|i| start + i) {
             let Some(length) = row.get(gap..).and_then(|rest| rest.iter().position(|&d| d != NONE)) else { break };
             start = gap + length;
-            if gap > 0 && length <= filling.width {
-                let ends = (row.get(gap - 1).copied(), row.get(start).copied());
-                if let ((Some(a), Some(b)), Some(pixels)) = (ends, row.get_mut(gap..start)) {
-                    pixels.fill(filling.value(a, b));
-                    filled += length as u32;
-                }
+            if gap == 0 || length > filling.width {
+                continue;
+            }
+            let (Some(&a), Some(&b)) = (row.get(gap - 1), row.get(start)) else { continue };
+            if let (Some(value), Some(pixels)) = (filling.value(a, b), row.get_mut(gap..start)) {
+                pixels.fill(value);
+                filled += length as u32;
             }
         }
     }
@@ -63,8 +76,7 @@ pub(super) fn fill_columns(disparity: &mut [i16], width: usize, filling: Filling
             }
             // This column of the rows above, from the last one with a disparity on.
             let mut column = above.get_mut(last as usize * width + u..).unwrap_or_default().iter_mut().step_by(width);
-            let Some(end) = column.next() else { continue };
-            let value = filling.value(*end, here);
+            let Some(value) = column.next().and_then(|end| filling.value(*end, here)) else { continue };
             for pixel in column {
                 *pixel = value;
                 filled += 1;
@@ -85,7 +97,11 @@ mod tests {
         let mut out = line.to_vec();
         let known: Vec<usize> = (0..line.len()).filter(|&i| line[i] != NONE).collect();
         for ends in known.windows(2).filter(|ends| ends[1] - ends[0] - 1 <= filling.width) {
-            out[ends[0] + 1..ends[1]].fill(filling.value(line[ends[0]], line[ends[1]]));
+            let (a, b) = (line[ends[0]] & !FILLED, line[ends[1]] & !FILLED);
+            let far = (i32::from(a) - i32::from(b)).abs() >= i32::from(filling.discontinuity);
+            if !far || filling.ends == GapEnds::Farther {
+                out[ends[0] + 1..ends[1]].fill(FILLED | if far { a.min(b) } else { (a + b) / 2 });
+            }
         }
         out
     }
@@ -93,8 +109,9 @@ mod tests {
     #[test]
     fn rows_and_columns_equal_their_plain_twin() {
         let mut random = Random::new(31);
-        for (width, height, none) in [(40, 23, 2), (17, 60, 5), (1, 30, 3), (30, 1, 3)].repeat(6) {
-            let filling = Filling { width: random.below(9) as usize, discontinuity: 192 };
+        for (i, (width, height, none)) in [(40, 23, 2), (17, 60, 5), (1, 30, 3), (30, 1, 3)].repeat(6).into_iter().enumerate() {
+            let ends = if i % 3 == 0 { GapEnds::Farther } else { GapEnds::Surface };
+            let filling = Filling { width: random.below(9) as usize, discontinuity: 192, ends };
             let pixel = |random: &mut Random| if random.below(none) > 0 { NONE } else { random.below(500) as i16 };
             let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
 
@@ -103,20 +120,25 @@ mod tests {
             assert!(rows == image.chunks(width).flat_map(|row| plain(row, filling)).collect::<Vec<_>>());
             assert_eq!(filled as usize, image.iter().zip(&rows).filter(|(a, b)| a != b).count());
 
-            let mut columns = image.clone();
+            let mut columns = rows.clone();
             fill_columns(&mut columns, width, filling, &mut vec![0; width]);
             for u in 0..width {
                 let column = |image: &[i16]| image.iter().skip(u).step_by(width).copied().collect::<Vec<_>>();
-                assert!(column(&columns) == plain(&column(&image), filling));
+                assert!(column(&columns) == plain(&column(&rows), filling));
             }
         }
     }
 
     #[test]
-    fn one_surface_gets_the_mean_and_two_the_farther() {
-        let filling = Filling { width: 3, discontinuity: 192 };
-        let mut row = [640, NONE, NONE, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE];
+    fn one_surface_gets_the_mean_and_two_nothing_or_the_farther() {
+        let filling = Filling { width: 3, discontinuity: 192, ends: GapEnds::Farther };
+        let image = [640, NONE, NONE, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE];
+        let [surface, farther] = [670, 100].map(|disparity| disparity | FILLED);
+        let mut row = image;
         assert_eq!(fill_rows(&mut row, 12, filling), 3);
-        assert_eq!(row, [640, 670, 670, 700, 100, 100, NONE, NONE, NONE, NONE, 100, NONE]);
+        assert_eq!(row, [640, surface, surface, 700, farther, 100, NONE, NONE, NONE, NONE, 100, NONE]);
+        let mut row = image;
+        assert_eq!(fill_rows(&mut row, 12, Filling { ends: GapEnds::Surface, ..filling }), 2);
+        assert_eq!(row, [640, surface, surface, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE]);
     }
 }

@@ -1,8 +1,8 @@
-//! A 3 x 3 median, for pixels whose eight neighbours all have a disparity; the others stay.
+//! A 3 x 3 median, for pixels whose eight neighbours all have a disparity; the others stay. What was filled in stays marked so.
 
 use crate::part::part;
 
-use super::dense::NONE;
+use super::dense::{FILLED, NONE};
 
 /// Filters `from`, whose row `first` is the first one of `to`.
 pub(super) fn median(from: &[i16], width: usize, first: usize, to: &mut [i16]) {
@@ -25,7 +25,8 @@ fn median_row(from: &[i16], width: usize, v: usize, to: &mut [i16]) -> Option<()
     for (((((&a, &b), &c), ((&d, &e), &f)), ((&g, &h), &i)), to) in rows.zip(to.get_mut(1..)?) {
         let window = [a, b, c, d, e, f, g, h, i];
         let least = window.iter().fold(i16::MAX, |a, &b| a.min(b));
-        *to = if least == NONE { *to } else { middle_of_nine(window) };
+        let middle = middle_of_nine(window.map(|disparity| disparity & !FILLED));
+        *to = if least == NONE { *to } else { middle | e & FILLED };
     }
     Some(())
 }

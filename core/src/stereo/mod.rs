@@ -68,7 +68,7 @@ mod support;
 #[cfg(test)]
 mod tests;
 
-pub use config::{DISPARITY_LIMIT, MAX_PLANE_RADIUS, MIN_CANDIDATE_STEP, MIN_GRID_SIZE, StereoConfig};
+pub use config::{DISPARITY_LIMIT, GapEnds, MAX_PLANE_RADIUS, MIN_CANDIDATE_STEP, MIN_GRID_SIZE, StereoConfig};
 pub use matcher::StereoMatcher;
 pub use report::{StereoReport, StereoStatus, StereoStep};
 

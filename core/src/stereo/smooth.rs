@@ -30,9 +30,10 @@ fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
             let tap = part(tap, block * BLOCK..);
             let sums = numerators.iter_mut().zip(&mut denominators);
             for ((numerator, denominator), (&tap, &centre)) in sums.zip(tap.iter().zip(centre)) {
-                // Against NONE the difference is at most 2^15 - 64: no overflow, no weight.
-                let difference = tap.wrapping_sub(centre);
-                let weight = (CUT - difference.max(difference.wrapping_neg()).min(CUT)) >> 2;
+                // Against NONE, and between what was measured and what was filled in, the difference is so large that nothing is left of the
+                // weight.
+                let difference = tap.saturating_sub(centre);
+                let weight = (CUT - difference.max(difference.saturating_neg()).min(CUT)) >> 2;
                 *numerator = numerator.wrapping_add(weight.wrapping_mul(difference));
                 *denominator = denominator.wrapping_add(weight);
             }
@@ -80,6 +81,7 @@ fn window() -> [usize; 2 * REACH] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::dense::FILLED;
     use super::*;
     use crate::random::Random;
     use std::{vec, vec::Vec};
@@ -107,7 +109,11 @@ mod tests {
         for (width, height) in [(37, 21), (8, 8), (9, 9), (64, 5)].repeat(5) {
             let base = [0, 40 * 64, 255 * 64 - 400];
             let image: Vec<i16> = (0..width * height)
-                .map(|i| if random.below(9) == 0 { NONE } else { base[i % width / 7 % 3] + random.below(400) as i16 })
+                .map(|i| match random.below(9) {
+                    0 => NONE,
+                    1 => (base[i % width / 7 % 3] + random.below(400) as i16) | FILLED,
+                    _ => base[i % width / 7 % 3] + random.below(400) as i16,
+                })
                 .collect();
             let mut rows = vec![0; image.len()];
             mean_along_rows(&image, width, &mut rows);

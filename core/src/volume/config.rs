@@ -16,6 +16,17 @@ pub enum ObservationWeight {
     Depth,
 }
 
+/// Along what a voxel's distance from the surface is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum DistanceAlong {
+    /// The camera's z axis, as the original does: the more obliquely a view sees a surface, the more its distances count.
+    Ray,
+    /// The surface's normal, as the disparities about the pixel say (Pan et al., *Voxfield*, IROS 2022).
+    #[default]
+    Normal,
+}
+
 /// What happens when a block is to be made and the pool is full.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
@@ -67,6 +78,13 @@ pub struct VolumeConfig {
     pub prune_distance: f32,
     /// Most blocks visited in one frame; the rest follows in the next. At least 1; 20,000.
     pub prune_blocks_per_frame: u32,
+    /// Pixels so near to what is farther by more than 1.5 px of disparity are not fused, for the matcher widens what is near, and pixels within 3 px of it, or
+    /// of no disparity, give colour only where there is none yet; 0 is off, at most 16; 2.
+    pub edge_reach_px: u8,
+    /// Along what distance is measured.
+    pub distance: DistanceAlong,
+    /// How far behind the surface voxels are observed, m, above 0: at least two voxels, at most the truncation; 0.3.
+    pub behind_m: f32,
 }
 
 impl Default for VolumeConfig {
@@ -85,6 +103,9 @@ impl Default for VolumeConfig {
             prune_lag: 200,
             prune_distance: 0.0,
             prune_blocks_per_frame: 20_000,
+            edge_reach_px: 2,
+            distance: DistanceAlong::Normal,
+            behind_m: 0.3,
         }
     }
 }
@@ -112,6 +133,8 @@ impl VolumeConfig {
         require(problems, self.prune_weight < self.max_weight, "volume.prune_weight", "must be below volume.max_weight");
         require(problems, self.prune_lag >= 1, "volume.prune_lag", "must be at least 1 frame");
         require(problems, (0.0..=1.0).contains(&self.prune_distance), "volume.prune_distance", "must be from 0 to 1");
+        require(problems, positive(self.behind_m), "volume.behind_m", "must be above 0");
+        require(problems, self.edge_reach_px <= 16, "volume.edge_reach_px", "must be at most 16 px");
         require(problems, self.prune_blocks_per_frame >= 1, "volume.prune_blocks_per_frame", "must be at least 1");
     }
 }

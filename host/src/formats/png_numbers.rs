@@ -2,7 +2,7 @@
 
 use super::picture::plain;
 use super::{FormatError, Image};
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ExtendedColorType, ImageReader};
 use std::path::Path;
 
 /// What to do about a file that cannot be decoded.
@@ -37,6 +37,16 @@ pub fn read_png_deep(path: &Path) -> Result<Image<u16>, FormatError> {
             Err(FormatError::content(path, reason, FETCH_ANEW))
         }
     }
+}
+
+/// Writes numbers as a grey PNG of 16 bit.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_png_deep(path: &Path, image: &Image<u16>) -> Result<(), FormatError> {
+    let bytes: Vec<u8> = image.pixels().iter().copied().flat_map(u16::to_ne_bytes).collect();
+    image::save_buffer(path, &bytes, image.width() as u32, image.height() as u32, ExtendedColorType::L16)
+        .map_err(|error| FormatError::content(path, plain(&error), "Check the folder, and whether the disk is full"))
 }
 
 fn decode(path: &Path) -> Result<DynamicImage, FormatError> {

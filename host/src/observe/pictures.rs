@@ -4,7 +4,7 @@ use super::MapView;
 use crate::evaluate::reference::{Region, Rule, Sample};
 use dynvox_core::Mapper;
 use dynvox_core::geometry::Transform;
-use dynvox_core::image::{DISPARITY_ONE_PX, View};
+use dynvox_core::image::{DISPARITY_FILLED, DISPARITY_ONE_PX, View};
 use dynvox_core::tracking::MotionState;
 use dynvox_core::view::{NORMAL_ONE, Raycaster};
 use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
@@ -108,6 +108,22 @@ pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample
         }
     }
     RgbImage::from_raw(width as u32, height as u32, pixels.into_flattened()).map(|picture| png(&picture)).unwrap_or_default()
+}
+
+/// Disparities against true ones, both 1/256 px and 0 none, each pixel of truth in the colour of its error over the darkened image; what the matcher filled
+/// in is darker.
+pub fn disparity_errors(grey: &View<'_, u8>, truth: &View<'_, u16>, given: &View<'_, u16>, marked: bool) -> Vec<u8> {
+    let px = |q8: u16| f32::from(q8) / f32::from(DISPARITY_ONE_PX);
+    let picture = RgbImage::from_fn(grey.width() as u32, grey.height() as u32, |u, v| {
+        let at = (u as usize, v as usize);
+        let [truth, given] = [truth, given].map(|image| image.get(at.0, at.1).unwrap_or_default());
+        if truth == 0 {
+            return Rgb([grey.get(at.0, at.1).unwrap_or_default() / 32 * 11; 3]);
+        }
+        let colour = error_colour(px(given), px(truth));
+        Rgb(if marked && given & DISPARITY_FILLED != 0 { colour.map(|channel| channel / 2) } else { colour })
+    });
+    png(&picture)
 }
 
 /// Points that are in no figure.

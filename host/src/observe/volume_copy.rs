@@ -119,6 +119,7 @@ mod tests {
                 grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
                 colour: None,
                 class: None,
+                noted: false,
             };
             volume.allocate(&view, depth_m, &mut NoStore, &Serial);
             volume.fuse(&view, seen, &Serial);

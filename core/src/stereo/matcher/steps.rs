@@ -2,14 +2,14 @@
 
 use super::{ROWS, StereoMatcher};
 use crate::{
-    image::{DISPARITY_ONE_PX, InvalidPair, View},
+    image::{DISPARITY_FILLED, DISPARITY_ONE_PX, InvalidPair, View},
     parallel::{BANDS, Bands, Executor, each, zip3},
     part::{part, part_mut},
     stereo::{
         StereoConfig, StereoReport,
         config::DISPARITY_LIMIT,
         delaunay::{SupportPoint, Triangulation},
-        dense::{DenseBand, DenseMatching, MatchBand, NONE, WORKING_ONE_PX},
+        dense::{DenseBand, DenseMatching, FILLED, MatchBand, NONE, WORKING_ONE_PX},
         descriptor::Gradients,
         filter_support, gaps,
         gaps::Filling,
@@ -129,7 +129,11 @@ impl StereoMatcher<'_> {
     }
 
     pub(super) fn fill_gaps(&mut self, config: &StereoConfig, report: &mut StereoReport) {
-        let filling = Filling { width: config.gap_width, discontinuity: working(config.gap_discontinuity) as u16 };
+        let filling = Filling {
+            width: config.gap_width,
+            discontinuity: working(config.gap_discontinuity) as u16,
+            ends: config.gap_ends,
+        };
         let image = image_of(self.disparity, self.width * self.height);
         report.filled = gaps::fill_rows(image, self.width, filling) + gaps::fill_columns(image, self.width, filling, self.columns);
     }
@@ -157,7 +161,9 @@ impl StereoMatcher<'_> {
         for disparity in disparities.iter_mut() {
             let working = *disparity as i16;
             // Smoothed values stay between those they come from: 0..=255 px.
-            *disparity = if working == NONE { 0 } else { working as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16) };
+            let (px, filled) = if working == NONE { (0, false) } else { (working & !FILLED, working & FILLED != 0) };
+            let value = px as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16);
+            *disparity = if filled && value > 0 { value | DISPARITY_FILLED } else { value };
         }
         if let Some(invalid) = invalid {
             invalid::remove(invalid, self.width, disparities);

@@ -9,6 +9,7 @@ use crate::{
     volume::{
         BLOCK_SIDE,
         block::{LAYER_VOXELS, Layer, packed},
+        observed::{is_spoiled, obliqueness},
     },
 };
 use nalgebra::Vector3;
@@ -161,9 +162,19 @@ impl Fusion<'_> {
     fn measure(&self, scratch: &mut Scratch) -> bool {
         let (truncation_m, scale) = (self.config.truncation_m, self.scale);
         for i in 0..LAYER_VOXELS {
-            let distance_m = scratch.observed_m[i] - scratch.z_m[i];
-            scratch.distance_m[i] = distance_m;
-            scratch.hit[i] = -i16::from((scratch.observed_m[i] > 0.0) & (distance_m >= -truncation_m));
+            let along_z_m = scratch.observed_m[i] - scratch.z_m[i];
+            scratch.hit[i] = -i16::from((scratch.observed_m[i] > 0.0) & (along_z_m >= -truncation_m));
+            scratch.distance_m[i] = along_z_m;
+        }
+        if self.seen.noted {
+            for (distance_m, &observed_m) in scratch.distance_m.iter_mut().zip(&scratch.observed_m) {
+                *distance_m *= obliqueness(observed_m);
+            }
+        }
+        let behind_m = self.behind_m;
+        for i in 0..LAYER_VOXELS {
+            let distance_m = scratch.distance_m[i];
+            scratch.hit[i] &= -i16::from(distance_m >= -behind_m);
             scratch.target[i] = rounded(clamp_f32(distance_m, -truncation_m, truncation_m) * scale) as i16;
         }
         scratch.hit.iter().fold(0, |any, hit| any | hit) != 0
@@ -213,6 +224,9 @@ impl Fusion<'_> {
             near &= near - 1;
             let target = self.seen.colour_at(scratch.column[i] as usize, scratch.row[i] as usize);
             let current = [red[i], green[i], blue[i]];
+            if self.seen.noted && current != [0; 3] && is_spoiled(scratch.observed_m[i]) {
+                continue;
+            }
             let sum = if current == [0; 3] { 1 } else { usize::from(weight[i]).clamp(2, COLOUR_WEIGHT + 1) };
             let share = self.shares.colour[sum];
             let blend = |c: usize| {

@@ -2,7 +2,8 @@
 //! Models from Range Images*, 1996, projective along the camera's z as in Newcombe et al., *KinectFusion*, 2011).
 //!
 //! A lattice point at depth z that projects onto a pixel of depth d observes `o = min((d - z) / truncation, 1)`, unless `o < -1`: then it
-//! is hidden. With weight w and observation weight v, in units of 1 / 32,767:
+//! is hidden. Where the depth has notes (`observed`), `d - z` is then taken along the surface's normal. Neither is what lies
+//! farther than `behind_m` behind the surface observed, for it may belong to another. With weight w and observation weight v, in units of 1 / 32,767:
 //!
 //! `sdf += round((o - sdf) * v / (w + v))`, `w = min(w + v, max_weight)`
 //!
@@ -51,6 +52,8 @@ pub struct Observation<'a> {
     pub colour: Option<View<'a, [u8; 3]>>,
     /// Semantic class per pixel.
     pub class: Option<View<'a, u8>>,
+    /// Whether the lowest bits of the depths are notes, as the mapper writes them.
+    pub noted: bool,
 }
 
 impl Observation<'_> {
@@ -89,6 +92,7 @@ struct Fusion<'a> {
     /// Units of signed distance per metre.
     scale: f32,
     colour_band_m: f32,
+    behind_m: f32,
 }
 
 impl<'a> Fusion<'a> {
@@ -117,6 +121,7 @@ impl<'a> Fusion<'a> {
             height: seen.depth_m.height() as u32,
             scale: 32_767.0 / config.truncation_m,
             colour_band_m: config.colour_band * config.truncation_m,
+            behind_m: max_f32(config.behind_m, 2.0 * config.voxel_size_m),
         }
     }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 #[test]
 fn a_wall_ahead_is_stored_at_its_distance() {
     let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![77; WIDTH * HEIGHT]);
-    let config = VolumeConfig { truncation_m: 0.4, ..VolumeConfig::default() };
+    let config = VolumeConfig { truncation_m: 0.4, behind_m: 0.4, ..VolumeConfig::default() };
     with_volume(&CAPACITY, &config, |volume| {
         for _ in 0..3 {
             fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
@@ -90,6 +90,12 @@ fn fuse_slowly(
         if depth <= 0.0 || distance < -config.truncation_m {
             continue;
         }
+        // The lowest five bits: sixteenths less one, and whether the colour is another's.
+        let notes = if seen.noted { depth.to_bits() & 31 } else { 15 };
+        let distance = distance * ((notes & 15) + 1) as f32 / 16.0;
+        if distance < -config.behind_m.max(2.0 * config.voxel_size_m) {
+            continue;
+        }
         let observed =
             if distance < config.truncation_m { libm::rintf(distance * (32_767.0 / config.truncation_m)) as i32 } else { 32_767 };
         let w = i32::from(weight[voxel]);
@@ -103,6 +109,9 @@ fn fuse_slowly(
             continue;
         }
         let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
+        if !is_blank && notes & 16 != 0 {
+            continue;
+        }
         let sum = if is_blank { 1 } else { i32::from(weight[voxel]).clamp(2, 6) };
         let target = seen.colour.map_or_else(|| [seen.grey.get(u, v).unwrap(); 3], |image| image.get(u, v).unwrap());
         for (plane, target) in colour.iter_mut().zip(target) {
@@ -113,7 +122,7 @@ fn fuse_slowly(
 
 #[test]
 fn equals_the_plain_twin_bit_for_bit() {
-    let mut config = VolumeConfig { max_weight: 7, ..VolumeConfig::default() };
+    let mut config = VolumeConfig { max_weight: 7, behind_m: 0.4, ..VolumeConfig::default() };
     config.class_weight[..3].copy_from_slice(&[0, 1, 3]);
     let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i % 251) as u8).collect();
     let rgb: Vec<[u8; 3]> = grey.iter().map(|&grey| [grey, 255 - grey, grey / 3]).collect();
@@ -122,11 +131,15 @@ fn equals_the_plain_twin_bit_for_bit() {
         let mut unchanged = 0;
         for i in 0..8 {
             // Every other frame shows a wall that hides most of what the one before showed.
-            let depth_m: Vec<f32> = bumpy_depth().iter().map(|depth| if i % 2 == 1 { 0.5 * depth } else { *depth }).collect();
+            let noted = i % 4 > 1;
+            let shown_m = bumpy_depth().into_iter().map(|depth| if i % 2 == 1 { 0.5 * depth } else { depth }).zip(0u32..);
+            let note = |(depth, at): (f32, u32)| f32::from_bits(depth.to_bits() & !31 | at.wrapping_mul(2_654_435_761) >> 27);
+            let depth_m: Vec<f32> = shown_m.map(|(depth, at)| if noted && depth > 0.0 { note((depth, at)) } else { depth }).collect();
             let view = view([0.02 * f64::from(i), 0.1, -0.3], [0.1 * f64::from(i), 0.0, 0.2]);
             let seen = Observation {
                 colour: if i % 4 < 2 { View::new(&rgb, WIDTH, HEIGHT) } else { None },
                 class: if i % 3 < 2 { View::new(&class, WIDTH, HEIGHT) } else { None },
+                noted,
                 ..observation(&depth_m, &grey)
             };
             volume.allocate(&view, seen.depth_m, &mut NoStore, &Serial);

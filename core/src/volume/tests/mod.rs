@@ -57,6 +57,7 @@ fn observation<'a>(depth_m: &'a [f32], grey: &'a [u8]) -> Observation<'a> {
         grey: View::new(grey, WIDTH, HEIGHT).unwrap(),
         colour: None,
         class: None,
+        noted: false,
     }
 }
 

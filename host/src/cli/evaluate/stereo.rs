@@ -1,15 +1,17 @@
 //! `dynvox evaluate stereo`.
 
 use crate::cli::settings::Settings;
-use crate::evaluate::stereo::{BAD_PX, StereoCounts, StereoFigures, StereoPair, filled, find_stereo_set};
-use crate::formats::{Image, read_picture, read_png_deep, read_png_u16};
+use crate::evaluate::stereo::{BAD_PX, Estimate, PartFigures, StereoCounts, StereoFigures, StereoPair, filled, find_stereo_set};
+use crate::formats::{Image, read_picture, read_png_deep, read_png_u16, write_png_deep};
+use crate::observe::pictures;
 use crate::run::Threads;
 use crate::slab::HostSlab;
-use anyhow::bail;
+use anyhow::{Context, bail};
 use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
 use dynvox_core::stereo::{StereoConfig, StereoMatcher};
 use serde::Serialize;
+use std::fs::create_dir_all;
 use std::path::{Path, PathBuf};
 
 /// Names of the regions: what both cameras see and all, each whole, its background and its foreground.
@@ -28,6 +30,9 @@ pub struct StereoArgs {
     /// One setting of the matcher, as in --set stereo.texture_min=10; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Write the disparities (16-bit PNG, value / 256 px, 0 none; odd values were filled in) and pictures of their errors into this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Threads; the result does not depend on them
     #[arg(long, default_value_t = 2, value_name = "N")]
     threads: usize,
@@ -57,7 +62,11 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
             Some(folder) => read_png_deep(&folder.join(format!("{}.png", pair.name)))?,
             None => threads.run(|| matched(pair, &config, &threads))?,
         };
-        count(pair, &given, &mut counts)?;
+        let whole = filled(&given);
+        count(pair, &Estimate { given: &given, filled: &whole, marked: args.disparity.is_none() }, &mut counts)?;
+        if let Some(folder) = &args.out {
+            write(folder, pair, &given, args.disparity.is_none())?;
+        }
     }
     let regions = REGIONS.into_iter().zip(counts).filter_map(|(name, counts)| Some((name, counts.figures()?))).collect();
     let found = Found { benchmark: set.name, pairs: set.pairs.len(), regions };
@@ -90,7 +99,8 @@ fn matched(pair: &StereoPair, config: &StereoConfig, threads: &Threads) -> anyho
 }
 
 /// Counts a pair in every region it has truth for.
-fn count(pair: &StereoPair, given: &Image<u16>, counts: &mut [StereoCounts; REGIONS.len()]) -> anyhow::Result<()> {
+fn count(pair: &StereoPair, estimate: &Estimate<'_>, counts: &mut [StereoCounts; REGIONS.len()]) -> anyhow::Result<()> {
+    let given = estimate.given;
     let same = |path: &Path, image: &Image<u16>| {
         if (image.width(), image.height()) == (given.width(), given.height()) {
             return Ok(());
@@ -98,7 +108,6 @@ fn count(pair: &StereoPair, given: &Image<u16>, counts: &mut [StereoCounts; REGI
         let sizes = [image, given].map(|image| format!("{} x {} px", image.width(), image.height()));
         bail!("{} is {}, but the disparity {}. Fetch one of them anew", path.display(), sizes[0], sizes[1])
     };
-    let whole = filled(given);
     let objects = pair.objects.as_deref().map(read_png_u16).transpose()?;
     if let (Some(path), Some(objects)) = (&pair.objects, &objects) {
         same(path, objects)?;
@@ -107,12 +116,28 @@ fn count(pair: &StereoPair, given: &Image<u16>, counts: &mut [StereoCounts; REGI
         let (Some(path), [all, background, foreground]) = (path, counts) else { continue };
         let truth = read_png_deep(path)?;
         same(path, &truth)?;
-        all.add(&truth, given, &whole, |_| true);
+        all.add(&truth, estimate, |_| true);
         if let Some(objects) = &objects {
             let is_object = |at: usize| objects.pixels().get(at).is_some_and(|&object| object > 0);
-            background.add(&truth, given, &whole, |at| !is_object(at));
-            foreground.add(&truth, given, &whole, is_object);
+            background.add(&truth, estimate, |at| !is_object(at));
+            foreground.add(&truth, estimate, is_object);
         }
+    }
+    Ok(())
+}
+
+/// Writes a pair's disparities, and its errors over the left image.
+fn write(folder: &Path, pair: &StereoPair, given: &Image<u16>, marked: bool) -> anyhow::Result<()> {
+    create_dir_all(folder).with_context(|| format!("{} cannot be made. Check --out", folder.display()))?;
+    let path = |ending: &str| folder.join(format!("{}{ending}.png", pair.name));
+    write_png_deep(&path(""), given)?;
+    let Some(truth) = pair.truth.iter().rev().flatten().next() else { return Ok(()) };
+    let truth = read_png_deep(truth)?;
+    let left = read_picture(&pair.images[0])?.to_8_bit(None).grey;
+    if let (Some(left), Some(truth), Some(given)) = (left.view(), truth.view(), given.view()) {
+        let path = path("_errors");
+        std::fs::write(&path, pictures::disparity_errors(&left, &truth, &given, marked))
+            .with_context(|| format!("{} cannot be written. Check --out", path.display()))?;
     }
     Ok(())
 }
@@ -131,5 +156,15 @@ fn print_figures(found: &Found) {
         out!("{name:<16}{:>11}{:>9.2}%{:>18}", of.pixels, 100.0 * of.coverage, both(of.d1, of.d1_filled));
         of.bad.iter().zip(of.bad_filled).for_each(|(given, filled)| out!("{:>18}", both(*given, filled)));
         outln!("{:>9.3} px{:>7.3} px", of.mean_error_px, of.mean_signed_error_px);
+        print_part("  measured", of.measured.as_ref().filter(|_| of.filled_in.is_some()));
+        print_part("  filled in", of.filled_in.as_ref());
     }
+}
+
+/// A line for a part of a region's estimates.
+fn print_part(name: &str, part: Option<&PartFigures>) {
+    let Some(part) = part else { return };
+    out!("{name:<16}{:>11}{:>9.2}%{:>18}", "", 100.0 * part.coverage, format!("{:.2}       ", 100.0 * part.d1));
+    part.bad.iter().for_each(|bad| out!("{:>18}", format!("{:.2}        ", 100.0 * bad)));
+    outln!("");
 }

@@ -2,7 +2,7 @@
 //!
 //! A pixel with truth is *bad by n* when it is off by more than n px, and wrong by *D1* when it is off by more than 3 px and by more than 5 % of the truth.
 //! Shares are given of the pixels that have an estimate, and, as the benchmarks rank, of all pixels with truth after the estimate's holes are
-//! filled ([`filled`]). Pixels are counted over all pairs together. Regions: what is seen in both images (`noc`), all (`occ`), each once
+//! filled ([`filled`]). What the matcher itself filled in (the core marks it: [`DISPARITY_FILLED`]) is counted apart from what it measured. Pixels are counted over all pairs together. Regions: what is seen in both images (`noc`), all (`occ`), each once
 //! more for foreground and background where the benchmark has an `obj_map`.
 
 mod fill;
@@ -15,6 +15,7 @@ pub use layout::{StereoPair, StereoSet, StereoSetError, find_stereo_set};
 
 use crate::evaluate::reference::Rule;
 use crate::formats::Image;
+use dynvox_core::image::DISPARITY_FILLED;
 use serde::Serialize;
 
 /// Plain thresholds, px.
@@ -35,13 +36,34 @@ pub struct StereoCounts {
     bad: [[u64; BAD_PX.len()]; 2],
     /// Sum of |error| of the given ones, px, and of the error with its sign.
     error_sums_px: [f64; 2],
+    /// Given ones that the matcher measured, and those it filled in.
+    parts: [PartCounts; 2],
+}
+
+/// Counts of a part of the estimates.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct PartCounts {
+    given: u64,
+    d1: u64,
+    bad: [u64; BAD_PX.len()],
+}
+
+/// An estimated disparity image, as it is counted.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate<'a> {
+    /// 1/256 px, 0 none.
+    pub given: &'a Image<u16>,
+    /// The same with holes filled as the benchmarks do.
+    pub filled: &'a Image<u16>,
+    /// Whether the core's marks tell what its matcher filled in.
+    pub marked: bool,
 }
 
 impl StereoCounts {
-    /// Takes in an image: truth and estimate in 1/256 px, 0 none; `counts` tells which pixels belong to the region.
-    pub fn add(&mut self, truth: &Image<u16>, given: &Image<u16>, filled: &Image<u16>, counts: impl Fn(usize) -> bool) {
+    /// Takes in an image: truth in 1/256 px, 0 none; `counts` tells which pixels belong to the region.
+    pub fn add(&mut self, truth: &Image<u16>, estimate: &Estimate<'_>, counts: impl Fn(usize) -> bool) {
         let px = |q8: u16| f32::from(q8) / ONE_PX;
-        let pixels = truth.pixels().iter().zip(given.pixels()).zip(filled.pixels()).enumerate();
+        let pixels = truth.pixels().iter().zip(estimate.given.pixels()).zip(estimate.filled.pixels()).enumerate();
         for (_, ((&truth, &given), &filled)) in pixels.filter(|(at, ((truth, _), _))| **truth > 0 && counts(*at)) {
             self.pixels += 1;
             self.given += u64::from(given > 0);
@@ -54,6 +76,8 @@ impl StereoCounts {
                 let error = f64::from(px(given) - px(truth));
                 self.error_sums_px[0] += error.abs();
                 self.error_sums_px[1] += error;
+                let is_filled = estimate.marked && given & DISPARITY_FILLED != 0;
+                self.parts[usize::from(is_filled)].add(px(given), px(truth));
             }
         }
     }
@@ -71,8 +95,40 @@ impl StereoCounts {
             bad_filled: self.bad[1].map(|bad| share(bad, self.pixels)),
             mean_error_px: mean(self.error_sums_px[0]),
             mean_signed_error_px: mean(self.error_sums_px[1]),
+            measured: self.parts[0].figures(self.pixels),
+            filled_in: self.parts[1].figures(self.pixels),
         })
     }
+}
+
+impl PartCounts {
+    fn add(&mut self, estimate_px: f32, truth_px: f32) {
+        self.given += 1;
+        self.d1 += u64::from(Rule::KITTI.is_error(estimate_px, truth_px));
+        let off_px = (estimate_px - truth_px).abs();
+        self.bad.iter_mut().zip(BAD_PX).for_each(|(bad, limit)| *bad += u64::from(off_px > limit));
+    }
+
+    /// `None` where there is no such estimate; `pixels` have truth.
+    fn figures(&self, pixels: u64) -> Option<PartFigures> {
+        let share = |count: u64| count as f64 / self.given as f64;
+        (self.given > 0).then(|| PartFigures {
+            coverage: self.given as f64 / pixels as f64,
+            d1: share(self.d1),
+            bad: self.bad.map(share),
+        })
+    }
+}
+
+/// Figures of a part of the estimates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PartFigures {
+    /// Share of the pixels with truth.
+    pub coverage: f64,
+    /// Share of these estimates that is wrong by 3 px and 5 %.
+    pub d1: f64,
+    /// Share that is off by more than 2, 3, 4, 5 px.
+    pub bad: [f64; BAD_PX.len()],
 }
 
 /// Figures of one region.
@@ -94,4 +150,10 @@ pub struct StereoFigures {
     pub mean_error_px: f64,
     /// Mean error of the estimates, px: below 0 where they are too far away.
     pub mean_signed_error_px: f64,
+    /// What the matcher measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured: Option<PartFigures>,
+    /// What it filled in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub filled_in: Option<PartFigures>,
 }

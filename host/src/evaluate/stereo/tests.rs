@@ -21,7 +21,9 @@ fn pixels_are_counted_given_and_filled_and_five_percent_is_forgiven_by_d1_alone(
     let truth = image(&[&[px(10.0), px(90.0), px(20.0), px(18.0), 0]]);
     let given = image(&[&[px(10.0), px(93.5), px(16.5), 0, px(5.0)]]);
     let mut counts = StereoCounts::default();
-    counts.add(&truth, &given, &filled(&given), |_| true);
+    let whole = filled(&given);
+    let estimate = Estimate { given: &given, filled: &whole, marked: false };
+    counts.add(&truth, &estimate, |_| true);
     let found = counts.figures().unwrap();
     assert_eq!((found.pixels, found.coverage), (4, 0.75));
     // The hole takes the disparity of the pixel beside it without truth, the smaller one: off by 13 px.
@@ -29,8 +31,15 @@ fn pixels_are_counted_given_and_filled_and_five_percent_is_forgiven_by_d1_alone(
     assert_eq!((found.bad, found.bad_filled), ([2.0 / 3.0, 2.0 / 3.0, 0.0, 0.0], [0.75, 0.75, 0.25, 0.25]));
     assert!((found.mean_error_px - 7.0 / 3.0).abs() < 1e-9 && found.mean_signed_error_px.abs() < 1e-9);
     let mut foreground = StereoCounts::default();
-    foreground.add(&truth, &given, &filled(&given), |at| at == 2);
+    foreground.add(&truth, &estimate, |at| at == 2);
     assert_eq!(foreground.figures().unwrap().d1, 1.0);
+    // Odd disparities were filled in, where the matcher is the core's.
+    let given = given.map(|&q8| if q8 == px(16.5) { q8 | 1 } else { q8 });
+    let mut marked = StereoCounts::default();
+    marked.add(&truth, &Estimate { given: &given, filled: &whole, marked: true }, |_| true);
+    let found = marked.figures().unwrap();
+    let parts = [found.measured.unwrap(), found.filled_in.unwrap()];
+    assert_eq!(parts.map(|part| (part.coverage, part.d1, part.bad[1])), [(0.5, 0.0, 0.5), (0.25, 1.0, 1.0)]);
     assert!(StereoCounts::default().figures().is_none());
 }
 

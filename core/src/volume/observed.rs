@@ -1,0 +1,216 @@
+//! The depth image that is fused: from disparity, without what the matcher makes up, and with a note at each pixel on how it is to be taken.
+//!
+//! *Edges.* The matcher widens what is near: beside its edge, what is behind gets its disparity. Pixels nearer than something within `edge_reach_px`, by
+//! more than [`EDGE_Q8`], are left out. What is left within [`COLOUR_REACH`] of an edge, or of a pixel without disparity, may still show the colour of what
+//! is behind, or of the sky.
+//!
+//! *Obliqueness.* A plane's disparity is linear in the pixel. With slopes `a`, `b` of the disparity `d` and the pixel (x, y) from the principal point, the
+//! plane's normal is along `(f a, f b, d - x a - y b)` and its product with the pixel's ray is `d`: so the cosine between the two is `d / |normal|` times
+//! the length of a ray of depth 1, and distance along the normal is distance along z times `d / |normal|`.
+//!
+//! Both are written into the lowest bits of the depth: five of 24, 60 µm at 20 m. Memory: none. Time: linear in pixels.
+
+use super::{DistanceAlong, VolumeConfig};
+use crate::{
+    geometry::StereoRig,
+    image::{View, ViewMut},
+    parallel::{BANDS, Bands, Executor, each, zip3},
+    part::{part, part_mut},
+};
+
+/// Columns worked on at once.
+const BLOCK: usize = 128;
+/// What differs by more than this is across an edge: 1.5 px.
+const EDGE_Q8: u16 = 384;
+/// How far an edge spoils colours, px.
+const COLOUR_REACH: usize = 3;
+/// Distance to the pixels a slope is taken from, px.
+const SLOPE_REACH: isize = 4;
+/// Largest difference to them within a surface: 6 px.
+const SLOPE_MOST_Q8: i32 = 4 * EDGE_Q8 as i32;
+/// Levels of obliqueness.
+const LEVELS: u32 = 16;
+/// Set where the colour may be another surface's.
+const SPOILED: u32 = LEVELS;
+/// All bits of a depth that are notes.
+const NOTES: u32 = LEVELS - 1 | SPOILED;
+
+/// Distance along the normal over distance along z, from a depth's note.
+#[inline]
+pub(super) fn obliqueness(depth_m: f32) -> f32 {
+    ((depth_m.to_bits() & (LEVELS - 1)) + 1) as i32 as f32 * (1.0 / LEVELS as f32)
+}
+
+/// Whether the colour may be another surface's, from a depth's note.
+#[inline]
+pub(super) fn is_spoiled(depth_m: f32) -> bool {
+    depth_m.to_bits() & SPOILED != 0
+}
+
+/// A disparity image about to become depth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ObservedDepth<'a> {
+    pub config: &'a VolumeConfig,
+    pub rig: &'a StereoRig,
+    /// 1/256 px, 0 none.
+    pub disparity_q8: View<'a, u16>,
+}
+
+impl ObservedDepth<'_> {
+    /// Writes the depths with their notes; 0 where nothing is to be fused.
+    pub fn write<E: Executor>(&self, depth_m: &mut ViewMut<'_, f32>, executor: &E) {
+        let width = depth_m.width().max(1);
+        let bands = Bands::of(depth_m.pixels_mut().len() / width);
+        let jobs = zip3(bands.first(), bands.split_mut(depth_m.pixels_mut(), width), [(); BANDS]);
+        each(executor, jobs, |(first, depths, ())| {
+            for (v, row) in (first..).zip(depths.chunks_exact_mut(width)) {
+                row.chunks_mut(BLOCK).enumerate().for_each(|(block, depths)| self.write_block(block * BLOCK, v, depths));
+            }
+        });
+    }
+
+    fn write_block(&self, first: usize, v: usize, depths: &mut [f32]) {
+        let here = self.tap(first, v, 0, 0);
+        let [behind, spoiling] = self.farthest(first, v);
+        let slopes = match self.config.distance {
+            DistanceAlong::Ray => None,
+            DistanceAlong::Normal => Some([[(SLOPE_REACH, 0), (-SLOPE_REACH, 0)], [(0, SLOPE_REACH), (0, -SLOPE_REACH)]]),
+        };
+        let slopes = slopes.map(|pairs| pairs.map(|pair| slope(&here, pair.map(|(du, dv)| self.tap(first, v, du, dv)))));
+        let levels = slopes.map_or([LEVELS - 1; BLOCK], |slopes| self.levels(first, v, &here, &slopes));
+        let scale = (self.rig.focal_baseline_px_m() * 256.0) as f32;
+        let (near_m, far_m) = (self.config.near_m, self.config.far_m);
+        let edges = behind.iter().zip(&spoiling);
+        for (((depth, &disparity), (&behind, &spoiling)), &level) in depths.iter_mut().zip(&here).zip(edges).zip(&levels) {
+            // Disparity 0 gives infinity, which is beyond far.
+            let value = scale / f32::from(disparity);
+            let fused = (value >= near_m) & (value <= far_m) & (disparity <= behind.saturating_add(EDGE_Q8));
+            let spoiled = if disparity > spoiling.saturating_add(EDGE_Q8) { SPOILED } else { 0 };
+            *depth = if fused { f32::from_bits(value.to_bits() & !NOTES | level | spoiled) } else { 0.0 };
+        }
+    }
+
+    /// The disparities of a block, moved by so many pixels; 0 outside the image.
+    fn tap(&self, first: usize, v: usize, du: isize, dv: isize) -> [u16; BLOCK] {
+        let mut tap = [0; BLOCK];
+        let Some(v) = v.checked_add_signed(dv).filter(|&v| v < self.disparity_q8.height()) else { return tap };
+        let outside = du.min(0).unsigned_abs().saturating_sub(first).min(BLOCK);
+        let start = first.saturating_add_signed(du);
+        part_mut(&mut tap, outside..).iter_mut().zip(part(self.disparity_q8.row(v), start..)).for_each(|(to, from)| *to = *from);
+        tap
+    }
+
+    /// The least disparity about each pixel of a block: of what has one within the reach of edges, and of all, none being 0, within that of colours.
+    fn farthest(&self, first: usize, v: usize) -> [[u16; BLOCK]; 2] {
+        let edge_reach = usize::from(self.config.edge_reach_px);
+        let mut farthest = [[u16::MAX; BLOCK]; 2];
+        if edge_reach == 0 {
+            return farthest;
+        }
+        let [behind, spoiling] = &mut farthest;
+        for step in 1..=COLOUR_REACH.max(edge_reach) {
+            let px = step as isize;
+            for (du, dv) in [(px, 0), (-px, 0), (0, px), (0, -px)] {
+                let tap = self.tap(first, v, du, dv);
+                if step <= edge_reach {
+                    // None wraps around to the largest.
+                    behind.iter_mut().zip(&tap).for_each(|(least, tap)| *least = least_of(*least, tap.wrapping_sub(1)));
+                }
+                if step <= COLOUR_REACH {
+                    spoiling.iter_mut().zip(&tap).for_each(|(least, tap)| *least = least_of(*least, *tap));
+                }
+            }
+        }
+        farthest
+    }
+
+    /// Levels of obliqueness of a block with these slopes along columns and rows.
+    fn levels(&self, first: usize, v: usize, here: &[u16; BLOCK], [along_u, along_v]: &[[f32; BLOCK]; 2]) -> [u32; BLOCK] {
+        let focal = self.rig.focal_px as f32;
+        let y = (v as f64 - self.rig.center_v_px) as f32;
+        let x_first = (first as f64 - self.rig.center_u_px) as f32;
+        let mut levels = [LEVELS - 1; BLOCK];
+        let slopes = along_u.iter().zip(along_v);
+        for (i, ((level, &disparity), (&a, &b))) in (0u16..).zip(levels.iter_mut().zip(here).zip(slopes)) {
+            let (d, x) = (f32::from(disparity) * (1.0 / 256.0), x_first + f32::from(i));
+            let (nu, nv, nz) = (focal * a, focal * b, d - x * a - y * b);
+            let share = d / libm::sqrtf(nu * nu + nv * nv + nz * nz);
+            // Without a disparity it is no number, which becomes 0.
+            let rounded = (share * LEVELS as f32 + 0.5) as u32;
+            *level = if rounded > LEVELS { LEVELS } else { rounded }.saturating_sub(1);
+        }
+        levels
+    }
+}
+
+#[inline]
+fn least_of(a: u16, b: u16) -> u16 {
+    if a < b { a } else { b }
+}
+
+/// Slopes, px per px, from those of the two neighbours that lie on the same surface.
+fn slope(here: &[u16; BLOCK], [after, before]: [[u16; BLOCK]; 2]) -> [f32; BLOCK] {
+    const HALF: f32 = 0.5 / (SLOPE_REACH as f32 * 256.0);
+    let mut slopes = [0.0; BLOCK];
+    for (slope, ((&here, after), before)) in slopes.iter_mut().zip(here.iter().zip(after).zip(before)) {
+        let [here, after_q8, before_q8] = [here, after, before].map(i32::from);
+        let (rise, fall) = (after_q8 - here, here - before_q8);
+        let has_after = (after > 0) & (rise < SLOPE_MOST_Q8) & (rise > -SLOPE_MOST_Q8);
+        let has_before = (before > 0) & (fall < SLOPE_MOST_Q8) & (fall > -SLOPE_MOST_Q8);
+        let sum = if has_after { rise } else { 0 } + if has_before { fall } else { 0 };
+        *slope = sum as f32 * if has_after & has_before { HALF } else { 2.0 * HALF };
+    }
+    slopes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Serial;
+    use std::vec::Vec;
+
+    const RIG: StereoRig = StereoRig { focal_px: 200.0, center_u_px: 150.0, center_v_px: 40.0, baseline_m: 0.5 };
+    const SIZE: [usize; 2] = [300, 80];
+
+    fn observed(config: &VolumeConfig, disparity_q8: impl Fn(usize, usize) -> u16) -> Vec<f32> {
+        let [width, height] = SIZE;
+        let pixels: Vec<u16> = (0..width * height).map(|at| disparity_q8(at % width, at / width)).collect();
+        let mut depth_m = std::vec![-1.0; width * height];
+        let observed = ObservedDepth { config, rig: &RIG, disparity_q8: View::new(&pixels, width, height).unwrap() };
+        observed.write(&mut ViewMut::new(&mut depth_m, width, height).unwrap(), &Serial);
+        depth_m
+    }
+
+    #[test]
+    fn a_road_is_seen_obliquely_and_a_wall_is_not() {
+        let config = VolumeConfig::default();
+        // A road 1.5 m below the camera: d = f B / z and z = 1.5 f / y, so d = B y / 1.5.
+        let road = observed(&config, |_, v| (256.0 * 0.5 * (v as f64 - RIG.center_v_px) / 1.5).max(0.0) as u16);
+        let wall = observed(&config, |_, _| 10 * 256);
+        for (u, v) in [(5, 70), (150, 60), (290, 72)] {
+            let depth_m = f64::from(road[v * SIZE[0] + u]);
+            let exact = 1.5 / depth_m;
+            // The normal is (0, 1, 0): distance along z times the product with the ray of depth 1 is the camera's height over depth.
+            assert!((f64::from(obliqueness(depth_m as f32)) - exact).abs() < 1.0 / 16.0, "{u} {v}: {depth_m} m, {exact}");
+            assert!((depth_m - 1.5 * RIG.focal_px / (v as f64 - RIG.center_v_px)).abs() < 0.1);
+            let at_wall = wall[v * SIZE[0] + u];
+            assert!((at_wall - 10.0).abs() < 1e-3 && obliqueness(at_wall) == 1.0 && !is_spoiled(at_wall));
+        }
+        let along_z = observed(&VolumeConfig { distance: DistanceAlong::Ray, ..config }, |_, v| 256 * (2 + v as u16 / 4));
+        assert!(along_z.iter().all(|&depth_m| obliqueness(depth_m) == 1.0 || depth_m == 0.0));
+    }
+
+    #[test]
+    fn the_rim_of_what_is_near_is_left_out_and_colour_beside_an_edge_is_doubtful() {
+        // Near from column 100 on, far before; nothing from column 200 on.
+        let disparity = |u: usize, _: usize| [10 * 256, 20 * 256, 0][u / 100];
+        let depth_m = observed(&VolumeConfig { edge_reach_px: 2, ..VolumeConfig::default() }, disparity);
+        let row = &depth_m[SIZE[0] * 30..][..SIZE[0]];
+        let fused: Vec<usize> = (95..105).filter(|&u| row[u] > 0.0).collect();
+        assert_eq!(fused, [95, 96, 97, 98, 99, 102, 103, 104], "two pixels of the near side are the matcher's");
+        let spoiled: Vec<usize> = (0..SIZE[0]).filter(|&u| row[u] > 0.0 && is_spoiled(row[u])).collect();
+        assert_eq!(spoiled, [0, 1, 2, 102, 197, 198, 199], "three px beside an edge or nothing");
+        let all = observed(&VolumeConfig { edge_reach_px: 0, ..VolumeConfig::default() }, disparity);
+        assert!(all[..200].iter().all(|&depth_m| depth_m > 0.0 && !is_spoiled(depth_m)));
+    }
+}
