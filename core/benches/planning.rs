@@ -100,8 +100,8 @@ fn windows(criterion: &mut Criterion) {
             disparity_q8: View::new(&disparity_q8, WIDTH, HEIGHT).unwrap(),
         };
         let poses: Vec<Transform> = (0..12).map(pose).collect();
-        for n in 0..poses.len() {
-            let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: poses[n] };
+        for pose in &poses {
+            let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: *pose };
             let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
             volume.allocate(&view, depth_m, &mut NoStore, &Serial);
             let seen = Observation {
@@ -109,9 +109,10 @@ fn windows(criterion: &mut Criterion) {
                 grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
                 colour: None,
                 class: None,
+                noted: false,
             };
             volume.fuse(&view, seen, &Serial);
-            planning.observe(&sight(&poses[n]));
+            planning.observe(&sight(pose));
         }
         measure(criterion, &capacity, (&mut planning, &volume), &sight(&poses[11]));
     }

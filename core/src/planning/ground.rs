@@ -33,7 +33,7 @@ const DRIFT: f32 = 0.1;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Column {
-    /// Height of the ground, m; meaningless without [`Column::GROUND`].
+    /// Height of the ground, m; meaningless where [`Column::ground_m`] is `None`.
     pub height_m: f32,
     /// Where ground would be expected, m: its height where it was found.
     pub reference_m: f32,

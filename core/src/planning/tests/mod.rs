@@ -82,6 +82,7 @@ impl Scene {
             grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
             colour: None,
             class: None,
+            noted: false,
         };
         self.volume.allocate(&view, depth_m, &mut NoStore, &Serial);
         self.volume.fuse(&view, seen, &Serial);
