@@ -105,7 +105,7 @@ impl Truth {
         for cell in (0..size[1]).flat_map(|y| (0..size[0]).flat_map(move |x| (0..size[2]).map(move |z| [x, y, z]))) {
             let cell = [0, 1, 2].map(|axis| origin[axis] + cell[axis]);
             let [x, y, z]: [f64; 3] = t_camera_world.transform_point(grid.to_world(cell.map(|c| f64::from(c) + 0.5)));
-            if z < 0.5 || z > FAR_M {
+            if !(0.5..=FAR_M).contains(&z) {
                 continue;
             }
             let (u, v) = (x * rig.focal_px / z + rig.center_u_px + 0.5, y * rig.focal_px / z + rig.center_v_px + 0.5);

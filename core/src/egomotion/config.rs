@@ -23,7 +23,7 @@ pub struct EgomotionConfig {
     pub acceleration_max_m_s2: f64,
     /// Share of inliers from which on any motion is believed; in 0..=1.
     pub inlier_share_strong: f32,
-    /// Distance by which the right camera may seem to stand ahead of its place beside the left one, or behind it, m. A larger one comes of
+    /// Distance by which the right camera may seem to stand ahead of where the calibration has it, or behind, m. A larger one comes of
     /// cameras that do not expose at the same time: a motion is taken only where the share of inliers is at least `inlier_share_strong`, and none
     /// above four times the distance ([`RightAhead::is_synchronous`](super::RightAhead::is_synchronous)). Above 0. DynSLAM: none.
     pub right_ahead_max_m: f64,

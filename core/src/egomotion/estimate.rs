@@ -63,8 +63,8 @@ pub struct MotionEstimate {
     pub samples: u32,
     /// Gauss-Newton steps of the refinement.
     pub steps: u32,
-    /// Of the camera: how far ahead of its place the right one seems to stand; far where both do not expose at the same time. `None` where too few
-    /// matches tell.
+    /// Of the camera: how far ahead of where the calibration has it the right one seems to stand; far where both do not expose at the same
+    /// time. `None` where too few matches tell.
     pub right_ahead: Option<RightAhead>,
 }
 

@@ -1,7 +1,7 @@
 //! Whether both cameras of a rig expose at the same time.
 //!
 //! A camera that exposes later, or delivers an older image, is not where the calibration says: while the rig moves forward it stands ahead
-//! of its place beside the other one, or behind it. Seen from a right camera that stands `a` ahead, a point at depth z has its row farther
+//! of that, or behind. Seen from a right camera that stands `a` ahead, a point at depth z has its row farther
 //! from the middle by a factor of 1 / (1 - a / z): with y the row from the principal point, d the disparity, f and b the rig's,
 //! v_right - v_left = a y d / (f b). A shift of the rows and another focal length of one camera, which a calibration may leave, are
 //! estimated along with it: they do not depend on the disparity.
@@ -20,7 +20,7 @@ const DETERMINANT_MIN: f64 = 1e-6;
 /// Fewest matches that say something.
 const MATCHES_MIN: usize = 20;
 
-/// How far ahead of its place beside the left camera the right one stands.
+/// How far ahead of where the calibration has it the right camera stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -276,8 +276,7 @@ impl<'s> FlowMatcher<'s> {
             executor.join(|| self.left.take(left, invalid_left, response_min), || self.right.take(right, invalid_right, response_min));
         let mut report = FlowReport { left, right, ..FlowReport::default() };
         if self.last.replace(size) != Some(size) {
-            report.status = FlowStatus::First;
-            return report;
+            return FlowReport { status: FlowStatus::First, ..report };
         }
         match [self.left.is_repeated(size), self.right.is_repeated(size)] {
             [false, false] => {}

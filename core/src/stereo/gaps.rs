@@ -26,7 +26,7 @@ impl Filling {
         let (a, b) = (a & !FILLED, b & !FILLED);
         // Both are disparities, at most 255 x 64: their sum fits.
         match self.ends {
-            _ if a.abs_diff(b) < self.discontinuity => Some((a + b) / 2 | FILLED),
+            _ if a.abs_diff(b) < self.discontinuity => Some(((a + b) / 2) | FILLED),
             GapEnds::Surface => None,
             GapEnds::Farther => Some(a.min(b) | FILLED),
         }

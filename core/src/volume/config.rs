@@ -79,7 +79,7 @@ pub struct VolumeConfig {
     /// Most blocks visited in one frame; the rest follows in the next. At least 1; 20,000.
     pub prune_blocks_per_frame: u32,
     /// Pixels so near to what is farther by more than 1.5 px of disparity are not fused, for the matcher widens what is near, and pixels within 3 px of it, or
-    /// of no disparity, give colour only where there is none yet; 0 is off, at most 16; 2.
+    /// of no disparity, give colour only to voxels without colour; 0 is off, at most 16; 2.
     pub edge_reach_px: u8,
     /// Along what distance is measured.
     pub distance: DistanceAlong,

@@ -33,7 +33,7 @@ const LEVELS: u32 = 16;
 /// Set where the colour may be another surface's.
 const SPOILED: u32 = LEVELS;
 /// All bits of a depth that are notes.
-const NOTES: u32 = LEVELS - 1 | SPOILED;
+const NOTES: u32 = (LEVELS - 1) | SPOILED;
 
 /// Distance along the normal over distance along z, from a depth's note.
 #[inline]
@@ -185,7 +185,7 @@ mod tests {
     fn a_road_is_seen_obliquely_and_a_wall_is_not() {
         let config = VolumeConfig::default();
         // A road 1.5 m below the camera: d = f B / z and z = 1.5 f / y, so d = B y / 1.5.
-        let road = observed(&config, |_, v| (256.0 * 0.5 * (v as f64 - RIG.center_v_px) / 1.5).max(0.0) as u16);
+        let road = observed(&config, |_, v| (256.0 * 0.5 * (v as f64 - RIG.center_v_px) / 1.5) as u16);
         let wall = observed(&config, |_, _| 10 * 256);
         for (u, v) in [(5, 70), (150, 60), (290, 72)] {
             let depth_m = f64::from(road[v * SIZE[0] + u]);

@@ -214,7 +214,7 @@ fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
     let manifest = Manifest::read(folder)?;
     let word = |job: &Job| match job.state(folder) {
         JobState::Done => "done",
-        JobState::Begun => "begun",
+        JobState::Started => "started",
         JobState::Open => "open",
     };
     if json {

@@ -286,9 +286,7 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
         evaluate: args.evaluate,
         evaluation_delay: args.evaluation_delay,
         save_instances: None,
-        rss_limit_bytes: args
-            .rss_limit_mib
-            .map_or_else(|| run::resident_limit_bytes(&capacity, dataset.size()), |mib| mib.saturating_mul(MIB)),
+        rss_limit_bytes: args.rss_limit_mib.map_or(run::resident_limit_bytes(&capacity, dataset.size()), |mib| mib.saturating_mul(MIB)),
         quiet: args.silent(),
         dataset,
     })

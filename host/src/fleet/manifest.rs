@@ -70,8 +70,8 @@ pub struct Job {
 pub enum JobState {
     /// Its map is there.
     Done,
-    /// A run was begun: it goes on, or ended early.
-    Begun,
+    /// A run was started: it goes on, or ended early.
+    Started,
     /// Nothing is there.
     Open,
 }
@@ -138,7 +138,7 @@ impl Manifest {
     /// Reads the jobs in a folder.
     ///
     /// # Errors
-    /// There are none.
+    /// The folder has no list of jobs.
     pub fn read(folder: &Path) -> Result<Self, FleetError> {
         let path = folder.join(MANIFEST_FILE);
         let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
@@ -187,10 +187,10 @@ impl Job {
     /// What became of it.
     pub fn state(&self, folder: &Path) -> JobState {
         let run = self.run_folder(folder);
-        let begun = run.exists() || run.with_file_name(format!(".{}.partial", self.id)).exists();
-        match (self.submap(folder).is_dir(), begun) {
+        let started = run.exists() || run.with_file_name(format!(".{}.partial", self.id)).exists();
+        match (self.submap(folder).is_dir(), started) {
             (true, _) => JobState::Done,
-            (false, true) => JobState::Begun,
+            (false, true) => JobState::Started,
             (false, false) => JobState::Open,
         }
     }

@@ -64,7 +64,7 @@ pub fn write_mesh(folder: &Path, out: &Path, min_weight: u8, axes: Axes) -> Resu
         truncation_m: lattice.truncation_m,
         ..VolumeConfig::default()
     };
-    let how = (&volume, &MeshConfig { min_weight, ..MeshConfig::default() });
+    let how = (&volume, &MeshConfig { min_weight });
     // Any profile's slab holds a piece of the map.
     let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
     let mut ply = PlyWriter::begin_in(out, "the world", axes).map_err(FleetError::io(out))?;

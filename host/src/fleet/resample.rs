@@ -210,14 +210,14 @@ impl<'s> SourceMap<'s> {
         sums
     }
 
-    /// Distance, weight and colour at a place in the run's lattice.
-    fn interpolated(&mut self, place: [f64; 3]) -> Option<(i16, u8, [u8; 3])> {
-        let near = place.map(f64::round);
-        // A place that rounding moved off a lattice point is on it.
-        let place: [f64; 3] =
-            std::array::from_fn(|axis| if (place[axis] - near[axis]).abs() < ROUNDING { near[axis] } else { place[axis] });
-        let low = place.map(f64::floor);
-        let share: [f64; 3] = std::array::from_fn(|axis| place[axis] - low[axis]);
+    /// Distance, weight and colour at a point of the run's lattice, between its lattice points.
+    fn interpolated(&mut self, point: [f64; 3]) -> Option<(i16, u8, [u8; 3])> {
+        let near = point.map(f64::round);
+        // A point that rounding moved off a lattice point is on it.
+        let point: [f64; 3] =
+            std::array::from_fn(|axis| if (point[axis] - near[axis]).abs() < ROUNDING { near[axis] } else { point[axis] });
+        let low = point.map(f64::floor);
+        let share: [f64; 3] = std::array::from_fn(|axis| point[axis] - low[axis]);
         let mut sums = [0.0; 5];
         for corner in 0..8usize {
             let ahead: [bool; 3] = std::array::from_fn(|axis| corner >> axis & 1 == 1);

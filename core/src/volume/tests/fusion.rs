@@ -54,6 +54,11 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
     });
 }
 
+/// The colour that a pixel shows.
+fn target_colour(seen: &Observation<'_>, u: usize, v: usize) -> [u8; 3] {
+    seen.colour.map_or_else(|| [seen.grey.get(u, v).unwrap(); 3], |image| image.get(u, v).unwrap())
+}
+
 /// Fusion as its module states it, one voxel after the other, and as plainly.
 fn fuse_slowly(
     config: &VolumeConfig,
@@ -93,7 +98,7 @@ fn fuse_slowly(
         // The lowest five bits: sixteenths less one, and whether the colour is another's.
         let notes = if seen.noted { depth.to_bits() & 31 } else { 15 };
         let distance = distance * ((notes & 15) + 1) as f32 / 16.0;
-        if distance < -config.behind_m.max(2.0 * config.voxel_size_m) {
+        if distance < -crate::geometry::scalar::max_f32(config.behind_m, 2.0 * config.voxel_size_m) {
             continue;
         }
         let observed =
@@ -105,16 +110,12 @@ fn fuse_slowly(
         }
         sdf[voxel] = averaged(i32::from(sdf[voxel]), observed, gain, w + gain) as i16;
         weight[voxel] = (w + gain).min(i32::from(config.max_weight)) as u8;
-        if distance.abs() > config.colour_band * config.truncation_m {
-            continue;
-        }
         let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
-        if !is_blank && notes & 16 != 0 {
+        if distance.abs() > config.colour_band * config.truncation_m || !is_blank && notes & 16 != 0 {
             continue;
         }
         let sum = if is_blank { 1 } else { i32::from(weight[voxel]).clamp(2, 6) };
-        let target = seen.colour.map_or_else(|| [seen.grey.get(u, v).unwrap(); 3], |image| image.get(u, v).unwrap());
-        for (plane, target) in colour.iter_mut().zip(target) {
+        for (plane, target) in colour.iter_mut().zip(target_colour(seen, u, v)) {
             plane[voxel] = averaged(i32::from(plane[voxel]), i32::from(target.max(1)), 1, sum) as u8;
         }
     }

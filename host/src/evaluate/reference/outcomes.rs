@@ -35,7 +35,7 @@ impl PointOutcomes {
 }
 
 /// Accuracy of each run on the points that all runs show: means over the frames that all of them evaluated, at the same points. And how many points that are.
-/// `None` where there is none.
+/// `None` without runs or points.
 pub fn on_common_points(runs: &[&[PointOutcomes]]) -> Option<(Vec<f64>, u64)> {
     let (first, _) = runs.split_first()?;
     let (mut sums, mut frames, mut points) = (vec![0.0; runs.len()], 0u32, 0u64);
@@ -65,7 +65,7 @@ mod tests {
     #[test]
     fn only_points_that_all_show_count() {
         let run = |shown: u64, right: u64| vec![PointOutcomes { frame: 3, points: 5, shown: vec![shown], right: vec![right] }];
-        // The second run drops two points, one of which was wrong in the first.
+        // The second run drops two points; one was wrong in the first.
         let (first, second) = (run(0b11111, 0b00111), run(0b01101, 0b01101));
         let (accuracy, points) = on_common_points(&[&first, &second]).unwrap();
         assert_eq!((accuracy, points), (vec![2.0 / 3.0, 1.0], 3));

@@ -145,7 +145,7 @@ impl Checkpoint {
     /// Reads the last checkpoint in a run's folder that is whole, but for the mapper's part. With it comes what is wrong with a later one.
     ///
     /// # Errors
-    /// The last checkpoint is missing, of another version, or damaged, and there is none before it.
+    /// The last checkpoint is missing, of another version, or damaged, and so is the one before it.
     pub fn read(folder: &RunFolder) -> Result<(Self, Option<ResumeError>), ResumeError> {
         let last = Self::of_file(folder.snapshot());
         let error = match last {
