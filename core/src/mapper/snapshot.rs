@@ -127,7 +127,22 @@ impl<'s> Mapper<'s> {
         slab: &'s mut [u8],
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
     ) -> Result<Self, RestoreError<E>> {
-        let mut mapper = Self::new(capacity, config, slab).map_err(RestoreError::New)?;
+        // Used where it lies, as a mapper is some kilobytes: each move would take as much stack again.
+        let mut made = Self::new(capacity, config, slab).map_err(RestoreError::New);
+        if let Ok(mapper) = &mut made {
+            mapper.read(capacity, config, source)?;
+        }
+        made
+    }
+
+    /// Reads what [`Mapper::save`] wrote into a new mapper.
+    #[inline(never)]
+    fn read<E>(
+        &mut self,
+        capacity: &Capacity,
+        config: &Config,
+        source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
+    ) -> Result<(), RestoreError<E>> {
         let mut reader = Reader::new(source);
         let (mut magic, mut version, mut prints) = ([0; 8], 0, [0; 2]);
         reader.bytes(&mut magic);
@@ -148,9 +163,9 @@ impl<'s> Mapper<'s> {
         if prints[1] != fingerprint(config) {
             return Err(RestoreError::Config);
         }
-        mapper.visit(&mut reader);
+        self.visit(&mut reader);
         reader.finish()?;
-        if mapper.rebuild() { Ok(mapper) } else { Err(RestoreError::Damaged) }
+        if self.rebuild() { Ok(()) } else { Err(RestoreError::Damaged) }
     }
 
     /// Visits what lives from frame to frame; [`Mapper::rebuild`] must follow a reading.

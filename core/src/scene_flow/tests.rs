@@ -89,7 +89,7 @@ fn another_size_or_too_large_a_frame_begins_anew() {
         matcher.push(&config, image(left), image(right), &Serial).status
     };
     assert_eq!(push([WIDTH, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::First);
-    assert_eq!(push([WIDTH, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::Matched);
+    assert_eq!(push([WIDTH, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::Repeated);
     assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH - 1, HEIGHT]), FlowStatus::First);
     assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::Refused);
     assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH - 1, HEIGHT]), FlowStatus::First);

@@ -24,6 +24,7 @@ use crate::run::{
     SNAPSHOT_FILE, Streaming, has_snapshot,
 };
 use anyhow::bail;
+use examine::Examined;
 use instances::InstancesArgs;
 use std::path::{Path, PathBuf};
 
@@ -244,12 +245,12 @@ fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
     settings.set_rectified_size(args.rectified.over(settings.rectified_size()));
     let recorded = args.open(&settings, stop)?;
     // Before networks, which would run on every image that is examined.
-    let warnings = examine::warnings(args, recorded.as_ref())?;
+    let Examined { warnings, interval_s } = examine::examine(args, recorded.as_ref())?;
     let dataset = args.dress(recorded)?;
     let (profile, capacity) = args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;
     settings.fit(&capacity);
     let frames = FrameNumbers::of(dataset.as_ref(), args.start, args.stride, args.frames)?;
-    if let Some(interval_s) = run::frame_interval_s(dataset.as_ref(), &frames) {
+    if let Some(interval_s) = interval_s {
         settings.set_frame_interval_s(interval_s);
     }
     if let Some(finds_motion) = args.masks.instances.finds_motion() {

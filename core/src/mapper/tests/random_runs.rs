@@ -134,5 +134,5 @@ fn a_thousand_runs_resumed_anywhere_give_the_digests_and_the_state_of_those_that
         assert!(resumed.unwrap() == end, "run {seed} stopped before {stop}: the states at the end differ");
     }
     println!("{RUNS} runs: {coverage:?}");
-    assert!(coverage.least() >= 100, "{coverage:?}");
+    assert!(coverage.least() >= 80, "{coverage:?}");
 }

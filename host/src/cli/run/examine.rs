@@ -3,18 +3,32 @@
 use super::RunArgs;
 use crate::input::FrameSource;
 use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
-use crate::run::FrameNumbers;
+use crate::run::{FrameNumbers, frame_interval_s};
 
-/// Examines the images of a recording, without masks and injected faults: warnings.
+/// What a recording says of itself.
+pub struct Examined {
+    /// What is doubtful about its images.
+    pub warnings: Vec<String>,
+    /// Time from frame to frame, s, where it is known.
+    pub interval_s: Option<f64>,
+}
+
+/// Examines a recording without masks and injected faults.
 ///
 /// # Errors
-/// They would make a map meaningless, and `--force` is not given.
-pub fn warnings(args: &RunArgs, dataset: &dyn FrameSource) -> anyhow::Result<Vec<String>> {
+/// Its images would make a map meaningless, and `--force` is not given.
+pub fn examine(args: &RunArgs, dataset: &dyn FrameSource) -> anyhow::Result<Examined> {
+    let frames = FrameNumbers::of(dataset, args.start, args.stride, args.frames)?;
+    // Of a stream while no frame has come: then it is its nominal interval.
+    let interval_s = frame_interval_s(dataset, &frames);
+    Ok(Examined { warnings: warnings(args, dataset, &frames)?, interval_s })
+}
+
+fn warnings(args: &RunArgs, dataset: &dyn FrameSource, frames: &FrameNumbers) -> anyhow::Result<Vec<String>> {
     if args.path.is_none() {
         // The synthetic street knows what it renders.
         return Ok(Vec::new());
     }
-    let frames = FrameNumbers::of(dataset, args.start, args.stride, args.frames)?;
     let stream = dataset.stream().is_some();
     // Of a stream the first frame can be looked at, and a camera may begin in the dark.
     let findings = diagnosis::examine(dataset, if stream { &[0] } else { frames.listed() })?;
