@@ -1,8 +1,8 @@
 //! What the fixture does not come to: every other way into the core, so that the proofs see it, and its bits are compared from machine to
 //! machine as well.
 
-use core::hint::black_box;
 use crate::fixture;
+use core::hint::black_box;
 use dynvox_clip::{Clip, Frame};
 use dynvox_core::{
     Capacity, Mapper, Serial, StereoFrame,
