@@ -165,7 +165,7 @@ pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
         Action::Pack { fixture, out, rust } => {
             let bytes = fixtures::pack(fixture)?;
             if let Some(rust) = rust {
-                let text = fixtures::constants(fixture)?;
+                let text = fixtures::constants(fixture, &bytes)?;
                 write_whole(rust, |file| file.write_all(text.as_bytes()))?;
             }
             write_whole(out, |file| file.write_all(&bytes))?;

@@ -5,6 +5,7 @@
 
 pub mod calibration;
 mod capacity;
+mod checksum;
 mod draft;
 mod error;
 mod image;
@@ -20,6 +21,7 @@ mod rows;
 mod tests;
 
 pub use capacity::{CapacityFile, CapacityTable};
+pub use checksum::checksum_of;
 pub use draft::DraftFolder;
 pub use error::{FormatError, read_text};
 pub use image::{Image, luma};

@@ -2,7 +2,7 @@
 //! of each; a resumed run truncates what was written after it.
 
 use super::ObserveError;
-use super::written_file::checksum_of;
+use crate::formats::checksum_of;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{ErrorKind, Write};

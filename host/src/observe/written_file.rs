@@ -1,13 +1,11 @@
 //! Files that the run wrote once: a resumed run refuses to go on without them.
 
 use super::ObserveError;
+use crate::formats::checksum_of;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::io::{self, ErrorKind, Read};
+use std::io::ErrorKind;
 use std::path::Path;
-
-/// Bytes read at once.
-const WINDOW_BYTES: usize = 16 << 10;
 
 /// A file below the run folder as it was written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,21 +51,6 @@ impl WrittenFile {
             return Err(changed("it is truncated or changed. Start the run again with --overwrite"));
         }
         Ok(())
-    }
-}
-
-/// CRC-32 of the first bytes of a file; `None` of a shorter one.
-pub(super) fn checksum_of(file: &File, bytes: u64) -> io::Result<Option<u32>> {
-    let (mut checksum, mut left, mut window) = (crc32fast::Hasher::new(), bytes, vec![0; WINDOW_BYTES]);
-    let mut rest = file.take(bytes);
-    loop {
-        match rest.read(&mut window)? {
-            0 => return Ok((left == 0).then(|| checksum.finalize())),
-            read => {
-                checksum.update(&window[..read]);
-                left -= read as u64;
-            }
-        }
     }
 }
 

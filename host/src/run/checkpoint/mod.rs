@@ -26,6 +26,7 @@ pub use manifest::RunManifest;
 use super::Plan;
 use super::state::RunState;
 use super::{FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, write_whole};
+use crate::formats::checksum_of;
 use crate::run::store::Position;
 use dynvox_core::Mapper;
 use dynvox_core::RestoreError;
@@ -41,8 +42,6 @@ const VERSION: u32 = 5;
 const HEAD: usize = 20;
 /// Checksum.
 const TAIL: usize = 4;
-/// Bytes read at once to check a file.
-const WINDOW_BYTES: usize = 1 << 16;
 
 /// When a run writes checkpoints.
 #[derive(Clone, Debug)]
@@ -113,18 +112,11 @@ fn open(path: &Path) -> Result<(BufReader<File>, [u64; 2]), ResumeError> {
     let part_len = head[12..].iter().rev().fold(0, |len, byte| len << 8 | u64::from(*byte));
     let content_len = len.checked_sub((HEAD + TAIL) as u64).ok_or_else(damaged)?;
     let mapper_len = content_len.checked_sub(part_len).ok_or_else(damaged)?;
-    let mut checksum = crc32fast::Hasher::new();
-    checksum.update(&head);
-    let (mut window, mut left) = (vec![0; WINDOW_BYTES], content_len);
-    while left > 0 {
-        let piece = &mut window[..left.min(WINDOW_BYTES as u64) as usize];
-        file.read_exact(piece).map_err(failed)?;
-        checksum.update(piece);
-        left -= piece.len() as u64;
-    }
+    file.rewind().map_err(failed)?;
+    let checksum = checksum_of(&file, HEAD as u64 + content_len).map_err(failed)?;
     let mut tail = [0; TAIL];
     file.read_exact(&mut tail).map_err(failed)?;
-    if checksum.finalize() != u32::from_le_bytes(tail) {
+    if checksum != Some(u32::from_le_bytes(tail)) {
         return Err(damaged());
     }
     file.seek(SeekFrom::Start(HEAD as u64)).map_err(failed)?;
