@@ -2,7 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// One scene point seen four times. Positions are (u, v) in px from the centre of the top left pixel.
+/// One scene point seen four times. Positions are (u, v) in px from the centre of the top left pixel; of a refined match those of the middle
+/// of its patch, half a pixel above and to the left of the feature's pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Match {

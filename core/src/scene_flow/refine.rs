@@ -15,13 +15,19 @@ const STEPS: usize = 8;
 /// A patch farther than this from where the circle put it is lost, px.
 const FARTHEST_PX: f64 = 1.75;
 /// A step below this is the last one, px.
-const SMALL_STEP_PX: f64 = 0.06;
+pub(super) const SMALL_STEP_PX: f64 = 0.06;
 /// The same where a motion was supposed: what is left of the way errs towards that motion in every patch alike, and would confirm it.
 const GUESSED_STEP_PX: f64 = 0.01;
 /// Correlation with the template below which a patch that no descriptor vouches for is another.
 const ALIKE_MIN: f64 = 0.8;
 /// Smallest eigenvalue of a patch's structure matrix (of doubled gradients) below which it cannot be placed.
 const TEXTURE_MIN: f64 = 2_000.0;
+
+/// The middle of the patch around a pixel, px: the patch reaches a pixel farther up and to the left. As the camera comes nearer a patch grows
+/// about its middle, so that the middle alone stays the same scene point; the pixel would move off it by half a pixel's share of that growth.
+pub(super) fn middle(pixel: [f32; 2]) -> [f32; 2] {
+    pixel.map(|px| px - 0.5)
+}
 
 /// One whole image, rows `width` apart.
 #[derive(Clone, Copy)]
@@ -31,7 +37,7 @@ pub(super) struct Pixels<'a> {
 }
 
 /// A patch, its gradients and what is needed to solve for its movement.
-struct Template {
+pub(super) struct Template {
     pixel: [[i16; SIDE]; SIDE],
     along: [[i16; SIDE]; SIDE],
     down: [[i16; SIDE]; SIDE],
@@ -57,7 +63,7 @@ fn sum(a: &[[i16; SIDE]; SIDE]) -> i32 {
 
 impl Template {
     /// The patch centred on pixel (u, v); `None` too near the border or where nothing can be placed.
-    fn extract(image: Pixels<'_>, u: usize, v: usize) -> Option<Self> {
+    pub(super) fn extract(image: Pixels<'_>, u: usize, v: usize) -> Option<Self> {
         let (left, top) = (u.checked_sub(SIDE / 2 + 1)?, v.checked_sub(SIDE / 2 + 1)?);
         if left + SIDE + 2 > image.width {
             return None;
@@ -105,7 +111,7 @@ impl Template {
     }
 
     /// Where the patch is in another image, begun at (u, v); the first step below `small_step_px` is the last one.
-    fn find(&self, image: Pixels<'_>, [u, v]: [f32; 2], small_step_px: f64) -> Option<[f32; 2]> {
+    pub(super) fn find(&self, image: Pixels<'_>, [u, v]: [f32; 2], small_step_px: f64) -> Option<[f32; 2]> {
         let begin = [f64::from(u), f64::from(v)];
         let mut at = begin;
         for _ in 0..STEPS {
@@ -186,11 +192,11 @@ impl Template {
 pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
     let [u, v] = m.current_left.map(|x| x as usize);
     let template = Template::extract(images.current_left, u, v)?;
-    let find = |image, at| template.find(image, at, GUESSED_STEP_PX).filter(|&at| template.is_alike(image, at));
+    let find = |image, at| template.find(image, at, GUESSED_STEP_PX).filter(|&at| template.is_alike(image, at)).map(middle);
     let found = Match {
         previous_left: find(images.previous_left, m.previous_left)?,
         previous_right: find(images.previous_right, m.previous_right)?,
-        current_left: m.current_left,
+        current_left: middle(m.current_left),
         current_right: find(images.current_right, m.current_right)?,
     };
     let valid = found.previous_disparity_px() > 0.0 && found.current_disparity_px() > 0.0;
@@ -211,11 +217,12 @@ pub(super) struct Images<'a> {
 pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
     let [u, v] = m.previous_left.map(|x| x as usize);
     let template = Template::extract(images.previous_left, u, v)?;
+    let find = |image, at| template.find(image, at, SMALL_STEP_PX).map(middle);
     let refined = Match {
-        previous_left: m.previous_left,
-        previous_right: template.find(images.previous_right, m.previous_right, SMALL_STEP_PX)?,
-        current_left: template.find(images.current_left, m.current_left, SMALL_STEP_PX)?,
-        current_right: template.find(images.current_right, m.current_right, SMALL_STEP_PX)?,
+        previous_left: middle(m.previous_left),
+        previous_right: find(images.previous_right, m.previous_right)?,
+        current_left: find(images.current_left, m.current_left)?,
+        current_right: find(images.current_right, m.current_right)?,
     };
     let valid = refined.previous_disparity_px() > 0.0 && refined.current_disparity_px() > 0.0;
     valid.then_some((refined, template.texture as f32))

@@ -23,7 +23,8 @@ pub enum GapEnds {
 }
 
 /// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving, [`StereoConfig::dynslam`] DynSLAM's, which fills wider
-/// gaps; [`Default`] fills wider ones still, but only within a surface (docs/decisions/0028-gaps-within-a-surface.md).
+/// gaps; [`Default`] fills wider ones still, but only within a surface (docs/decisions/0028-gaps-within-a-surface.md), and asks less of a
+/// support match.
 ///
 /// ```
 /// use dynvox_core::stereo::StereoConfig;
@@ -37,7 +38,8 @@ pub enum GapEnds {
 pub struct StereoConfig {
     /// Largest disparity searched, px, 10..=255. Published: 255.
     pub disparity_max: u16,
-    /// A support match must cost less than this share of the second best, above 0, at most 1. Published: 0.85.
+    /// A support match must cost less than this share of the second best, above 0, at most 1. 0.9
+    /// (docs/decisions/0035-support-matches-below-nine-tenths.md); published: 0.85.
     pub support_ratio: f32,
     /// Least texture of a support point's descriptor: sum of gradient magnitudes over its 16 samples. Published: 10.
     pub support_texture: u16,
@@ -153,6 +155,11 @@ impl StereoConfig {
 
 impl Default for StereoConfig {
     fn default() -> Self {
-        Self { gap_width: 40, gap_ends: GapEnds::Surface, ..Self::robotics() }
+        Self {
+            support_ratio: 0.9,
+            gap_width: 40,
+            gap_ends: GapEnds::Surface,
+            ..Self::robotics()
+        }
     }
 }
