@@ -3,6 +3,7 @@
 //! The README's example is compiled and run with the doc tests of this package.
 #![cfg_attr(doctest, doc = include_str!("../../README.md"))]
 
+pub mod fuzz;
 pub mod source;
 
 use dynvox::input::InstanceMask;

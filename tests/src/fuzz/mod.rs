@@ -1,0 +1,48 @@
+//! Everything that reads bytes from outside, as fuzz targets: each takes any bytes and may refuse them, but neither panics nor hangs nor takes
+//! memory that the bytes do not pay for.
+//!
+//! The same targets run three ways: as seeded tests (`cargo test --test fuzz`, a fixed number of mutations of valid inputs), for a given time
+//! (`DYNVOX_FUZZ_SECONDS=1800 cargo test --release --test fuzz`), and under cargo-fuzz with coverage (`tests/fuzz`).
+
+mod drive;
+mod files;
+mod mutate;
+mod seeds;
+
+pub use mutate::Mutator;
+
+/// A reader that takes any bytes.
+#[derive(Clone, Copy)]
+pub struct Target {
+    /// Its name, as `cargo fuzz run NAME` has it.
+    pub name: &'static str,
+    /// Inputs that it takes.
+    pub seeds: fn() -> Vec<Vec<u8>>,
+    /// Hands it bytes. Whether it took them.
+    pub run: fn(&[u8]) -> bool,
+}
+
+/// All targets.
+pub const TARGETS: [Target; 12] = [
+    Target { name: "calibration", seeds: seeds::calibrations, run: files::calibration },
+    Target { name: "poses", seeds: seeds::poses, run: files::poses },
+    Target { name: "times", seeds: seeds::times, run: files::times },
+    Target { name: "recording", seeds: seeds::recording, run: files::recording },
+    Target { name: "pictures", seeds: seeds::pictures, run: files::pictures },
+    Target { name: "depth", seeds: seeds::depth, run: files::depth },
+    Target { name: "masks", seeds: seeds::masks, run: files::masks },
+    Target { name: "store", seeds: seeds::store, run: files::store },
+    Target { name: "stream", seeds: seeds::stream, run: files::stream },
+    Target { name: "clip", seeds: seeds::clip, run: drive::clip },
+    Target { name: "snapshot", seeds: drive::snapshots, run: drive::snapshot },
+    Target { name: "settings", seeds: seeds::settings, run: drive::settings },
+];
+
+/// Hands bytes to the target of a name.
+///
+/// # Panics
+/// There is none, or it has a fault.
+pub fn run(name: &str, bytes: &[u8]) {
+    let target = TARGETS.iter().find(|target| target.name == name).expect("the target is listed");
+    (target.run)(bytes);
+}

@@ -1,0 +1,69 @@
+//! Each fuzz target on mutations of valid inputs: a fixed number of them by seed, or for `DYNVOX_FUZZ_SECONDS` a target.
+
+use std::time::{Duration, Instant};
+
+use dynvox_tests::fuzz::{Mutator, TARGETS, Target};
+
+/// Mutations of a target in an ordinary run.
+const MUTATIONS: u32 = 400;
+/// Longest time one input may take. It is far above what any takes: it tells a hang from a slow machine.
+const INPUT_MAX: Duration = Duration::from_secs(20);
+
+/// Runs a target on mutations, and prints how many there were and how many it took.
+fn fuzz(target: &Target) {
+    let seeds = (target.seeds)();
+    let seconds = std::env::var("DYNVOX_FUZZ_SECONDS").ok().and_then(|text| text.parse().ok());
+    let (begin, mut mutator) = (Instant::now(), Mutator::new(1));
+    let (mut runs, mut taken) = (0_u32, 0_u32);
+    let go_on = |runs: u32| match seconds {
+        Some(seconds) => begin.elapsed() < Duration::from_secs(seconds),
+        None => runs < MUTATIONS,
+    };
+    while go_on(runs) {
+        let bytes = mutator.mutate(&seeds);
+        let at = Instant::now();
+        let run = || (target.run)(&bytes);
+        match std::panic::catch_unwind(run) {
+            Ok(took) => taken += u32::from(took),
+            Err(_) => panic!("{} panics at run {runs} on {} bytes: {:02x?}", target.name, bytes.len(), &bytes[..bytes.len().min(4_000)]),
+        }
+        assert!(at.elapsed() < INPUT_MAX, "{} takes {:?} at run {runs}", target.name, at.elapsed());
+        runs += 1;
+    }
+    println!("{}: {runs} runs, {taken} taken, {:.0} s", target.name, begin.elapsed().as_secs_f64());
+}
+
+#[test]
+fn valid_inputs_are_taken() {
+    for target in TARGETS {
+        for (at, seed) in (target.seeds)().iter().enumerate() {
+            assert!((target.run)(seed), "{} refuses input {at}: {:?}", target.name, String::from_utf8_lossy(seed));
+        }
+    }
+}
+
+#[test]
+fn mutations_are_made_by_their_seed() {
+    let seeds = vec![b"one".to_vec(), b"another".to_vec()];
+    let of = |seed| {
+        let mut mutator = Mutator::new(seed);
+        (0..20).map(|_| mutator.mutate(&seeds)).collect::<Vec<_>>()
+    };
+    assert_eq!(of(3), of(3));
+    assert_ne!(of(3), of(4));
+}
+
+macro_rules! targets {
+    ($($name:ident),*) => {
+        $(#[test]
+        fn $name() {
+            fuzz(TARGETS.iter().find(|target| target.name == stringify!($name)).expect("the target is listed"));
+        })*
+
+        #[test]
+        fn every_target_is_run() {
+            assert_eq!(TARGETS.map(|target| target.name), [$(stringify!($name)),*]);
+        }
+    };
+}
+targets!(calibration, poses, times, recording, pictures, depth, masks, store, stream, clip, snapshot, settings);
