@@ -31,6 +31,8 @@ mod sweep;
 mod synth;
 mod view;
 
+pub use run::{MapperPlan, check_options, mapper_of, plan_of};
+
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -148,8 +150,12 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// An error with its causes. A cause that is a part of the text already is not repeated.
-fn sentence(error: &anyhow::Error) -> String {
+/// An error with its causes. A cause that is a part of the text already is not repeated, nor is how a command is used.
+pub fn sentence(error: &anyhow::Error) -> String {
+    if let Some(refused) = error.downcast_ref::<clap::Error>() {
+        let text = refused.to_string();
+        return text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+    }
     error
         .chain()
         .skip(1)

@@ -2,6 +2,7 @@
 
 mod examine;
 mod instances;
+mod plan;
 mod results;
 mod resume;
 mod stream;
@@ -20,17 +21,15 @@ use crate::observe::Reference;
 use crate::report;
 use crate::report::text::counted;
 use crate::run::{
-    self, BLOCKS_FILE, Checkpoint, FrameNumbers, Incomplete, MAP_FILE, PREVIOUS_SNAPSHOT_FILE, Plan, RunError, RunFolder, RunRecord,
-    SNAPSHOT_FILE, Streaming, has_snapshot,
+    self, BLOCKS_FILE, Checkpoint, Incomplete, MAP_FILE, PREVIOUS_SNAPSHOT_FILE, Plan, RunError, RunFolder, RunRecord, SNAPSHOT_FILE,
+    has_snapshot,
 };
 use anyhow::bail;
-use examine::Examined;
 use instances::InstancesArgs;
+use plan::plan;
+pub use plan::{MapperPlan, check_options, mapper_of, plan_of};
 use std::path::{Path, PathBuf};
 
-const MIB: u64 = 1 << 20;
-/// Threads at most.
-const MOST_THREADS: usize = 256;
 /// Where run folders go unless `--out` says otherwise.
 const DEFAULT_PARENT: &str = "out";
 
@@ -232,67 +231,6 @@ fn rate_hz(text: &str) -> Result<f64, String> {
     rate.ok_or_else(|| "must be a number above 0".to_owned())
 }
 
-/// The plan of a run.
-fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
-    let mut settings = Settings::resolve(args.config.as_deref(), &args.set)?;
-    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
-    if threads > MOST_THREADS {
-        bail!("--threads {threads} is more than {MOST_THREADS}. Give at most the number of processors");
-    }
-    if threads == 0 || args.stride == 0 || args.frames == Some(0) {
-        bail!("--threads, --stride and --frames must be at least 1. Give a larger number");
-    }
-    settings.set_rectified_size(args.rectified.over(settings.rectified_size()));
-    let recorded = args.open(&settings, stop)?;
-    // Before networks, which would run on every image that is examined.
-    let Examined { warnings, interval_s } = examine::examine(args, recorded.as_ref())?;
-    let dataset = args.dress(recorded)?;
-    let (profile, capacity) = args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;
-    settings.fit(&capacity);
-    let frames = FrameNumbers::of(dataset.as_ref(), args.start, args.stride, args.frames)?;
-    if let Some(interval_s) = interval_s {
-        settings.set_frame_interval_s(interval_s);
-    }
-    if let Some(finds_motion) = args.masks.instances.finds_motion() {
-        settings.set_motion_segmentation(finds_motion);
-    }
-    if let Some(dynamic) = args.dynamic {
-        settings.set_dynamic(dynamic);
-    }
-    if let Some(fuse_every) = args.fuse_every {
-        settings.set_fuse_every(fuse_every);
-    }
-    let poses = match &args.egomotion {
-        Some(choice) => choice.apply(&mut settings, dataset.as_ref(), frames.listed())?,
-        None => None,
-    };
-    Ok(Plan {
-        warnings,
-        frames,
-        skip_bad_frames: args.skip_bad_frames,
-        stop: stop.clone(),
-        poses,
-        profile,
-        capacity,
-        config: settings.config(dataset.rig(), dataset.rectification()),
-        config_toml: settings.to_toml(args.path.is_none())?,
-        threads,
-        checkpoints: None,
-        streaming: (!args.no_stream).then_some(Streaming {
-            most_bytes: args.stream_mib.map(|mib| mib.saturating_mul(MIB)),
-            keep_file: args.keep_blocks,
-        }),
-        export: args.export.options(),
-        strict: args.strict,
-        evaluate: args.evaluate,
-        evaluation_delay: args.evaluation_delay,
-        save_instances: None,
-        rss_limit_bytes: args.rss_limit_mib.map_or(run::resident_limit_bytes(&capacity, dataset.size()), |mib| mib.saturating_mul(MIB)),
-        quiet: args.silent(),
-        dataset,
-    })
-}
-
 /// Maps into a folder. An error about sizes lists the profiles; one that leaves a snapshot says how to resume.
 fn map(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> anyhow::Result<RunRecord> {
     run::run(plan, folder, checkpoint).map_err(|error| match error {
@@ -303,11 +241,6 @@ fn map(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> anyho
         }
         error => error.into(),
     })
-}
-
-/// The plan of a command line, the program's name first.
-pub fn plan_of(line: &[String]) -> anyhow::Result<Plan> {
-    plan(&RunArgs::parse(line)?, &StopRequest::default())
 }
 
 /// A run without a folder: its files go to a scratch directory and are removed.

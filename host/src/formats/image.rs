@@ -31,6 +31,11 @@ impl<T> Image<T> {
         &self.pixels
     }
 
+    /// Hands out the pixels.
+    pub fn into_pixels(self) -> Vec<T> {
+        self.pixels
+    }
+
     /// Borrows it as the core takes images.
     pub fn view(&self) -> Option<View<'_, T>> {
         View::new(&self.pixels, self.width, self.height)

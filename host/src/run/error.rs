@@ -189,7 +189,7 @@ pub(super) fn refused(profile: &str, error: NewError) -> RunError {
 }
 
 /// The core's refusal of a frame, in words.
-pub(super) fn step_reason(error: StepError) -> String {
+pub fn step_reason(error: StepError) -> String {
     match error {
         StepError::SizesDiffer => "its images differ in size".to_owned(),
         StepError::RawSizeDiffers { width, height } => {

@@ -97,34 +97,42 @@ impl Plan {
         {
             return Err(RunError::NoReference { reference, frames: self.frames.listed().len(), delay: self.evaluation_delay });
         }
-        let fits = |capacity: &Capacity| width <= capacity.image_width && height <= capacity.image_height;
-        if !fits(&self.capacity) {
-            let scale = (self.capacity.image_width as f64 / width as f64).min(self.capacity.image_height as f64 / height as f64);
-            let scale = (scale * 100.0).floor() / 100.0;
-            let larger = Capacity::PROFILES.iter().find(|(_, capacity)| fits(capacity));
-            return Err(RunError::ImageSize {
-                width,
-                height,
-                profile: self.profile.clone(),
-                fits_width: self.capacity.image_width,
-                fits_height: self.capacity.image_height,
-                action: match larger {
-                    Some((name, _)) => format!("Choose --profile {name}, or shrink the images with --scale {scale}"),
-                    None => format!("Shrink the images with --scale {scale}"),
-                },
-            });
-        }
-        let problems = self.config.validate();
-        let (prune_lag, history_frames) = (self.config.volume.prune_lag, self.capacity.history_frames);
-        if problems.is_empty() && self.config.volume.prune_weight > 0 && prune_lag as usize > history_frames {
-            return Err(RunError::Window { prune_lag, history_frames, profile: self.profile.clone() });
-        }
-        if problems.is_empty() {
-            return Ok(());
-        }
-        let problems: Vec<String> = problems.iter().map(|problem| format!("{} {}", problem.key, problem.rule)).collect();
-        Err(RunError::Config { problems: problems.join("; ") })
+        check_bounds((width, height), (&self.profile, &self.capacity), &self.config)
     }
+}
+
+/// Refuses bounds and settings that images of a size cannot be mapped with.
+///
+/// # Errors
+/// What does not fit, and what to change.
+pub fn check_bounds((width, height): (usize, usize), (profile, bounds): (&str, &Capacity), config: &Config) -> Result<(), RunError> {
+    let fits = |capacity: &Capacity| width <= capacity.image_width && height <= capacity.image_height;
+    if !fits(bounds) {
+        let scale = (bounds.image_width as f64 / width as f64).min(bounds.image_height as f64 / height as f64);
+        let scale = (scale * 100.0).floor() / 100.0;
+        let larger = Capacity::PROFILES.iter().find(|(_, capacity)| fits(capacity));
+        return Err(RunError::ImageSize {
+            width,
+            height,
+            profile: profile.to_owned(),
+            fits_width: bounds.image_width,
+            fits_height: bounds.image_height,
+            action: match larger {
+                Some((name, _)) => format!("Choose --profile {name}, or shrink the images with --scale {scale}"),
+                None => format!("Shrink the images with --scale {scale}"),
+            },
+        });
+    }
+    let problems = config.validate();
+    let (prune_lag, history_frames) = (config.volume.prune_lag, bounds.history_frames);
+    if problems.is_empty() && config.volume.prune_weight > 0 && prune_lag as usize > history_frames {
+        return Err(RunError::Window { prune_lag, history_frames, profile: profile.to_owned() });
+    }
+    if problems.is_empty() {
+        return Ok(());
+    }
+    let problems: Vec<String> = problems.iter().map(|problem| format!("{} {}", problem.key, problem.rule)).collect();
+    Err(RunError::Config { problems: problems.join("; ") })
 }
 
 /// The frames a run takes, by their numbers in the source.

@@ -28,6 +28,11 @@ impl InstancesArgs {
         masks::attach(dataset, &self.instances, self.instances_every)
     }
 
+    /// Whether the masks are found by the mapper, if at all.
+    pub fn need_no_recording(&self) -> bool {
+        matches!(self.instances, MaskChoice::Auto | MaskChoice::None | MaskChoice::Motion)
+    }
+
     /// Whether the masks come with a stream's pairs, or of them.
     pub fn fits_stream(&self) -> bool {
         matches!(self.instances, MaskChoice::Auto | MaskChoice::None | MaskChoice::Motion | MaskChoice::Networks(_))
