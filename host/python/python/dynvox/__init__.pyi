@@ -1,0 +1,321 @@
+"""Stereo dense mapping of streets with moving cars, for numpy.
+
+Axes are KITTI's: x right, y down, z forward; the first left camera is the world. Poses map camera to world. Lengths are metres, disparities
+1/256 px. Every error is an `Error` with the sentence that the command line prints.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from os import PathLike
+from typing import Any, Literal, TypedDict, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__version__: str
+
+class Error(Exception):
+    """What is wrong, and what to do about it."""
+
+class Pose(TypedDict):
+    """A rigid motion. `matrix` makes a matrix of it."""
+
+    rotation: tuple[float, float, float, float]
+    """Quaternion: x, y, z, w."""
+    translation_m: tuple[float, float, float]
+
+class Track(TypedDict):
+    """An object as it stands after a step."""
+
+    id: int
+    """Its number, from 1, never used again."""
+    class_name: str
+    state: Literal["uncertain", "static", "dynamic"]
+    score: float
+    """Score of its last detection."""
+    detected: bool
+    """Whether it was detected in this frame."""
+    first_frame: int
+    last_frame: int
+    sightings: int
+    """Frames it was detected in."""
+    box_px: list[int]
+    """Left, top, width, height in the left image, where it was last detected."""
+    speed_m_s: float | None
+    speed_sigma_m_s: float | None
+    measured: bool
+    """Whether the motion was measured in this frame; if not it is extrapolated."""
+    center_world_m: list[float]
+    """Centre of its matches before this frame's motion."""
+    motion_world: Pose
+    """Motion over ground within this frame."""
+    t_world_object: Pose | None
+    matches: int
+    inliers: int
+    blocks: int
+    """Blocks of its volume; 0 where it is not reconstructed."""
+
+class Region(TypedDict):
+    """A region of the slab, in bytes."""
+
+    name: str
+    bytes: int
+    used: int
+    peak: int
+
+class Raycast(TypedDict):
+    """The map as a camera sees it, height x width each."""
+
+    depth_m: NDArray[np.float32]
+    """Depth along z; 0 where there is no surface."""
+    normal: NDArray[np.int8]
+    """Normal in camera axes, towards the camera, times 127."""
+    colour: NDArray[np.uint8]
+    weight: NDArray[np.uint8]
+    """Observations at the nearest point of the lattice."""
+    object: NDArray[np.uint32]
+    """Number of the track a pixel shows; 0 for the static map."""
+
+class Frame(TypedDict, total=False):
+    """The keywords of `Mapper.step`. `left` and `right` are always there."""
+
+    left: NDArray[np.uint8]
+    right: NDArray[np.uint8]
+    colour: NDArray[np.uint8]
+    disparity_q8: NDArray[np.uint16]
+    t_world_camera: Pose
+    time_ns: int
+    detections: list[Detection]
+
+@final
+class Rig:
+    """Two identical pinhole cameras, rectified. That of a data set or of `read_calibration` can also be of raw cameras: the mapper rectifies then."""
+
+    def __init__(self, focal_px: float, center_u_px: float, center_v_px: float, baseline_m: float) -> None: ...
+    @property
+    def focal_px(self) -> float: ...
+    @property
+    def center_u_px(self) -> float: ...
+    @property
+    def center_v_px(self) -> float: ...
+    @property
+    def baseline_m(self) -> float: ...
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height of rectified pictures, where known."""
+
+    @property
+    def raw_size(self) -> tuple[int, int] | None:
+        """Width and height of raw pictures; None where pairs come rectified."""
+
+def read_calibration(
+    *files: str | PathLike[str],
+    image: tuple[int, int] | None = None,
+    rectified: tuple[int, int] | None = None,
+    rectified_focal_px: float | None = None,
+) -> Rig:
+    """Reads a calibration in any format that `dynvox calibration` reads: one file with both cameras, or one for each.
+
+    `image` is the raw pictures' size, where the files do not say it; `rectified` and `rectified_focal_px` are as the options of that name.
+    """
+
+@final
+class Detection:
+    """An instance in the left image: a mask in a box whose first column and row are `left` and `top`."""
+
+    def __init__(
+        self, mask: NDArray[np.uint8] | NDArray[np.bool_], left: int, top: int, class_name: str = "car", score: float = 1.0
+    ) -> None: ...
+    @property
+    def mask(self) -> NDArray[np.uint8]: ...
+    @property
+    def left(self) -> int: ...
+    @property
+    def top(self) -> int: ...
+    @property
+    def class_name(self) -> str: ...
+    @property
+    def score(self) -> float: ...
+
+def detections_of(instances: ArrayLike, class_names: Sequence[str], scores: Sequence[float] | None = None) -> list[Detection]:
+    """Detections of an image of instances: pixel k shows instance k, of class `class_names[k - 1]`; 0 shows none."""
+
+def matrix(pose: Pose) -> NDArray[np.float64]:
+    """A pose of a report as a matrix of 4 x 4."""
+
+@final
+class Mapper:
+    """A stereo mapper in one slab of memory, which is taken when the pictures' size is known: with `image`, else at the first pair.
+
+    Other threads of Python run while it works. One mapper serves one thread at a time; others wait.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        image: tuple[int, int] | None = None,
+        frame_interval_s: float | None = None,
+        stream: bool | str | PathLike[str] = True,
+        memory: str | None = "256MiB",
+        profile: Literal["tiny", "small", "onboard", "desktop"] | None = None,
+        capacity: str | PathLike[str] | None = None,
+        planning: str | None = None,
+        planning_3d: bool = False,
+        threads: int | None = None,
+        config: str | PathLike[str] | None = None,
+        set: Mapping[str, Any] | None = None,
+        dynamic: bool | None = None,
+        fuse_every: int | None = None,
+        instances: Literal["auto", "motion", "none"] = "auto",
+        egomotion: Literal["stereo", "icp"] = "stereo",
+    ) -> None:
+        """`image` is (width, height). `frame_interval_s` is the time between two frames without `time_ns`.
+
+        `stream`: evicted blocks go to a temporary file; to the file of a path; with False they are lost, and counted. All others are the
+        options of `dynvox run`: `set={"volume.voxel_size_m": 0.1}` is `--set volume.voxel_size_m=0.1`.
+        """
+
+    def step(
+        self,
+        left: NDArray[np.uint8],
+        right: NDArray[np.uint8],
+        *,
+        colour: NDArray[np.uint8] | None = None,
+        classes: NDArray[np.uint8] | None = None,
+        disparity_q8: NDArray[np.uint16] | None = None,
+        t_world_camera: ArrayLike | Pose | None = None,
+        time_ns: int | None = None,
+        detections: Iterable[Detection] | None = None,
+    ) -> dict[str, Any]:
+        """Maps one pair and returns the report, with the fields of `dynvox_core::Report` and `severity`.
+
+        Pictures are height x width, or height x width x 3 (red, green, blue): the left one is then fused in colour, and grey is computed.
+        No grey picture, colour, disparity or mask is copied; rows may lie apart, as in a part of a larger array. `t_world_camera` replaces the
+        egomotion and `disparity_q8` the stereo matching: give them with every frame.
+        """
+
+    def finish(self) -> dict[str, Any]:
+        """Ends a sequence: prunes what is still in the window."""
+
+    @property
+    def tracks(self) -> list[Track]:
+        """What is tracked after the last step, oldest first."""
+
+    def raycast(self, t_world_camera: ArrayLike | Pose | None = None, *, objects: bool = True) -> Raycast:
+        """The map seen from a pose, the last one of the camera without one; with the objects where they are now."""
+
+    def triangles(self, object: int | None = None) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """Triangles of the static map, evicted blocks included, or of one track's object, in the world: positions in metres and colours, both
+        triangles x corners x 3. Corners run counter-clockwise seen from free space."""
+
+    @property
+    def t_world_camera(self) -> NDArray[np.float64]:
+        """Where the left camera was in the last frame, 4 x 4."""
+
+    @property
+    def disparity_q8(self) -> NDArray[np.uint16]:
+        """Disparity of the last frame; 0 where there is none. It has size 1 x 1 before the first frame."""
+
+    @property
+    def digest(self) -> int | None:
+        """Digest of the last step; None before the first, and after `restore`."""
+
+    @property
+    def step_seconds(self) -> float | None:
+        """Wall time of the last step within the core; None before the first."""
+
+    @property
+    def slab_bytes(self) -> int: ...
+    @property
+    def config_toml(self) -> str:
+        """All settings, as the config.toml of a run has them."""
+
+    def footprint(self) -> list[Region]:
+        """Every region of the slab."""
+
+    def snapshot(self) -> bytes:
+        """Everything that later steps depend on, evicted blocks included."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Continues after the step at which the snapshot was taken, bit for bit. The mapper must have been made with the same rig, bounds and
+        settings. After an error it is as it was made."""
+
+class Dataset:
+    """The frames that `dynvox run PATH` would map; the synthetic street without a path.
+
+    Options are those of `dynvox run`, with underscores. A sequence of frames: `dataset[3]`, `len(dataset)`, `for frame in dataset` (decoded ahead).
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str] | None = None,
+        *,
+        stream: bool | str | PathLike[str] = True,
+        sequence: str | None = None,
+        dataset: str | None = None,
+        images: str | None = None,
+        bits: int | None = None,
+        topics: str | None = None,
+        side_by_side: bool = False,
+        top_bottom: bool = False,
+        calibration: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
+        rectified: str | None = None,
+        rectified_focal: float | None = None,
+        start: int | None = None,
+        frames: int | None = None,
+        stride: int | None = None,
+        scale: float | None = None,
+        depth: str | None = None,
+        instances: str | None = None,
+        instances_every: int | None = None,
+        egomotion: str | None = None,
+        faults: str | None = None,
+        force: bool = False,
+        memory: str | None = "256MiB",
+        profile: str | None = None,
+        capacity: str | PathLike[str] | None = None,
+        planning: str | None = None,
+        planning_3d: bool = False,
+        threads: int | None = None,
+        config: str | PathLike[str] | None = None,
+        set: Mapping[str, Any] | None = None,
+        dynamic: bool | None = None,
+        fuse_every: int | None = None,
+    ) -> None: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the pictures that are mapped."""
+
+    @property
+    def rig(self) -> Rig: ...
+    @property
+    def notes(self) -> list[str]:
+        """What was assumed or left aside."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is doubtful about the images."""
+
+    @property
+    def frame_interval_s(self) -> float: ...
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the frames in the data set."""
+
+    @property
+    def times_s(self) -> list[float]: ...
+    @property
+    def truth(self) -> NDArray[np.float64] | None:
+        """True poses, frames x 4 x 4, the first at the origin."""
+
+    def lidar(self, position: int) -> NDArray[np.float32] | None:
+        """Points of a frame's LiDAR scan in the axes of the rectified left camera; None where the frame has no scan."""
+
+    def mapper(self) -> Mapper:
+        """A mapper with the bounds, settings and threads of this run."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, position: int) -> Frame: ...
+    def __iter__(self) -> Iterator[Frame]: ...
