@@ -32,13 +32,22 @@ fn inspect_reports_what_a_data_set_holds_and_how_to_map_it() {
         let printed = dynvox(root.path(), &["inspect", path]);
         assert!(!printed.status.success() && output_text(&printed).contains(words), "{path}: {}", output_text(&printed));
     }
+    let json =
+        |path: &str| -> serde_json::Value { serde_json::from_slice(&dynvox(root.path(), &["inspect", path, "--json"]).stdout).unwrap() };
+    let found = json("rig");
+    let described = &found["sequences"][0]["dataset"];
+    assert_eq!((&found["layout"], &described["pairs"], &described["width"]), (&"folder".into(), &2.into(), &160.into()), "{found}");
+    assert_eq!((&described["rig"]["baseline_m"], &described["command"]), (&0.5.into(), &"dynvox run rig".into()), "{found}");
+    assert!(described["least_bytes"].as_u64().unwrap() > 1 << 20 && described["masks"] == "none", "{found}");
     fs::create_dir_all(root.path().join("run")).unwrap();
     fs::write(root.path().join("run/summary.json"), "{}").unwrap();
+    assert_eq!((&json("run")["layout"], json("run")["commands"].as_array().unwrap().len()), (&"run".into(), 2));
     let printed = String::from_utf8(dynvox(root.path(), &["inspect", "run"]).stdout).unwrap();
     assert!(printed.contains("the results of a run") && printed.contains("dynvox evaluate trajectory run TRUTH"), "{printed}");
     fs::remove_file(root.path().join("rig/calib.txt")).unwrap();
     let printed = dynvox(root.path(), &["inspect", "rig"]);
     assert!(!printed.status.success() && String::from_utf8_lossy(&printed.stdout).contains("calib.txt is missing"));
+    assert!(json("rig")["sequences"][0]["error"].as_str().unwrap().contains("calib.txt is missing"));
 }
 
 #[test]
@@ -119,4 +128,30 @@ fn files_are_evaluated_without_a_run() {
     assert!(same["ate_m"].as_f64().unwrap() < 1e-9 && same["rpe_r_deg"].as_f64().unwrap() < 1e-6, "{same}");
     let refused = dynvox(root.path(), &["evaluate", "trajectory", "run", "rig/calib.txt"]);
     assert!(!refused.status.success() && output_text(&refused).contains("line 1 is not a pose"), "{}", output_text(&refused));
+}
+
+#[test]
+fn a_run_of_some_frames_is_evaluated_against_the_true_poses_of_all() {
+    let root = TempDir::new().unwrap();
+    let street = ["--set", "street.width=160", "--set", "street.height=64", "--set", "street.frames=14"];
+    let run = |more: &[&str]| {
+        let done = dynvox(root.path(), &[&["run", "--profile", "tiny", "--quiet"], &street[..], more].concat());
+        assert!(done.status.success(), "{}", output_text(&done));
+    };
+    run(&["--out", "all"]);
+    run(&["--out", "some", "--start", "3", "--stride", "2", "--frames", "4"]);
+    let evaluate = |folder: &str, truth: &str| dynvox(root.path(), &["evaluate", "trajectory", folder, truth, "--json"]);
+    let ate_m = |printed: &std::process::Output| -> f64 {
+        assert!(printed.status.success(), "{}", output_text(printed));
+        serde_json::from_slice::<serde_json::Value>(&printed.stdout).unwrap()["ate_m"].as_f64().unwrap()
+    };
+    let summary: serde_json::Value = serde_json::from_slice(&fs::read(root.path().join("some/summary.json")).unwrap()).unwrap();
+    // The same by the rows of the frames as by the run's own truth.
+    let by_rows = ate_m(&evaluate("some", "all/trajectory_truth_kitti.txt"));
+    assert!((by_rows - ate_m(&evaluate("some", "some/trajectory_truth_kitti.txt"))).abs() < 1e-6);
+    assert!((by_rows - summary["egomotion"]["ate_m"].as_f64().unwrap()).abs() < 1e-4, "{by_rows}");
+    let text = fs::read_to_string(root.path().join("all/trajectory_truth_kitti.txt")).unwrap();
+    fs::write(root.path().join("short.txt"), text.lines().take(8).collect::<Vec<_>>().join("\n")).unwrap();
+    let refused = evaluate("some", "short.txt");
+    assert!(output_text(&refused).contains("the run mapped frame 9, and the true poses have 8 rows"), "{}", output_text(&refused));
 }

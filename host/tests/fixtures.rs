@@ -70,6 +70,9 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
     assert_eq!((&differences[0]["frame"], &differences[0]["columns"][0]), (&3.into(), &"input".into()), "{verdicts}");
     let report = fs::read_to_string(root.join("report.xml")).unwrap();
     assert!(report.contains("name=\"frame 3\"><failure message=\"digests differ: input"), "{report}");
+    let dry = dynvox(root, &["fixtures", "bless", "pinned", "--dry-run", "--json"]);
+    let dry: serde_json::Value = serde_json::from_slice(&dry.stdout).unwrap();
+    assert!(!dry[0]["differences"].as_array().unwrap().is_empty(), "{dry}");
     let dry = dynvox(root, &["fixtures", "bless", "pinned", "--dry-run"]);
     assert!(dry.status.success() && printed(&dry).contains("first divergence: frame 3, input"), "{}", printed(&dry));
     assert!(fs::read(root.join("pinned/digests.txt")).unwrap() == golden, "nothing is written");

@@ -4,6 +4,7 @@ use crate::fixtures::{self, Blessing, Verdict};
 use crate::run::write_whole;
 use anyhow::bail;
 use dynvox_core::Serial;
+use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -40,6 +41,9 @@ enum Action {
         /// Say what would be blessed, and write nothing
         #[arg(long)]
         dry_run: bool,
+        /// Write what was done to standard output as JSON
+        #[arg(long)]
+        json: bool,
     },
     /// Pack a fixture into one file that a firmware can embed
     Pack {
@@ -92,6 +96,9 @@ struct NewArgs {
     /// One setting; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Write what was made to standard output as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 impl NewArgs {
@@ -123,13 +130,17 @@ const DEFAULT_MEMORY: &str = "32MiB";
 fn new(args: &NewArgs) -> anyhow::Result<()> {
     let plan = super::run::plan_of(&args.as_run())?;
     let frames = fixtures::create(&args.folder, &plan, &Serial)?;
+    if args.json {
+        outln!("{:#}", json!({ "fixture": args.folder, "frames": frames, "bytes": plan.capacity.bytes() }));
+        return Ok(());
+    }
     let (shown, mib) = (args.folder.display(), plan.capacity.bytes() as f64 / f64::from(1 << 20));
     outln!("{shown}: {frames} frames, replayed in {mib:.1} MiB. Commit the folder, and compare with: dynvox fixtures verify {shown}");
     Ok(())
 }
 
 fn verify(path: &Path, json: bool, junit: Option<&Path>) -> anyhow::Result<()> {
-    let verdicts = fixtures::all(path)?.iter().map(|fixture| fixtures::verify(fixture, &Serial)).collect::<Result<Vec<_>, _>>()?;
+    let verdicts = verdicts(path)?;
     if let Some(file) = junit {
         write_whole(file, |out| out.write_all(fixtures::junit(&verdicts).as_bytes()))?;
     }
@@ -144,24 +155,38 @@ fn verify(path: &Path, json: bool, junit: Option<&Path>) -> anyhow::Result<()> {
     Ok(())
 }
 
+fn verdicts(path: &Path) -> anyhow::Result<Vec<Verdict>> {
+    Ok(fixtures::all(path)?.iter().map(|fixture| fixtures::verify(fixture, &Serial)).collect::<Result<_, _>>()?)
+}
+
+fn bless(path: &Path, reason: &str, json: bool) -> anyhow::Result<()> {
+    let mut outcomes = Vec::new();
+    for fixture in fixtures::all(path)? {
+        let written = fixtures::bless(&fixture, reason, &Serial)? == Blessing::Written;
+        if !json {
+            outln!("{} is {}", fixture.display(), if written { "blessed" } else { "unchanged" });
+        }
+        outcomes.push(json!({ "fixture": fixture, "blessed": written }));
+    }
+    if json {
+        outln!("{:#}", serde_json::Value::from(outcomes));
+    }
+    Ok(())
+}
+
 pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
     match &args.action {
         Action::New(args) => new(args)?,
         Action::Verify { path, json, junit } => verify(path, *json, junit.as_deref())?,
-        Action::Bless { path, dry_run: true, .. } => {
-            for fixture in fixtures::all(path)? {
-                outln!("{}", sentence(&fixtures::verify(&fixture, &Serial)?));
+        Action::Bless { path, dry_run: true, json, .. } => {
+            let verdicts = verdicts(path)?;
+            if *json {
+                outln!("{}", serde_json::to_string_pretty(&verdicts)?);
+            } else {
+                verdicts.iter().for_each(|verdict| outln!("{}", sentence(verdict)));
             }
         }
-        Action::Bless { path, reason, .. } => {
-            for fixture in fixtures::all(path)? {
-                let outcome = match fixtures::bless(&fixture, reason.as_deref().unwrap_or_default(), &Serial)? {
-                    Blessing::Unchanged => "is unchanged",
-                    Blessing::Written => "is blessed",
-                };
-                outln!("{} {outcome}", fixture.display());
-            }
-        }
+        Action::Bless { path, reason, json, .. } => bless(path, reason.as_deref().unwrap_or_default(), *json)?,
         Action::Pack { fixture, out, rust } => {
             let bytes = fixtures::pack(fixture)?;
             if let Some(rust) = rust {

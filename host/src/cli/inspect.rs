@@ -3,7 +3,10 @@
 use crate::evaluate::stereo::{StereoSetError, find_stereo_set};
 use crate::input::diagnosis;
 use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout};
+use dynvox_core::geometry::StereoRig;
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
+use serde::{Serialize, Serializer};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -13,45 +16,75 @@ pub struct InspectArgs {
     /// Layout of the data set; guessed from the path unless given
     #[arg(long, value_enum)]
     dataset: Option<Layout>,
+    /// Write what is found to standard output as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     let (layout, found) = match input::survey(&args.path, args.dataset) {
         // A folder that cannot be mapped may be of another kind.
-        Err(error @ InputError::Layout { .. }) => return other(&args.path).unwrap_or(Err(error.into())),
+        Err(error @ InputError::Layout { .. }) => return other(args).unwrap_or(Err(error.into())),
         survey => survey?,
     };
-    outln!("{}: {} ({} sequence{})", args.path.display(), layout.name(), found.len(), if found.len() == 1 { "" } else { "s" });
-    outln!("  {}", layout.describe(&args.path));
+    if !args.json {
+        outln!("{}: {} ({} sequence{})", args.path.display(), layout.name(), found.len(), if found.len() == 1 { "" } else { "s" });
+        outln!("  {}", layout.describe(&args.path));
+    }
+    let mut sequences = Vec::new();
     for one in &found {
-        outln!("");
-        if let Some(sequence) = &one.sequence {
-            outln!("sequence {sequence}");
+        let sequence = SequenceFound {
+            sequence: one.sequence.clone(),
+            described: one
+                .opened
+                .as_ref()
+                .map(|dataset| Description::of(dataset.as_ref(), &command(&args.path, one)))
+                .map_err(ToString::to_string),
+        };
+        // Line by line as they are examined, which takes its time.
+        if !args.json {
+            sequence.print();
         }
-        match &one.opened {
-            Ok(dataset) => describe(dataset.as_ref(), &command(&args.path, one)),
-            Err(error) => outln!("  cannot be used: {error}"),
-        }
+        sequences.push(sequence);
+    }
+    if args.json {
+        let sequences: Vec<_> = sequences.iter().map(SequenceFound::json).collect();
+        let found = json!({ "path": args.path, "layout": layout.name(), "sequences": sequences });
+        outln!("{}", serde_json::to_string_pretty(&found)?);
     }
     if found.iter().all(|one| one.opened.is_err()) {
-        anyhow::bail!("nothing at {} can be mapped. The reasons stand above", args.path.display());
+        let stand = if args.json { "under `error`" } else { "above" };
+        anyhow::bail!("nothing at {} can be mapped. The reasons stand {stand}", args.path.display());
     }
     Ok(())
 }
 
 /// Describes a folder that is not a data set: a run's results, a stereo benchmark; `None` for neither.
-fn other(path: &Path) -> Option<anyhow::Result<()>> {
-    let shown = path.display();
+fn other(args: &InspectArgs) -> Option<anyhow::Result<()>> {
+    let (path, shown) = (&args.path, args.path.display());
     if path.join("summary.json").is_file() {
+        let (evaluate, again) = (
+            format!("dynvox evaluate trajectory {shown} TRUTH"),
+            format!("dynvox run [PATH] --config {}", path.join("config.toml").display()),
+        );
+        if args.json {
+            outln!("{:#}", json!({ "path": path, "layout": "run", "commands": [evaluate, again] }));
+            return Some(Ok(()));
+        }
         outln!("{shown}: the results of a run; report.html shows them in a browser");
-        outln!("  evaluate its trajectory: dynvox evaluate trajectory {shown} TRUTH");
-        outln!("  the same run again: dynvox run [PATH] --config {}", path.join("config.toml").display());
+        outln!("  evaluate its trajectory: {evaluate}");
+        outln!("  the same run again: {again}");
         return Some(Ok(()));
     }
     match find_stereo_set(path) {
         Ok(set) => {
-            outln!("{shown}: {}, {} pairs with true disparity: single pairs, nothing to map", set.name, set.pairs.len());
-            outln!("  evaluate the matcher: dynvox evaluate stereo {shown}");
+            let (pairs, evaluate) = (set.pairs.len(), format!("dynvox evaluate stereo {shown}"));
+            if args.json {
+                outln!("{:#}", json!({ "path": path, "layout": set.name, "pairs": pairs, "commands": [evaluate] }));
+                return Some(Ok(()));
+            }
+            outln!("{shown}: {}, {pairs} pairs with true disparity: single pairs, nothing to map", set.name);
+            outln!("  evaluate the matcher: {evaluate}");
             Some(Ok(()))
         }
         Err(error @ StereoSetError::NoTruth { .. }) => Some(Err(error.into())),
@@ -64,54 +97,143 @@ fn command(path: &Path, found: &Found) -> String {
     format!("dynvox run {}{sequence}", path.display())
 }
 
-fn describe(dataset: &dyn FrameSource, command: &str) {
-    let ((width, height), rig) = (dataset.size(), dataset.rig());
-    let last = dataset.len().saturating_sub(1);
-    let seconds = dataset.time_s(last) - dataset.time_s(0);
-    outln!("  {} stereo pairs of {width} x {height} px, {seconds:.1} s", dataset.len());
-    outln!(
-        "  focal length {:.2} px, principal point ({:.2}, {:.2}) px, baseline {:.4} m",
-        rig.focal_px,
-        rig.center_u_px,
-        rig.center_v_px,
-        rig.baseline_m
-    );
-    let first = dataset.frame(0);
-    match &first {
-        Ok(frame) => {
-            outln!("  {}", if frame.colour.is_some() { "colour images: the map has colours" } else { "grey images: the map is grey" })
+/// One sequence, or why it cannot be used.
+struct SequenceFound {
+    sequence: Option<String>,
+    described: Result<Description, String>,
+}
+
+impl SequenceFound {
+    fn print(&self) {
+        outln!("");
+        if let Some(sequence) = &self.sequence {
+            outln!("sequence {sequence}");
         }
-        Err(error) => outln!("  the first frame cannot be read: {error}"),
-    }
-    outln!(
-        "  {}",
-        if dataset.truth().is_some() {
-            "ground-truth poses: the trajectory is evaluated"
-        } else {
-            "no ground-truth poses: the trajectory is not evaluated"
+        match &self.described {
+            Ok(description) => description.print(),
+            Err(error) => outln!("  cannot be used: {error}"),
         }
-    );
-    if first.is_ok_and(|frame| frame.objects.is_some()) {
-        outln!("  object labels: motions, states and tracks are evaluated");
     }
-    outln!("  {}", masks(dataset));
-    let evaluate = lidar(dataset);
-    match diagnosis::examine(dataset, &(0..dataset.len()).collect::<Vec<_>>()) {
-        Ok(findings) => {
-            for finding in findings {
-                println!("  {}: {}", if finding.refused { "refused" } else { "warning" }, finding.message);
-            }
+
+    fn json(&self) -> serde_json::Value {
+        match &self.described {
+            Ok(description) => json!({ "sequence": self.sequence, "dataset": description }),
+            Err(error) => json!({ "sequence": self.sequence, "error": error }),
         }
-        Err(error) => println!("  the images cannot be examined: {error}"),
     }
-    for note in dataset.notes() {
-        outln!("  note: {note}");
+}
+
+/// What a sequence has, and what can be made of it.
+#[derive(Serialize)]
+struct Description {
+    pairs: usize,
+    width: usize,
+    height: usize,
+    seconds: f64,
+    #[serde(serialize_with = "rig_numbers")]
+    rig: StereoRig,
+    /// Whether images have colour; absent where the first cannot be read.
+    colour: Option<bool>,
+    true_poses: bool,
+    object_labels: bool,
+    masks: &'static str,
+    frames_with_masks: usize,
+    frames_with_lidar: usize,
+    /// What is doubtful about the images.
+    findings: Vec<Doubt>,
+    /// What cannot be read of what is there.
+    unreadable: Vec<String>,
+    notes: Vec<String>,
+    /// Least bytes of memory; absent where images of this size cannot be mapped.
+    least_bytes: Option<usize>,
+    command: String,
+    #[serde(skip)]
+    mask_sentence: String,
+    #[serde(skip)]
+    memory_sentence: String,
+}
+
+fn rig_numbers<S: Serializer>(rig: &StereoRig, serializer: S) -> Result<S::Ok, S::Error> {
+    let StereoRig { focal_px, center_u_px, center_v_px, baseline_m } = rig;
+    json!({ "focal_px": focal_px, "center_u_px": center_u_px, "center_v_px": center_v_px, "baseline_m": baseline_m }).serialize(serializer)
+}
+
+#[derive(Serialize)]
+struct Doubt {
+    refused: bool,
+    message: String,
+}
+
+impl Description {
+    fn of(dataset: &dyn FrameSource, command: &str) -> Self {
+        let (width, height) = dataset.size();
+        let first = dataset.frame(0);
+        let mut unreadable: Vec<String> =
+            first.as_ref().err().map(|error| format!("the first frame cannot be read: {error}")).into_iter().collect();
+        let scans: Vec<usize> = (0..dataset.len()).filter(|&index| dataset.has_lidar(index)).collect();
+        let scan = scans.first().map(|&index| dataset.lidar(index));
+        if let Some(Err(error)) = &scan {
+            unreadable.push(format!("the first LiDAR scan cannot be read: {error}"));
+        }
+        let findings = diagnosis::examine(dataset, &(0..dataset.len()).collect::<Vec<_>>()).unwrap_or_else(|error| {
+            unreadable.push(format!("the images cannot be examined: {error}"));
+            Vec::new()
+        });
+        let least = least_memory(width, height);
+        let (masks, frames_with_masks, mask_sentence) = masks(dataset);
+        let evaluate = if matches!(scan, Some(Ok(_))) { " --evaluate lidar" } else { "" };
+        Self {
+            pairs: dataset.len(),
+            width,
+            height,
+            seconds: dataset.time_s(dataset.len().saturating_sub(1)) - dataset.time_s(0),
+            rig: dataset.rig(),
+            colour: first.as_ref().ok().map(|frame| frame.colour.is_some()),
+            true_poses: dataset.truth().is_some(),
+            object_labels: first.is_ok_and(|frame| frame.objects.is_some()),
+            masks,
+            frames_with_masks,
+            frames_with_lidar: scans.len(),
+            findings: findings.into_iter().map(|finding| Doubt { refused: finding.refused, message: finding.message }).collect(),
+            unreadable,
+            notes: dataset.notes().to_vec(),
+            memory_sentence: match &least {
+                Ok(least) => format!("memory: 256 MiB by default; at least --memory {}MiB", least.div_ceil(1 << 20)),
+                Err(error) => format!("cannot be mapped at this size: {error}. Shrink the images with --scale"),
+            },
+            least_bytes: least.ok(),
+            command: format!("{command}{evaluate}"),
+            mask_sentence,
+        }
     }
-    match least_memory(width, height) {
-        Ok(least) => outln!("  memory: 256 MiB by default; at least --memory {}MiB", least.div_ceil(1 << 20)),
-        Err(error) => outln!("  cannot be mapped at this size: {error}. Shrink the images with --scale"),
+
+    fn print(&self) {
+        outln!("  {} stereo pairs of {} x {} px, {:.1} s", self.pairs, self.width, self.height, self.seconds);
+        let StereoRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
+        outln!("  focal length {focal_px:.2} px, principal point ({center_u_px:.2}, {center_v_px:.2}) px, baseline {baseline_m:.4} m");
+        match self.colour {
+            Some(true) => outln!("  colour images: the map has colours"),
+            Some(false) => outln!("  grey images: the map is grey"),
+            None => {}
+        }
+        let (poses, not) = if self.true_poses { ("", "") } else { ("no ", "not ") };
+        outln!("  {poses}ground-truth poses: the trajectory is {not}evaluated");
+        if self.object_labels {
+            outln!("  object labels: motions, states and tracks are evaluated");
+        }
+        outln!("  {}", self.mask_sentence);
+        match self.frames_with_lidar {
+            0 => outln!("  no LiDAR scans (velodyne/): accuracy and completeness stay unknown"),
+            frames => outln!("  LiDAR scans of {frames} frames: --evaluate lidar measures accuracy and completeness"),
+        }
+        self.unreadable.iter().for_each(|what| outln!("  {what}"));
+        for Doubt { refused, message } in &self.findings {
+            outln!("  {}: {message}", if *refused { "refused" } else { "warning" });
+        }
+        self.notes.iter().for_each(|note| outln!("  note: {note}"));
+        outln!("  {}", self.memory_sentence);
+        outln!("  map it: {}", self.command);
     }
-    outln!("  map it: {command}{}", if evaluate { " --evaluate lidar" } else { "" });
 }
 
 /// Bytes of the least slab for images of a size.
@@ -123,12 +245,13 @@ fn least_memory(width: usize, height: usize) -> Result<usize, BudgetError> {
     }
 }
 
-fn masks(dataset: &dyn FrameSource) -> String {
+/// Which masks there are, for how many frames, and that as a sentence.
+fn masks(dataset: &dyn FrameSource) -> (&'static str, usize, String) {
     match dataset.masks() {
         AvailableMasks::Folder(folder) => {
             let has = |index: &usize| dataset.stem(*index).is_some_and(|stem| folder.join(format!("{stem}.png")).is_file());
             let there = (0..dataset.len()).filter(has).count();
-            match there {
+            let sentence = match there {
                 0 => format!("{} has no mask of any frame's name: objects are found only while they move", folder.display()),
                 there if there == dataset.len() => format!("masks in {}: objects are separate from the static map", folder.display()),
                 there => format!(
@@ -136,23 +259,10 @@ fn masks(dataset: &dyn FrameSource) -> String {
                     folder.display(),
                     dataset.len()
                 ),
-            }
+            };
+            ("files", there, sentence)
         }
-        AvailableMasks::Exact => "exact masks, by --instances exact".to_owned(),
-        AvailableMasks::Absent => "no masks: objects are found only while they move, unless --instances names some".to_owned(),
+        AvailableMasks::Exact => ("exact", dataset.len(), "exact masks, by --instances exact".to_owned()),
+        AvailableMasks::Absent => ("none", 0, "no masks: objects are found only while they move, unless --instances names some".to_owned()),
     }
-}
-
-/// Prints whether there are scans; returns whether input and map can be evaluated against them.
-fn lidar(dataset: &dyn FrameSource) -> bool {
-    let scans: Vec<usize> = (0..dataset.len()).filter(|&index| dataset.has_lidar(index)).collect();
-    let Some(&first) = scans.first() else {
-        outln!("  no LiDAR scans (velodyne/): accuracy and completeness stay unknown");
-        return false;
-    };
-    match dataset.lidar(first) {
-        Ok(_) => outln!("  LiDAR scans of {} frames: --evaluate lidar measures accuracy and completeness", scans.len()),
-        Err(error) => outln!("  LiDAR scans of {} frames, but {error}", scans.len()),
-    }
-    dataset.lidar(first).is_ok()
 }

@@ -2,8 +2,9 @@
 
 use super::run::{self, RunArgs};
 use crate::input::{self, OpenOptions};
-use crate::sweep::{Data, Kind, Plan, RunResult, SweepFolder, SweepRequest, merge};
+use crate::sweep::{Data, Kind, Plan, Results, RunResult, SweepFolder, SweepRequest, merge};
 use anyhow::{Context, bail};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -52,6 +53,9 @@ pub struct SweepArgs {
     /// Folder for results, tables and report.html; an interrupted sweep continues there
     #[arg(long, default_value = "out/sweep", value_name = "DIR")]
     out: PathBuf,
+    /// Write points and figures to standard output as JSON, and nothing else
+    #[arg(long)]
+    json: bool,
     /// Show no progress
     #[arg(long)]
     quiet: bool,
@@ -66,7 +70,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     if !args.merge.is_empty() {
         let (plan, folder, results) = merge(&args.merge, &args.out)?;
         let page = folder.draw(&plan, &results)?;
-        return print_result(&plan, results.len(), &page, args.quiet);
+        return print_result(args, &plan, &results, &page);
     }
     let data = if args.data.is_empty() { vec![Data { path: None, sequence: None }] } else { args.data.clone() };
     let labels: Vec<String> = data.iter().map(Data::label).collect();
@@ -93,7 +97,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         let (Some(arguments), Some(one)) = (plan.runs.get(*key), data_of(&plan, key, &labels).and_then(|at| data.get(at))) else {
             continue;
         };
-        if !args.quiet {
+        if !args.quiet && !args.json {
             eprintln!("run {} of {}: {} {}", at + 1, share.len(), one.label(), arguments.join(" "));
         }
         let result = make(args, one, arguments, &folder.scratch_dir(key)).with_context(|| format!("run {key} ended"))?;
@@ -103,7 +107,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     }
     let results = folder.results(&plan)?;
     let page = folder.draw(&plan, &results)?;
-    print_result(&plan, results.len(), &page, args.quiet)
+    print_result(args, &plan, &results, &page)
 }
 
 impl SweepArgs {
@@ -142,9 +146,20 @@ fn make(args: &SweepArgs, data: &Data, arguments: &[String], scratch_dir: &Path)
     Ok(RunResult::of(arguments, &record)?)
 }
 
-fn print_result(plan: &Plan, made: usize, page: &Path, quiet: bool) -> anyhow::Result<()> {
-    if !quiet {
-        outln!("{made} of {} runs finished", plan.runs.len());
+fn print_result(args: &SweepArgs, plan: &Plan, results: &Results, page: &Path) -> anyhow::Result<()> {
+    if args.json {
+        let points = plan.points.iter().map(|point| {
+            let result = results.get(&point.run);
+            let mut value = serde_json::to_value(point)?;
+            value["arguments"] = plan.runs.get(&point.run).cloned().unwrap_or_default().into();
+            value["summary"] = result.map_or(serde_json::Value::Null, |result| result.summary.clone());
+            Ok(value)
+        });
+        let points = points.collect::<anyhow::Result<Vec<_>>>()?;
+        let of = json!({ "page": page, "runs": plan.runs.len(), "finished": results.len(), "points": points });
+        outln!("{of:#}");
+    } else if !args.quiet {
+        outln!("{} of {} runs finished", results.len(), plan.runs.len());
         outln!("{}", page.display());
     }
     Ok(())

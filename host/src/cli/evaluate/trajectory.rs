@@ -1,13 +1,14 @@
 //! `dynvox evaluate trajectory`.
 
-use crate::evaluate::trajectory::{self, TrajectoryErrors, matched, read_trajectory};
+use crate::evaluate::trajectory::{self, TrajectoryErrors, frames_of_run, matched, read_trajectory, truth_of_frames};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct TrajectoryArgs {
     /// Estimated poses: a file in KITTI's or TUM's format, or a run folder
     estimate: PathBuf,
-    /// True poses, in either format; joined by time where both have times, row by row otherwise
+    /// True poses, in either format; joined by time where both have times, by the numbers of a run folder's frames where they are more than those, row by
+    /// row otherwise
     truth: PathBuf,
     /// Write the figures to standard output as JSON
     #[arg(long)]
@@ -15,7 +16,12 @@ pub struct TrajectoryArgs {
 }
 
 pub fn run(args: &TrajectoryArgs) -> anyhow::Result<()> {
-    let (estimate, truth) = matched(&read_trajectory(&args.estimate)?, &read_trajectory(&args.truth)?)?;
+    let mut truth = read_trajectory(&args.truth)?;
+    // A run of some frames of a sequence, with the true poses of all of them.
+    if let Some(frames) = frames_of_run(&args.estimate)? {
+        truth = truth_of_frames(truth, &frames)?;
+    }
+    let (estimate, truth) = matched(&read_trajectory(&args.estimate)?, &truth)?;
     let found = trajectory::errors(&truth, &estimate).ok_or_else(|| anyhow::anyhow!("two poses are needed. Give longer trajectories"))?;
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&found)?);

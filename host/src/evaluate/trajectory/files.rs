@@ -2,12 +2,20 @@
 
 use crate::formats::{FormatError, Trajectory, read_poses};
 use dynvox_core::geometry::Transform;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Two poses are of the same frame when their times differ by at most this, s (as `evo` has it).
 const SAME_TIME_S: f64 = 0.01;
 /// File of a run folder that is read when a folder is given.
 const OF_A_RUN: &str = "trajectory_tum.txt";
+
+/// Table of a run folder that numbers its frames.
+const FRAMES_OF_A_RUN: &str = "frames.csv";
+
+#[derive(serde::Deserialize)]
+struct FrameNumber {
+    frame: usize,
+}
 
 /// Why trajectories cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +33,24 @@ pub enum TrajectoryError {
         /// Poses of the second.
         second: usize,
     },
+    /// A run's table of frames cannot be read.
+    #[error("{path} cannot be read: {reason}. Give its trajectory_tum.txt and true poses with times", path = .path.display())]
+    Frames {
+        /// The table.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The true poses end before the run does.
+    #[error(
+        "the run mapped frame {frame}, and the true poses have {rows} rows. Give those of the whole sequence, one row for each of its frames"
+    )]
+    NoRow {
+        /// Number of the frame.
+        frame: usize,
+        /// Rows there are.
+        rows: usize,
+    },
     /// Fewer than two pairs.
     #[error(
         "only {pairs} poses have the same time: two are needed. Times must agree to {SAME_TIME_S} s; check that both use the same clock"
@@ -33,6 +59,34 @@ pub enum TrajectoryError {
         /// Pairs found.
         pairs: usize,
     },
+}
+
+/// Numbers of a run folder's frames in its data set; `None` where `path` is no such folder.
+///
+/// # Errors
+/// Its table of frames cannot be read.
+pub fn frames_of_run(path: &Path) -> Result<Option<Vec<usize>>, TrajectoryError> {
+    let table = path.join(FRAMES_OF_A_RUN);
+    if !table.is_file() {
+        return Ok(None);
+    }
+    let unreadable = |error: csv::Error| TrajectoryError::Frames { path: table.clone(), reason: error.to_string() };
+    let mut rows = csv::Reader::from_path(&table).map_err(unreadable)?;
+    let frames: Result<Vec<usize>, _> = rows.deserialize().map(|row| row.map(|FrameNumber { frame }| frame)).collect();
+    frames.map(Some).map_err(unreadable)
+}
+
+/// The rows of `truth` that belong to these frames: KITTI's rows are numbered as a data set's frames. All of them where they have times, or are as
+/// many as the frames.
+///
+/// # Errors
+/// There is no row for a frame.
+pub fn truth_of_frames(truth: Trajectory, frames: &[usize]) -> Result<Trajectory, TrajectoryError> {
+    if truth.times_s.is_some() || truth.poses.len() == frames.len() {
+        return Ok(truth);
+    }
+    let row = |&frame: &usize| truth.poses.get(frame).copied().ok_or(TrajectoryError::NoRow { frame, rows: truth.poses.len() });
+    Ok(Trajectory { times_s: None, poses: frames.iter().map(row).collect::<Result<_, _>>()? })
 }
 
 /// Reads a file of either format; of a run folder its own trajectory.

@@ -8,7 +8,7 @@
 mod align;
 mod files;
 
-pub use files::{TrajectoryError, matched, read_trajectory};
+pub use files::{TrajectoryError, frames_of_run, matched, read_trajectory, truth_of_frames};
 
 use align::aligned_error_m;
 use dynvox_core::geometry::Transform;
