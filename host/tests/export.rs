@@ -5,7 +5,9 @@ mod binary;
 
 use binary::{dynvox, names, output_text, rig};
 use dynvox::formats::{PlyMesh, read_numbered, read_poses};
-use std::collections::BTreeMap;
+use dynvox::run::stereo_frame;
+use dynvox_core::{Mapper, Serial, StereoFrame};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -79,6 +81,62 @@ fn a_map_has_its_objects_where_they_were_last_seen() {
     assert!(none_bounds[1][1] < 5.0, "y down as readers turn it: the ground is not far below {none_bounds:?}");
     let header = fs::read(root.path().join("none/map.ply")).unwrap();
     assert!(String::from_utf8_lossy(&header[..300]).contains("x right, y forward, z up"));
+}
+
+/// Cells of a grid, m: a point of the map has another one in its own cell or in a neighbour.
+const CELL_M: f64 = 0.15;
+
+fn cell(position_m: [f64; 3]) -> [i64; 3] {
+    position_m.map(|metres| (metres / CELL_M).floor() as i64)
+}
+
+#[test]
+fn cars_stand_in_the_map_where_the_raycast_of_the_last_frame_shows_them() {
+    let root = TempDir::new().unwrap();
+    run(root.path(), &[&STREET[..], &["--out", "result"]].concat());
+    // The same run once more, up to a look through the last camera.
+    let plan =
+        dynvox::cli::plan_of(&[&["dynvox"], &STREET[1..]].concat().iter().map(|word| (*word).to_owned()).collect::<Vec<_>>()).unwrap();
+    let mut slab = vec![0; plan.capacity.bytes() + dynvox_core::memory::SLAB_ALIGN];
+    let mut mapper = Mapper::new(&plan.capacity, &plan.config, &mut slab).unwrap();
+    for &frame in plan.frames.listed() {
+        let images = plan.dataset.frame(frame).unwrap();
+        let detections: Vec<_> = images.masks.instances.iter().map(|of| of.detection()).collect();
+        let frame = StereoFrame {
+            time_ns: plan.dataset.stamp_ns(frame),
+            ..stereo_frame(&images, &detections).unwrap()
+        };
+        mapper.step(&frame, &Serial).unwrap();
+    }
+    let (pose, rig) = (*mapper.t_world_camera(), plan.config.rig);
+    let ids: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
+    let seen = mapper.raycast_composed(&pose, &Serial).unwrap();
+    let (depth_m, layer) = (seen.depth_m().unwrap(), seen.layer().unwrap());
+    let mut vertices = BTreeMap::<u32, BTreeSet<[i64; 3]>>::new();
+    let map = PlyMesh::open(&root.path().join("result/map.ply")).unwrap();
+    map.triangles(|corners| {
+        for corner in corners.iter().filter(|corner| corner.object > 0) {
+            vertices.entry(corner.object).or_default().insert(cell(corner.position_m.map(f64::from)));
+        }
+    })
+    .unwrap();
+    let mut shown = BTreeMap::<u32, [usize; 2]>::new();
+    for (u, v) in (0..depth_m.height()).flat_map(|v| (0..depth_m.width()).map(move |u| (u, v))) {
+        let Some(id) = layer.get(u, v).and_then(|layer| ids.get(usize::from(layer).checked_sub(1)?)) else { continue };
+        let z = f64::from(depth_m.get(u, v).unwrap());
+        let [x, y] = [(u as f64 - rig.center_u_px) / rig.focal_px * z, (v as f64 - rig.center_v_px) / rig.focal_px * z];
+        let at = cell(pose.transform_point([x, y, z]));
+        let near = |of: &BTreeSet<[i64; 3]>| {
+            (0..27).any(|code| of.contains(&[at[0] + code % 3 - 1, at[1] + code / 3 % 3 - 1, at[2] + code / 9 - 1]))
+        };
+        let [pixels, found] = shown.entry(*id).or_default();
+        *pixels += 1;
+        *found += usize::from(vertices.get(id).is_some_and(near));
+    }
+    assert!(shown.values().any(|[pixels, _]| *pixels > 100), "a car is in sight: {shown:?}");
+    for (id, [pixels, found]) in &shown {
+        assert!(found * 100 >= pixels * 95, "object {id}: {found} of {pixels} pixels show a point of the map's object");
+    }
 }
 
 #[test]
