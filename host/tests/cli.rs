@@ -42,7 +42,7 @@ fn a_run_leaves_its_folder_and_json_alone_on_standard_output() {
     let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
     assert!(columns.len() == 4 && columns.iter().all(|count| *count == columns[0]), "one header, three rows, equal widths");
     let report = fs::read_to_string(root.path().join("result/report.html")).unwrap();
-    assert!(!report.contains("://") && report.contains("data:image/png;base64,"), "one self-contained file");
+    assert!(!report.contains("://") && report.contains("data:image/jpeg;base64,"), "one self-contained file");
 }
 
 #[test]

@@ -81,6 +81,9 @@ result.last = data.frame;
 await until(() => caption() !== result.caption);
 result.lastCaption = caption();
 result.left = root.querySelector("canvas.left").width;
+const plain = shown().red;
+await toggle("swept");
+result.swept = shown().red !== plain;
 await toggle("map");
 result.objects = Number(data.triangles);
 await toggle("later");
@@ -109,9 +112,30 @@ report(result);
     // The first object is last seen in the middle, the second at the end.
     assert_eq!((triangles("objects"), triangles("now")), (2 * 12, 12), "{of}");
     assert_eq!(triangles("back"), 2 * 60 * 60 + 12, "{of}");
-    for key in ["colour1", "colour2", "colour3", "turned"] {
+    for key in ["colour1", "colour2", "colour3", "turned", "swept"] {
         assert_eq!(of[key], true, "{key}: {of}");
     }
+}
+
+#[test]
+fn without_a_graphics_card_motion_is_coarse_and_rest_is_whole() {
+    let Some(browser) = Browser::find("without_a_graphics_card_motion_is_coarse_and_rest_is_whole") else { return };
+    let root = TempDir::new().unwrap();
+    FakeRun { frames: 4, objects: 0, squares: 190, pictures: false }.write(root.path());
+    let script = r#"
+const turn = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, { pointerId: 1, clientX: x, clientY: 200, buttons: 1, bubbles: true }));
+canvas.setPointerCapture = () => {};
+const whole = Number(data.triangles), share = shown().share;
+turn("pointerdown", 200);
+await drawn(() => turn("pointermove", 204));
+const moving = Number(data.triangles), movingShare = shown().share;
+await until(() => Number(data.triangles) > moving);
+report({ whole, moving, rest: Number(data.triangles), share, movingShare });
+"#;
+    let of = visit(&browser, &viewer(root.path()), "", script);
+    let triangles = |key: &str| of[key].as_f64().unwrap();
+    assert!(triangles("whole") > 60_000.0 && triangles("rest") > 8.0 * triangles("moving") && triangles("moving") > 100.0, "{of}");
+    assert!((triangles("share") - triangles("movingShare")).abs() < 0.1, "the same is seen: {of}");
 }
 
 #[test]

@@ -14,19 +14,19 @@ const OVERVIEW_OFFSET_M: [f64; 3] = [0.0, -7.0, -15.0];
 /// How far it is tilted down, rad.
 const OVERVIEW_PITCH_RAD: f64 = 0.33;
 
-/// Pictures of one frame, as PNG files.
+/// Pictures of one frame, as JPEG files.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Keyframe {
     /// Number of the frame in the data set.
     pub frame: usize,
     /// Left image.
-    pub input_png: Vec<u8>,
+    pub input_jpeg: Vec<u8>,
     /// Disparity in colours.
-    pub disparity_png: Vec<u8>,
+    pub disparity_jpeg: Vec<u8>,
     /// The static map from the camera's pose.
-    pub raycast_png: Vec<u8>,
+    pub raycast_jpeg: Vec<u8>,
     /// The same with every object in its place; empty without objects.
-    pub composed_png: Vec<u8>,
+    pub composed_jpeg: Vec<u8>,
 }
 
 /// Pictures of a run.
@@ -34,8 +34,8 @@ pub struct Keyframe {
 pub struct KeyframesSection {
     /// Pictures of some frames.
     pub keyframes: Vec<Keyframe>,
-    /// The finished map from behind and above the last camera, as a PNG file; empty without frames.
-    pub overview_png: Vec<u8>,
+    /// The finished map from behind and above the last camera, as a JPEG file; empty without frames.
+    pub overview_jpeg: Vec<u8>,
 }
 
 /// Takes pictures.
@@ -43,7 +43,7 @@ pub struct KeyframesSection {
 pub struct KeyframesObserver {
     keyframes: Vec<Keyframe>,
     #[serde(skip)]
-    overview_png: Vec<u8>,
+    overview_jpeg: Vec<u8>,
 }
 
 impl Observer for KeyframesObserver {
@@ -65,13 +65,13 @@ impl Observer for KeyframesObserver {
     fn end(&mut self, _: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         if let Some(row) = end.last {
             let seen = end.view.raycast(&overview_pose(&row.report.t_world_camera));
-            self.overview_png = png(seen.and_then(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None)));
+            self.overview_jpeg = jpeg(seen.and_then(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None)));
         }
         Ok(())
     }
 
     fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<KeyframesSection, ObserveError> {
-        Ok(KeyframesSection { keyframes: self.keyframes, overview_png: self.overview_png })
+        Ok(KeyframesSection { keyframes: self.keyframes, overview_jpeg: self.overview_jpeg })
     }
 }
 
@@ -89,21 +89,21 @@ pub(super) fn left(frame: &FrameContext<'_, '_>) -> Option<RgbImage> {
     Some(pictures::input(&grey, colour.as_ref()))
 }
 
-/// A picture as a PNG file; empty without a picture.
-fn png(picture: Option<RgbImage>) -> Vec<u8> {
-    picture.as_ref().map(pictures::png).unwrap_or_default()
+/// A picture as a JPEG file; empty without a picture.
+fn jpeg(picture: Option<RgbImage>) -> Vec<u8> {
+    picture.as_ref().map(pictures::jpeg).unwrap_or_default()
 }
 
 fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
     let t_world_camera: Transform = frame.row.report.t_world_camera;
-    let input_png = png(Some(left(frame)?));
-    let disparity_png = png(Some(pictures::disparity(&frame.view.mapper().disparity_q8())));
+    let input_jpeg = jpeg(Some(left(frame)?));
+    let disparity_jpeg = jpeg(Some(pictures::disparity(&frame.view.mapper().disparity_q8())));
     let seen = frame.view.raycast(&t_world_camera)?;
     Some(Keyframe {
         frame: frame.row.frame,
-        input_png,
-        disparity_png,
-        raycast_png: png(pictures::map(pictures::SMALL_PX, seen, |_| None)),
-        composed_png: png(pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera)),
+        input_jpeg,
+        disparity_jpeg,
+        raycast_jpeg: jpeg(pictures::map(pictures::SMALL_PX, seen, |_| None)),
+        composed_jpeg: jpeg(pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera)),
     })
 }

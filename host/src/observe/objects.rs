@@ -40,8 +40,8 @@ pub struct ReconstructedObject {
     pub triangles: u64,
     /// Its mesh against the true surface, where that is known.
     pub surface: Option<SurfaceFigures>,
-    /// Its mesh from three sides, as a PNG file; empty for objects beyond the number shown.
-    pub thumbnail_png: Vec<u8>,
+    /// Its mesh from three sides, as a JPEG file; empty for objects beyond the number shown.
+    pub thumbnail_jpeg: Vec<u8>,
 }
 
 /// Objects of a run.
@@ -219,7 +219,7 @@ impl ObjectsObserver {
             blocks: volume.blocks(),
             triangles: triangles.len() as u64,
             surface: side.and_then(|side| side.compare(&triangles, f64::from(volume.config().voxel_size_m))),
-            thumbnail_png: thumbnail(&triangles),
+            thumbnail_jpeg: thumbnail(&triangles),
         });
         self.limit_thumbnails();
         Ok(())
@@ -227,11 +227,11 @@ impl ObjectsObserver {
 
     /// Drops the thumbnail of the object fused least often when there are too many.
     fn limit_thumbnails(&mut self) {
-        let mut shown: Vec<_> = self.retired.iter_mut().filter(|one| !one.thumbnail_png.is_empty()).collect();
+        let mut shown: Vec<_> = self.retired.iter_mut().filter(|one| !one.thumbnail_jpeg.is_empty()).collect();
         if shown.len() > THUMBNAILS
             && let Some(least) = shown.iter_mut().min_by_key(|one| one.frames)
         {
-            least.thumbnail_png = Vec::new();
+            least.thumbnail_jpeg = Vec::new();
         }
     }
 }

@@ -107,7 +107,7 @@ pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample
             }
         }
     }
-    RgbImage::from_raw(width as u32, height as u32, pixels.into_flattened()).map(|picture| png(&picture)).unwrap_or_default()
+    RgbImage::from_raw(width as u32, height as u32, pixels.into_flattened()).map(|picture| jpeg(&picture)).unwrap_or_default()
 }
 
 /// Disparities against true ones, both 1/256 px and 0 none, each pixel of truth in the colour of its error over the darkened image; what the matcher filled

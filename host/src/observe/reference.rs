@@ -82,15 +82,15 @@ impl ReferencePlan {
     }
 }
 
-/// Pictures of one frame's errors, as PNG files.
+/// Pictures of one frame's errors, as JPEG files.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ErrorPictures {
     /// Number of the frame in the data set.
     pub frame: usize,
     /// The input against the reference.
-    pub input_png: Vec<u8>,
+    pub input_jpeg: Vec<u8>,
     /// The map against the reference.
-    pub map_png: Vec<u8>,
+    pub map_jpeg: Vec<u8>,
 }
 
 /// A finished evaluation.
@@ -167,8 +167,8 @@ impl ReferenceObserver {
             let samples = || due.samples.iter();
             self.pictures.push(ErrorPictures {
                 frame: due.frame,
-                input_png: pictures::errors(&picture, samples().map(|sample| (sample, sample.input_px))),
-                map_png: pictures::errors(&picture, samples().zip(shown_px.iter().copied())),
+                input_jpeg: pictures::errors(&picture, samples().map(|sample| (sample, sample.input_px))),
+                map_jpeg: pictures::errors(&picture, samples().zip(shown_px.iter().copied())),
             });
         }
     }

@@ -1,7 +1,8 @@
 //! An object's mesh on three pictures, orthographic: from the camera that saw it first, from its left side, from above.
 
+use super::pictures;
 use dynvox_core::view::Triangle;
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::RgbImage;
 use nalgebra::Vector3;
 
 /// Size of one view, px.
@@ -10,7 +11,7 @@ const VIEW_PX: (usize, usize) = (380, 240);
 const STRAY: f64 = 0.005;
 const EMPTY: [u8; 3] = [24, 26, 30];
 
-/// The pictures side by side as a PNG file; empty when there is nothing to show.
+/// The pictures side by side as a JPEG file; empty when there is nothing to show.
 pub fn thumbnail(triangles: &[Triangle]) -> Vec<u8> {
     if triangles.is_empty() {
         return Vec::new();
@@ -20,13 +21,8 @@ pub fn thumbnail(triangles: &[Triangle]) -> Vec<u8> {
     let views = [[x, y, z], [-z, y, x], [x, -z, y]].map(|axes| view(triangles, axes));
     let rows = (0..VIEW_PX.1).flat_map(|v| views.iter().flat_map(move |view| &view[v * VIEW_PX.0..(v + 1) * VIEW_PX.0]));
     let pixels: Vec<u8> = rows.flatten().copied().collect();
-    let mut png = Vec::new();
     let size = (3 * VIEW_PX.0 as u32, VIEW_PX.1 as u32);
-    // A picture that cannot be encoded is left out.
-    if PngEncoder::new(&mut png).write_image(&pixels, size.0, size.1, ExtendedColorType::Rgb8).is_err() {
-        png.clear();
-    }
-    png
+    RgbImage::from_raw(size.0, size.1, pixels).map(|picture| pictures::jpeg(&picture)).unwrap_or_default()
 }
 
 fn view(triangles: &[Triangle], axes: [Vector3<f32>; 3]) -> Vec<[u8; 3]> {

@@ -73,8 +73,8 @@ fn configuration(run: &RunRecord) -> Markup {
 }
 
 /// A picture inside the page.
-fn image(png: &[u8], alt: &str) -> Markup {
-    html! { img alt=(alt) src={ "data:image/png;base64," (STANDARD.encode(png)) }; }
+fn image(jpeg: &[u8], alt: &str) -> Markup {
+    html! { img alt=(alt) src={ "data:image/jpeg;base64," (STANDARD.encode(jpeg)) }; }
 }
 
 /// A table that scrolls where the page is narrow: heads with whether their column holds numbers, then rows of cells.

@@ -186,7 +186,7 @@ fn track_row(track: &TrackRecord) -> Vec<String> {
 
 /// Meshes with a thumbnail.
 fn gallery(objects: &[ReconstructedObject]) -> Markup {
-    let shown: Vec<&ReconstructedObject> = objects.iter().filter(|object| !object.thumbnail_png.is_empty()).collect();
+    let shown: Vec<&ReconstructedObject> = objects.iter().filter(|object| !object.thumbnail_jpeg.is_empty()).collect();
     if shown.is_empty() {
         return html! {};
     }
@@ -198,7 +198,7 @@ fn gallery(objects: &[ReconstructedObject]) -> Markup {
         div.gallery {
             @for object in shown {
                 figure {
-                    (image(&object.thumbnail_png, &format!("mesh of object {}", object.name)))
+                    (image(&object.thumbnail_jpeg, &format!("mesh of object {}", object.name)))
                     figcaption {
                         (object.class.name()) " " code { (object.name) ".ply" } ", " (state_name(object.state)) ": " (object.frames) " frames, "
                         (grouped(object.triangles)) " triangles"

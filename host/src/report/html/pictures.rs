@@ -7,7 +7,7 @@ use maud::{Markup, html};
 
 pub fn section(run: &RunRecord) -> Markup {
     let pictures = &run.sections.keyframes;
-    let composed = pictures.keyframes.iter().any(|keyframe| !keyframe.composed_png.is_empty());
+    let composed = pictures.keyframes.iter().any(|keyframe| !keyframe.composed_jpeg.is_empty());
     html! {
         section {
             h2 { "Input, disparity and map" }
@@ -21,9 +21,9 @@ pub fn section(run: &RunRecord) -> Markup {
                 }
             }
             @for keyframe in &pictures.keyframes { (figure(keyframe)) }
-            @if !pictures.overview_png.is_empty() {
+            @if !pictures.overview_jpeg.is_empty() {
                 figure {
-                    (image(&pictures.overview_png, "map from behind and above"))
+                    (image(&pictures.overview_jpeg, "map from behind and above"))
                     figcaption { "The finished map from behind and above the last camera" }
                 }
             }
@@ -32,14 +32,14 @@ pub fn section(run: &RunRecord) -> Markup {
 }
 
 fn figure(keyframe: &Keyframe) -> Markup {
-    let composed = !keyframe.composed_png.is_empty();
+    let composed = !keyframe.composed_jpeg.is_empty();
     html! {
         figure {
             div class=(if composed { "four" } else { "three" }) {
-                (image(&keyframe.input_png, "left image"))
-                (image(&keyframe.disparity_png, "disparity"))
-                (image(&keyframe.raycast_png, "map"))
-                @if composed { (image(&keyframe.composed_png, "map with objects")) }
+                (image(&keyframe.input_jpeg, "left image"))
+                (image(&keyframe.disparity_jpeg, "disparity"))
+                (image(&keyframe.raycast_jpeg, "map"))
+                @if composed { (image(&keyframe.composed_jpeg, "map with objects")) }
             }
             figcaption { "frame " (keyframe.frame) }
         }

@@ -100,9 +100,9 @@ fn error_pictures(section: &ReferenceSection, name: &str) -> Markup {
     html! {
         @for of in &section.pictures {
             figure {
-                (image(&of.input_png, &format!("input against {name}")))
+                (image(&of.input_jpeg, &format!("input against {name}")))
                 figcaption { "frame " (of.frame) ": input against " (name) }
-                (image(&of.map_png, &format!("map against {name}")))
+                (image(&of.map_jpeg, &format!("map against {name}")))
                 figcaption { "frame " (of.frame) ": map against " (name) }
             }
         }

@@ -43,3 +43,29 @@ function decodeTile(planes, { vertices, triangles }) {
   }
   return { bytes, indices };
 }
+
+// Triangles between one vertex for each cube of some steps: what a slow machine draws while something moves. A power of two of steps.
+function coarseTriangles({ bytes, indices }, bits) {
+  const words = new Uint16Array(bytes.buffer), vertices = words.length / 6;
+  const keepers = new Map(), kept = new Uint16Array(vertices), coarse = [];
+  for (let at = 0; at < vertices; at++) {
+    const cell = ((words[6 * at] >> bits) * 65536 + (words[6 * at + 1] >> bits)) * 65536 + (words[6 * at + 2] >> bits);
+    if (!keepers.has(cell)) keepers.set(cell, at);
+    kept[at] = keepers.get(cell);
+  }
+  for (let at = 0; at < indices.length; at += 3) {
+    const a = kept[indices[at]], b = kept[indices[at + 1]], c = kept[indices[at + 2]];
+    if (a !== b && b !== c && c !== a) coarse.push(a, b, c);
+  }
+  return Uint16Array.from(coarse);
+}
+
+// Bits of the cubes that leave about one triangle of sixteen: four edges of this tile long.
+function coarseBits({ bytes, indices }) {
+  const words = new Uint16Array(bytes.buffer), every = 3 * Math.max(1, Math.floor(indices.length / 3000));
+  let sum = 0, count = 0;
+  for (let at = 0; at + 1 < indices.length; at += every, count++) {
+    sum += Math.hypot(...[0, 1, 2].map((axis) => words[6 * indices[at] + axis] - words[6 * indices[at + 1] + axis]));
+  }
+  return clamp(Math.round(Math.log2(4 * sum / Math.max(count, 1))), 1, 15);
+}

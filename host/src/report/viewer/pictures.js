@@ -1,10 +1,16 @@
 // The pictures of the keyframe nearest to a frame, and the tracks on its left image.
 const STATE_COLOURS = { uncertain: "#9aa0aa", static: "#3a7bd5", dynamic: "#e8590c" };
 
-// A picture of the page as an address; null where the run has none.
+// A picture of the page as an address; null where the run has none. Made once: the text is decoded when the picture is first looked at.
+const PICTURE_URLS = new Map();
 function pictureUrl(frame, name, kind) {
-  const element = document.getElementById(`dynvox-${String(frame).padStart(6, "0")}_${name}`);
-  return element ? `data:image/${kind};base64,${element.textContent}` : null;
+  const id = `dynvox-${String(frame).padStart(6, "0")}_${name}`;
+  if (!PICTURE_URLS.has(id)) {
+    const element = document.getElementById(id), text = element && atob(element.textContent);
+    const bytes = text && Uint8Array.from(text, (character) => character.charCodeAt(0));
+    PICTURE_URLS.set(id, bytes && URL.createObjectURL(new Blob([bytes], { type: `image/${kind}` })));
+  }
+  return PICTURE_URLS.get(id);
 }
 
 async function loaded(url) {

@@ -2,16 +2,20 @@
 const NO_TINT = [-1, -1, -1];
 const IDENTITY = poseMatrix([0, 0, 0, 0, 0, 0, 1]);
 
+// Names of what draws without a graphics card.
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+
 class Renderer {
-  // Null where the browser has no WebGL 2.
+  // Null where the browser has no WebGL 2. Smooth edges take a processor twenty times as long as all the rest: there they are left out.
   static on(canvas) {
-    const gl = canvas.getContext("webgl2", { antialias: true, alpha: false, preserveDrawingBuffer: true });
-    return gl ? new Renderer(canvas, gl) : null;
+    const probe = document.createElement("canvas").getContext("webgl2"), names = probe && probe.getExtension("WEBGL_debug_renderer_info");
+    const software = SOFTWARE.test(probe ? probe.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : probe.RENDERER) : "");
+    const gl = canvas.getContext("webgl2", { antialias: !software, alpha: false, preserveDrawingBuffer: true });
+    return gl ? new Renderer(canvas, gl, software) : null;
   }
 
-  constructor(canvas, gl) {
-    this.canvas = canvas;
-    this.gl = gl;
+  constructor(canvas, gl, software) {
+    Object.assign(this, { canvas, gl, software });
     this.mesh = this.program(MESH_VERTEX, MESH_FRAGMENT, ["a_position", "a_normal", "a_colour"]);
     this.line = this.program(LINE_VERTEX, LINE_FRAGMENT, ["a_from", "a_to"]);
     this.tiles = [];
@@ -37,7 +41,7 @@ class Renderer {
     return { program, uniforms };
   }
 
-  addTile(head, { bytes, indices }) {
+  addTile(head, { bytes, indices, coarse }) {
     const { gl } = this, array = gl.createVertexArray();
     gl.bindVertexArray(array);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
@@ -47,10 +51,13 @@ class Renderer {
       gl.vertexAttribPointer(at, size, kind, true, VERTEX_BYTES, offset);
     });
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+    // All triangles, and behind them the few that stand for them while something moves.
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, 2 * (indices.length + coarse.length), gl.STATIC_DRAW);
+    gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, indices);
+    gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 2 * indices.length, coarse);
     gl.bindVertexArray(null);
     const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => head.low_m.map((low, axis) => (bits >> axis & 1 ? head.high_m[axis] : low)));
-    this.tiles.push({ head, array, count: indices.length, corners });
+    this.tiles.push({ head, array, whole: [0, indices.length], coarse: [indices.length, coarse.length], corners });
   }
 
   // A line through points, or pieces between pairs of them.
@@ -76,8 +83,8 @@ class Renderer {
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(points.flat()), gl.DYNAMIC_DRAW);
   }
 
-  // Draws at a share of the canvas's own pixels. `objects` gives pose and tint of each object, or null where it is hidden.
-  draw({ share, clip, colour, heights, background, showStatic, objects, lines }) {
+  // Draws at a share of the canvas's own pixels, and with the tiles' coarse triangles where they are asked for and there. `objects` gives pose and tint of each object, or null where it is hidden.
+  draw({ share, isCoarse, clip, colour, heights, background, showStatic, objects, lines }) {
     const { gl, canvas } = this;
     const ratio = Math.min(window.devicePixelRatio || 1, 2) * share;
     const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
@@ -85,7 +92,7 @@ class Renderer {
     gl.viewport(0, 0, width, height);
     gl.clearColor(...background, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const triangles = this.drawTiles(clip, colour, heights, showStatic, objects);
+    const triangles = this.drawTiles({ clip, colour, heights, isCoarse, showStatic, objects });
     const { program, uniforms } = this.line;
     gl.useProgram(program);
     gl.uniformMatrix4fv(uniforms.u_clip_world, false, clip);
@@ -99,14 +106,14 @@ class Renderer {
     return triangles;
   }
 
-  drawTiles(clip, colour, heights, showStatic, objects) {
+  drawTiles({ clip, colour, heights, isCoarse, showStatic, objects }) {
     const { gl } = this, { program, uniforms } = this.mesh;
     gl.useProgram(program);
     gl.uniformMatrix4fv(uniforms.u_clip_world, false, clip);
     gl.uniform1i(uniforms.u_colour, colour);
     gl.uniform2fv(uniforms.u_heights, heights);
     let triangles = 0;
-    for (const { head, array, count, corners } of this.tiles) {
+    for (const { head, array, whole, coarse, corners } of this.tiles) {
       const object = head.object === null ? (showStatic ? { matrix: IDENTITY, tint: NO_TINT } : null) : objects[head.object];
       if (!object || isOutside(multiply(clip, object.matrix), corners)) continue;
       gl.uniformMatrix4fv(uniforms.u_world_mesh, false, object.matrix);
@@ -114,7 +121,8 @@ class Renderer {
       gl.uniform1f(uniforms.u_size, head.size_m);
       gl.uniform3fv(uniforms.u_tint, object.tint);
       gl.bindVertexArray(array);
-      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, 0);
+      const [first, count] = isCoarse && coarse[1] ? coarse : whole;
+      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, 2 * first);
       triangles += count / 3;
     }
     return triangles;

@@ -6,12 +6,17 @@ const LINES = { camera: "#2f6fde", truth: "#e5484d", now: "#f5b301" };
 // Where the edges of the camera's picture lie at a depth of 1, and how far its pyramid is drawn, m.
 const PYRAMID = [[-0.85, -0.27], [0.85, -0.27], [0.85, 0.27], [-0.85, 0.27]];
 const PYRAMID_M = 1.6;
-// Drawing slower than this, ms, draws fewer pixels until nothing moves.
+// Boxes along an object's trajectory, at most, and the edges of one between its corners.
+const SWEPT_BOXES = 24;
+const BOX_EDGES = [0, 1, 2].flatMap((bit) => [0, 1, 2, 3, 4, 5, 6, 7].filter((corner) => !(corner >> bit & 1)).map((corner) => [corner, corner | 1 << bit]));
+// Drawing slower than this, ms, draws coarser triangles, and then fewer pixels, until nothing moves.
 const SLOW_MS = 40;
+// Meshes of more triangles have coarse ones as well.
+const COARSE_OVER = 60000;
 
 class Viewer {
   constructor(head, renderer) {
-    Object.assign(this, { head, renderer, at: Math.floor(head.frames.length / 2), share: 1, triangles: 0, drawn: 0 });
+    Object.assign(this, { head, renderer, at: Math.floor(head.frames.length / 2), share: 1, isCoarse: Boolean(renderer?.software), triangles: 0, drawn: 0 });
     this.camera = new Camera();
     this.pictures = new Pictures(root, head);
     this.charts = new Charts(find(".charts"), head, (at) => this.go(at));
@@ -49,15 +54,16 @@ class Viewer {
       ["dynamic", "dynamic objects", objects], ["static", "static objects", objects], ["uncertain", "uncertain objects", objects],
       ["later", "objects where last seen", objects],
       ["tracks", "tracks", objects || head.tracks.some((tracks) => tracks.length)],
+      ["swept", "swept volumes", objects, false],
       ["masks", "masks", head.pictures.length > 0 && head.tracks.some((tracks) => tracks.length)],
       ["camera", "camera path", head.poses.length > 0], ["truth", "ground truth", head.truth.length > 0],
     ];
     const layers = {};
-    for (const [key, text, there] of known) {
-      layers[key] = there;
+    for (const [key, text, there, checked = true] of known) {
+      layers[key] = there && checked;
       if (!there) continue;
       const label = document.createElement("label"), box = document.createElement("input");
-      Object.assign(box, { type: "checkbox", checked: true, value: key });
+      Object.assign(box, { type: "checkbox", checked, value: key });
       box.addEventListener("change", () => { layers[key] = box.checked; this.show(); });
       label.append(box, ` ${text}`);
       find(".layers").append(label);
@@ -102,6 +108,7 @@ class Viewer {
     if (positions.length > 1) this.lines.camera = renderer.addLine(positions, rgb(LINES.camera), 1.8);
     if (head.truth.length > 1) this.lines.truth = renderer.addLine(head.truth, rgb(LINES.truth), 1.4);
     this.tracks = head.objects.map(({ id, poses }) => ({ id, line: renderer.addLine(poses.map((pose) => pose.slice(0, 3)), [1, 1, 1], 2.2) }));
+    this.swept = head.objects.map(({ id }, at) => ({ id, line: renderer.addLine(this.sweptBoxes(at), [1, 1, 1], 1, true) }));
     steer(canvas, camera, () => find(".mode").value, () => {
       if (["follow", "camera"].includes(find(".mode").value)) find(".mode").value = "orbit";
       this.show();
@@ -112,6 +119,19 @@ class Viewer {
     this.lookBehind(true);
     find(".controls").hidden = false;
     find(".controls").open = innerWidth > 820;
+  }
+
+  // The box around an object's mesh at poses along its trajectory, as pairs of points.
+  sweptBoxes(at) {
+    const tiles = this.head.tiles.filter(({ object }) => object === at), { poses } = this.head.objects[at];
+    if (!tiles.length) return [];
+    const side = (most, name) => [0, 1, 2].map((axis) => most(...tiles.map((tile) => tile[name][axis])));
+    const low = side(Math.min, "low_m"), high = side(Math.max, "high_m"), every = Math.ceil(poses.length / SWEPT_BOXES);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => low.map((least, axis) => (bits >> axis & 1 ? high[axis] : least)));
+    return poses.filter((_, pose) => pose % every === 0).flatMap((pose) => {
+      const matrix = poseMatrix(pose), points = corners.map((corner) => transform(matrix, corner));
+      return BOX_EDGES.flatMap((edge) => edge.map((corner) => points[corner]));
+    });
   }
 
   lookBehind(behind) {
@@ -156,16 +176,14 @@ class Viewer {
     const { head, renderer, camera, layers } = this, canvas = find(".view canvas"), began = performance.now();
     const objects = this.posedObjects();
     const lines = Object.entries(this.lines).filter(([key]) => key === "pyramid" ? layers.camera : layers[key]).map(([, line]) => line);
-    if (layers.tracks) {
-      for (const { id, line } of this.tracks) {
-        line.colour = rgb(STATE_COLOURS[this.stateOf(id)]);
-        lines.push(line);
-      }
+    for (const { id, line } of [...(layers.tracks ? this.tracks : []), ...(layers.swept ? this.swept : [])]) {
+      line.colour = rgb(STATE_COLOURS[this.stateOf(id)]);
+      lines.push(line);
     }
     renderer.setLine(this.lines.pyramid, this.pyramid());
     const dark = matchMedia("(prefers-color-scheme: dark)").matches;
     this.triangles = renderer.draw({
-      share: this.share, clip: camera.clip(canvas.clientWidth / Math.max(canvas.clientHeight, 1)), colour: Number(find(".colour").value),
+      share: this.share, isCoarse: this.isCoarse, clip: camera.clip(canvas.clientWidth / Math.max(canvas.clientHeight, 1)), colour: Number(find(".colour").value),
       heights: [head.heights_m[0], Math.max(head.heights_m[1], head.heights_m[0] + 0.1)],
       background: dark ? [0.07, 0.08, 0.09] : [0.90, 0.92, 0.94], showStatic: layers.map, objects, lines,
     });
@@ -174,19 +192,23 @@ class Viewer {
     Object.assign(root.dataset, { triangles: String(this.triangles), drawn: String(++this.drawn) });
   }
 
-  // Fewer pixels while drawing is slow, and all of them when nothing has moved for a while.
+  // Coarser triangles and fewer pixels while drawing is slow, and all of them when nothing has moved for a while.
   adapt(ms) {
     clearTimeout(this.settling);
     if (this.refining) { this.refining = false; return; }
-    if (ms > SLOW_MS) this.share = Math.max(this.share * 0.7, 0.35);
-    if (this.share < 1) {
-      this.settling = setTimeout(() => {
-        const moving = this.share;
-        Object.assign(this, { share: 1, refining: true });
-        this.draw3d();
-        this.share = moving;
-      }, 250);
+    if (ms > SLOW_MS) {
+      if (this.isCoarse) this.share = Math.max(this.share * 0.7, 0.35);
+      this.isCoarse = true;
     }
+    if (this.share < 1 || this.isCoarse) this.settling = setTimeout(() => this.refine(), 250);
+  }
+
+  // Draws everything once.
+  refine() {
+    const { share, isCoarse } = this;
+    Object.assign(this, { share: 1, isCoarse: false, refining: true });
+    this.draw3d();
+    Object.assign(this, { share, isCoarse });
   }
 
   // Pose and tint of each object at the current frame; null where it is hidden.
@@ -227,9 +249,17 @@ async function load() {
     root.classList.add("live");
     const bar = find("progress"), triangles = head.tiles.reduce((sum, tile) => sum + tile.triangles, 0);
     bar.hidden = false;
+    let bits = null;
+    const decoded = (tile, planes) => {
+      const mesh = decodeTile(planes, tile);
+      // All tiles of the static map have steps of one size; objects are small.
+      if (tile.object === null) bits = bits ?? coarseBits(mesh);
+      const coarse = tile.object === null && triangles > COARSE_OVER ? coarseTriangles(mesh, bits) : new Uint16Array(0);
+      return { ...mesh, coarse };
+    };
     let pause = 0, drawnAt = -Infinity;
     for (const [at, tile] of head.tiles.entries()) {
-      renderer.addTile(tile, decodeTile(await inflate(`dynvox-tile-${at}`), tile));
+      renderer.addTile(tile, decoded(tile, await inflate(`dynvox-tile-${at}`)));
       bar.value = (at + 1) / head.tiles.length;
       // Drawing takes a quarter of the time at most, however slow it is.
       if (performance.now() - drawnAt > pause) {
@@ -241,7 +271,8 @@ async function load() {
       }
     }
     bar.hidden = true;
-    viewer.draw();
+    clearTimeout(viewer.settling);
+    viewer.refine();
     const of = head.tiles.length ? `${triangles.toLocaleString("en")} triangles, of ${head.static_triangles.toLocaleString("en")} of the static map` : "The map is empty";
     find(".note").textContent = of;
   } else {
