@@ -1,7 +1,8 @@
 """Stereo dense mapping of streets with moving cars, for numpy.
 
 Axes are KITTI's: x right, y down, z forward; the first left camera is the world. Poses map camera to world. Lengths are metres, disparities
-1/256 px. Every error is an `Error` with the sentence that the command line prints.
+1/256 px. Every error is an `Error` with the sentence that the command line prints. Pose, Track, Region, Raycast and Frame are dictionaries: import their
+names under `typing.TYPE_CHECKING` alone.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -10,6 +11,7 @@ from typing import Any, Literal, TypedDict, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import Self
 
 __version__: str
 
@@ -90,7 +92,7 @@ class Frame(TypedDict, total=False):
 class Rig:
     """Two identical pinhole cameras, rectified. That of a data set or of `read_calibration` can also be of raw cameras: the mapper rectifies then."""
 
-    def __init__(self, focal_px: float, center_u_px: float, center_v_px: float, baseline_m: float) -> None: ...
+    def __new__(cls, focal_px: float, center_u_px: float, center_v_px: float, baseline_m: float) -> Self: ...
     @property
     def focal_px(self) -> float: ...
     @property
@@ -122,9 +124,9 @@ def read_calibration(
 class Detection:
     """An instance in the left image: a mask in a box whose first column and row are `left` and `top`."""
 
-    def __init__(
-        self, mask: NDArray[np.uint8] | NDArray[np.bool_], left: int, top: int, class_name: str = "car", score: float = 1.0
-    ) -> None: ...
+    def __new__(
+        cls, mask: NDArray[np.uint8] | NDArray[np.bool_], left: int, top: int, class_name: str = "car", score: float = 1.0
+    ) -> Self: ...
     @property
     def mask(self) -> NDArray[np.uint8]: ...
     @property
@@ -149,13 +151,13 @@ class Mapper:
     Other threads of Python run while it works. One mapper serves one thread at a time; others wait.
     """
 
-    def __init__(
-        self,
+    def __new__(
+        cls,
         rig: Rig,
         *,
         image: tuple[int, int] | None = None,
         frame_interval_s: float | None = None,
-        stream: bool | str | PathLike[str] = True,
+        stream: bool | str | PathLike[str] | None = None,
         memory: str | None = "256MiB",
         profile: Literal["tiny", "small", "onboard", "desktop"] | None = None,
         capacity: str | PathLike[str] | None = None,
@@ -168,10 +170,10 @@ class Mapper:
         fuse_every: int | None = None,
         instances: Literal["auto", "motion", "none"] = "auto",
         egomotion: Literal["stereo", "icp"] = "stereo",
-    ) -> None:
+    ) -> Self:
         """`image` is (width, height). `frame_interval_s` is the time between two frames without `time_ns`.
 
-        `stream`: evicted blocks go to a temporary file; to the file of a path; with False they are lost, and counted. All others are the
+        `stream`: evicted blocks go to a temporary file (None, True), to the file of a path, or nowhere (False): then they are lost, and counted. All others are the
         options of `dynvox run`: `set={"volume.voxel_size_m": 0.1}` is `--set volume.voxel_size_m=0.1`.
         """
 
@@ -246,11 +248,11 @@ class Dataset:
     Options are those of `dynvox run`, with underscores. A sequence of frames: `dataset[3]`, `len(dataset)`, `for frame in dataset` (decoded ahead).
     """
 
-    def __init__(
-        self,
+    def __new__(
+        cls,
         path: str | PathLike[str] | None = None,
         *,
-        stream: bool | str | PathLike[str] = True,
+        stream: bool | str | PathLike[str] | None = None,
         sequence: str | None = None,
         dataset: str | None = None,
         images: str | None = None,
@@ -281,7 +283,7 @@ class Dataset:
         set: Mapping[str, Any] | None = None,
         dynamic: bool | None = None,
         fuse_every: int | None = None,
-    ) -> None: ...
+    ) -> Self: ...
     @property
     def name(self) -> str: ...
     @property
@@ -317,5 +319,5 @@ class Dataset:
         """A mapper with the bounds, settings and threads of this run."""
 
     def __len__(self) -> int: ...
-    def __getitem__(self, position: int) -> Frame: ...
+    def __getitem__(self, position: int, /) -> Frame: ...
     def __iter__(self) -> Iterator[Frame]: ...
