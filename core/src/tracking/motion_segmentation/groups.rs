@@ -25,6 +25,10 @@ const MOTION_M: f64 = 0.15;
 const MOTION_PER_DEPTH: f64 = 0.02;
 /// A group's motion beyond the least one, m for each m^2 of squared depth.
 const MOTION_PER_SQUARED_DEPTH: f64 = 0.0008;
+/// Up to this depth groups are small as well, m: what passes the camera is blurred, cut by the image's border, and fast.
+const SPARSE_UP_TO_M: f64 = 10.0;
+/// Those are at least so wide or long, m: of bollards in a row one is taken for the next.
+const WIDTH_MIN_M: f64 = 0.5;
 /// Largest extent of a group, m: width, height, length.
 const EXTENT_MAX_M: [f64; 3] = [8.0, 5.0, 12.0];
 /// Motions of groups on one object differ by at most this, m, and lie at most that far apart, m.
@@ -60,9 +64,19 @@ impl Candidate {
         }
     }
 
+    /// Its pixel and disparity.
+    pub fn position(&self) -> [f32; 3] {
+        [self.u, self.v, self.disparity_px]
+    }
+
     /// Whether it is the first member of its group, at that position.
     pub fn is_first(&self, index: usize) -> bool {
         self.parent as usize == index
+    }
+
+    /// Whether it belongs to the group whose first member is at `first`.
+    pub fn is_of(&self, first: u32) -> bool {
+        self.parent == first
     }
 
     /// The same at another position.
@@ -93,7 +107,7 @@ pub(super) fn motion_tolerance_m(depth_m: f64) -> f64 {
     MOTION_M + MOTION_PER_DEPTH * depth_m
 }
 
-fn larger(a: f64, b: f64) -> f64 {
+pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
@@ -161,10 +175,17 @@ impl Group {
         is_small && self.motion_m.norm() > f64::from(config.motion_min_m) + MOTION_PER_SQUARED_DEPTH * self.depth_m * self.depth_m
     }
 
+    /// Whether another group is on the same object: of one motion and close by.
+    fn is_same(&self, other: &Self) -> bool {
+        (other.motion_m - self.motion_m).norm() < MERGE_MOTION_M && other.extent.gap(&self.extent) < MERGE_DISTANCE_M
+    }
+
     /// Whether it has members enough as well.
     pub fn passes(&self, config: &SegmentationConfig) -> bool {
-        let is_far = self.depth_m > f64::from(config.sparse_from_m);
-        let least = if is_far { config.far_members_min } else { config.members_min };
+        let Extent { low: [left, _, near], high: [right, _, far] } = self.extent;
+        let is_wide = larger(right - left, far - near) > WIDTH_MIN_M;
+        let is_sparse = self.depth_m > f64::from(config.sparse_from_m) || self.depth_m < SPARSE_UP_TO_M && is_wide;
+        let least = if is_sparse { config.far_members_min } else { config.members_min };
         self.members >= u32::from(least) && self.is_plausible(config)
     }
 }
@@ -307,10 +328,7 @@ fn merge(groups: Vec<Group, GROUPS_MAX>) -> Vec<Group, GROUPS_MAX> {
     let mut last = None;
     while let Some(group) = groups.iter().filter(|group| last.is_none_or(|last| key(group) > last)).min_by_key(|group| key(group)) {
         last = Some(key(group));
-        let is_same = |other: &&mut Group| {
-            (other.motion_m - group.motion_m).norm() < MERGE_MOTION_M && other.extent.gap(&group.extent) < MERGE_DISTANCE_M
-        };
-        if let Some(other) = merged.iter_mut().find(is_same) {
+        if let Some(other) = merged.iter_mut().find(|other| other.is_same(group)) {
             other.extent = other.extent.union(&group.extent);
             other.members += group.members;
         } else {
@@ -319,4 +337,52 @@ fn merge(groups: Vec<Group, GROUPS_MAX>) -> Vec<Group, GROUPS_MAX> {
         }
     }
     merged
+}
+
+/// Adds the groups of sparse matches: each widens the one on the same object, or is a new one where none lies, if it has `members_min`
+/// members. Returns how many there is no space for.
+pub(super) fn add(groups: &mut Vec<Group, GROUPS_MAX>, more: &[Group], members_min: u16) -> u32 {
+    let mut refused = 0;
+    for group in more {
+        if let Some(known) = groups.iter_mut().find(|known| known.is_same(group)) {
+            known.extent = known.extent.union(&group.extent);
+        } else if group.members >= u32::from(members_min) && groups.iter().all(|known| known.extent.gap(&group.extent) > 0.0) {
+            refused += u32::from(groups.push(*group).is_err());
+        }
+    }
+    refused
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn group(x: f64, width_m: f64, depth_m: f64, members: u32) -> Group {
+        let half = 0.5 * width_m;
+        let extent = Extent { low: [x - half, 0.0, depth_m], high: [x + half, 1.0, depth_m] };
+        Group {
+            extent,
+            depth_m,
+            motion_m: Vector3::new(0.0, 0.0, 1.0),
+            members,
+            first: 0,
+            depth_sigma_m: 0.1,
+        }
+    }
+
+    #[test]
+    fn a_near_group_may_be_small_where_it_is_wide_enough_for_more_than_a_bollard() {
+        let config = SegmentationConfig::default();
+        assert!(group(0.0, 0.6, 5.0, 5).passes(&config) && !group(0.0, 0.4, 5.0, 5).passes(&config));
+        assert!(group(0.0, 0.4, 5.0, 8).passes(&config) && !group(0.0, 0.6, 15.0, 5).passes(&config));
+    }
+
+    #[test]
+    fn sparse_matches_widen_a_group_and_make_a_new_one_only_where_they_are_many() {
+        let mut groups = Vec::<Group, GROUPS_MAX>::new();
+        assert!(groups.push(group(0.0, 1.0, 8.0, 10)).is_ok());
+        assert_eq!(add(&mut groups, &[group(1.5, 1.0, 8.0, 4), group(20.0, 1.0, 8.0, 7)], 8), 0);
+        assert_eq!((groups.len(), groups.first().unwrap().extent.high[0]), (1, 2.0));
+        assert_eq!((add(&mut groups, &[group(20.0, 1.0, 8.0, 8)], 8), groups.len()), (0, 2));
+    }
 }

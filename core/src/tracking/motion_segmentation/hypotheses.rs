@@ -2,7 +2,7 @@
 
 use super::{
     SegmentationConfig,
-    groups::{Extent, GROUPS_MAX, Group},
+    groups::{Extent, GROUPS_MAX, Group, larger},
 };
 use crate::{geometry::Transform, part::part, state::Visitor, tracking::association::remove_at};
 use bytemuck::{Pod, Zeroable};
@@ -16,8 +16,18 @@ const DISTANCE_PER_DEPTH: f64 = 0.06;
 /// How far the motions in two frames may differ, m, and by metre of depth.
 const MOTION_M: f64 = 0.25;
 const MOTION_PER_DEPTH: f64 = 0.02;
+/// Share of an extent that is kept where a frame's members do not reach.
+const KEPT_SHARE: f64 = 0.9;
+/// Largest extent that is kept, m: width, height, length.
+const KEPT_MAX_M: [f64; 3] = [1.8, 1.4, 4.0];
+/// Frames in which an object that was hidden is searched for where it must be, after those over which its mask is predicted.
+const HIDDEN_FRAMES: u32 = 7;
 /// Frames of the history that count.
 const RECENT: u32 = 0b111;
+
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
 
 /// A group that is followed over frames.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -73,16 +83,39 @@ impl Hypothesis {
         self.confirmed > 0
     }
 
+    /// Whether its mask is in this frame.
+    pub fn is_shown(&self, config: &SegmentationConfig) -> bool {
+        self.is_confirmed() && self.missed <= u32::from(config.predict_frames)
+    }
+
+    /// Whether a group of this frame is its own.
+    pub fn is_observed(&self) -> bool {
+        self.missed == 0
+    }
+
     /// Updates it by the group of this frame.
-    fn update(&mut self, config: &SegmentationConfig, found: &Observed) {
+    fn update(&mut self, config: &SegmentationConfig, found: &Observed, t_world_camera: &Transform) {
+        let is_known = self.history != 0;
+        let expected = self.center() + Vector3::from(self.motion_m);
+        let offset_m = t_world_camera.inverse().rotate(expected - found.center);
         self.history = self.history << 1 | 1;
         self.missed = 0;
         if (self.history & RECENT).count_ones() >= u32::from(config.confirm_frames) {
             self.confirmed = 1;
         }
-        self.center_m = found.center.into();
+        // The members are now on one part of it, now on another: its extent is theirs, and for a while that of the frames before.
+        let mut shift_m = Vector3::zeros();
+        for (((half_m, found_m), (offset_m, shift_m)), most_m) in
+            self.half_m.iter_mut().zip(found.half).zip(offset_m.iter().zip(shift_m.iter_mut())).zip(KEPT_MAX_M)
+        {
+            let kept_m = if is_known { KEPT_SHARE * *half_m } else { 0.0 };
+            let free_m = larger(found_m, most_m - found_m);
+            let low_m = if is_known { larger(-free_m, smaller(-found_m, offset_m - kept_m)) } else { -found_m };
+            let high_m = if is_known { smaller(free_m, larger(found_m, offset_m + kept_m)) } else { found_m };
+            (*half_m, *shift_m) = (0.5 * (high_m - low_m), 0.5 * (high_m + low_m));
+        }
+        self.center_m = (found.center + t_world_camera.rotate(shift_m)).into();
         self.motion_m = found.motion.into();
-        self.half_m = found.half;
     }
 
     /// A frame without a group: it moves on.
@@ -158,7 +191,7 @@ impl<'s> Hypotheses<'s> {
             }
             match best {
                 Some((_, index, found)) => {
-                    hypothesis.update(config, &found);
+                    hypothesis.update(config, &found, t_world_camera);
                     used.get_mut(index).into_iter().for_each(|used| *used = true);
                 }
                 None => hypothesis.miss(),
@@ -172,7 +205,7 @@ impl<'s> Hypotheses<'s> {
                 continue;
             };
             *slot = Hypothesis::default();
-            slot.update(config, &observed(group));
+            slot.update(config, &observed(group), t_world_camera);
             self.len += 1;
         }
         refused
@@ -184,7 +217,8 @@ impl<'s> Hypotheses<'s> {
         for index in 0..self.len {
             let Some(hypothesis) = self.table.get(index).copied() else { break };
             let is_recent = hypothesis.history & RECENT != 0;
-            let stays = if hypothesis.is_confirmed() { hypothesis.missed <= u32::from(config.predict_frames) } else { is_recent };
+            let stays =
+                if hypothesis.is_confirmed() { hypothesis.missed <= u32::from(config.predict_frames) + HIDDEN_FRAMES } else { is_recent };
             if let Some(slot) = self.table.get_mut(kept).filter(|_| stays) {
                 *slot = hypothesis;
                 kept += 1;
@@ -199,5 +233,55 @@ impl<'s> Hypotheses<'s> {
             remove_at(self.table.get_mut(..self.len).unwrap_or_default(), index);
             self.len -= 1;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec;
+
+    fn group(x: f64, width_m: f64) -> Group {
+        let half = 0.5 * width_m;
+        let extent = Extent { low: [x - half, 0.0, 10.0], high: [x + half, 1.0, 10.5] };
+        Group {
+            extent,
+            depth_m: 10.0,
+            motion_m: Vector3::zeros(),
+            members: 9,
+            first: 0,
+            depth_sigma_m: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_extent_of_members_on_another_part_of_it_is_kept_for_a_while() {
+        let (mut table, config) = (vec![Hypothesis::default(); 2], SegmentationConfig::default());
+        let mut hypotheses = Hypotheses::new(&mut table);
+        for (x, width_m, [left, right]) in [(0.0, 1.6, [-0.8, 0.8]), (0.5, 0.4, [-0.72, 0.72]), (0.5, 0.4, [-0.648, 0.7])] {
+            hypotheses.update(&config, &[group(x, width_m)], &Transform::IDENTITY);
+            let extent = hypotheses.all()[0].extent(&Transform::IDENTITY);
+            assert!((extent.low[0] - left).abs() < 1e-9 && (extent.high[0] - right).abs() < 1e-9, "{extent:?}");
+        }
+        // It never gets larger than a car by that.
+        hypotheses.update(&config, &[group(-0.9, 1.0)], &Transform::IDENTITY);
+        let extent = hypotheses.all()[0].extent(&Transform::IDENTITY);
+        assert!(extent.high[0] - extent.low[0] <= 1.8 + 1e-9, "{extent:?}");
+    }
+
+    #[test]
+    fn a_hidden_object_is_searched_for_longer_than_its_mask_is_shown() {
+        let (mut table, config) = (vec![Hypothesis::default(); 2], SegmentationConfig::default());
+        let mut hypotheses = Hypotheses::new(&mut table);
+        for _ in 0..2 {
+            hypotheses.update(&config, &[group(0.0, 1.6)], &Transform::IDENTITY);
+        }
+        let mut counts = [0, 0];
+        for _ in 0..20 {
+            hypotheses.update(&config, &[], &Transform::IDENTITY);
+            counts[0] += hypotheses.all().len() as u32;
+            counts[1] += u32::from(hypotheses.all().iter().any(|hypothesis| hypothesis.is_shown(&config)));
+        }
+        assert_eq!(counts, [u32::from(config.predict_frames) + HIDDEN_FRAMES, u32::from(config.predict_frames)]);
     }
 }

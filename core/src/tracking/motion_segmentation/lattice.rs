@@ -1,20 +1,36 @@
 //! The disparity image on a lattice: where a group's mask grows.
 
-use super::{ground::Ground, groups::Extent};
+use super::{
+    ground::Ground,
+    groups::{Extent, larger},
+};
 use crate::{
     geometry::StereoRig,
     image::{DISPARITY_ONE_PX, View},
     masks::PixelBox,
 };
 
+/// Marks of an object's cells: those it grew to, and those between them.
+const GROWN: u8 = 1;
+const FILLED: u8 = 2;
 /// Side of a lattice cell, px.
 pub(super) const CELL_PX: usize = 4;
 /// How far a mask reaches beyond the extent of a group's members, m: to the side, above and below, along the depth.
 const MARGIN_M: [f64; 3] = [0.9, 0.9, 1.6];
+/// Less of it far away, m by metre of depth, and at least: there the disparities of an object reach beyond it.
+const MARGIN_PER_DEPTH: f64 = 0.02;
+const MARGIN_MIN_M: f64 = 0.45;
 /// How long an object is along the depth at least, m: of a car that comes, the members are on its front.
 const LENGTH_M: f64 = 4.5;
+/// An object further to the side than this share of its depth shows its side, and its members may be on either end of it.
+const BESIDE: f64 = 0.25;
 /// Disparities of neighbouring cells of one object differ by less, px: those of the side of a car 2 m beside the camera by 1.1.
-const STEP_PX: f64 = 1.2;
+const STEP_PX: f64 = 0.4;
+/// The same as a share of the disparity.
+const STEP_SHARE: f64 = 0.04;
+/// A match decides on cells whose disparity differs from its own by less, as a share and px.
+const BLOCK_SHARE: f64 = 0.06;
+const BLOCK_PX: f64 = 0.4;
 /// Beyond that, by what depth errs, m for each m^2 of squared depth.
 const DEPTH_MARGIN: f64 = 0.0012;
 /// What is lower above the ground belongs to it, m.
@@ -59,7 +75,11 @@ impl<'a> Lattice<'a> {
 
     /// The point of a cell, in the camera, m.
     fn point(&self, column: usize, row: usize) -> Option<[f64; 3]> {
-        let [u, v] = self.pixel(column, row);
+        self.point_at(self.pixel(column, row))
+    }
+
+    /// The point of a pixel, in the camera, m.
+    fn point_at(&self, [u, v]: [usize; 2]) -> Option<[f64; 3]> {
         let per_px = self.rig.baseline_m / self.disparity_px([u, v])?;
         let [x, y] = [u as f64 - self.rig.center_u_px, v as f64 - self.rig.center_v_px];
         Some([x * per_px, y * per_px, self.rig.focal_px * per_px])
@@ -72,21 +92,28 @@ impl<'a> Lattice<'a> {
     }
 
     /// Marks the cells of an object, from those within its extent on, connected through cells that can be its own, and fills gaps between
-    /// them. The marks are `cells`, row by row of the lattice. Returns the pixels they lie in.
-    pub fn grow(&self, extent: &Extent, ground: Option<&Ground>, cells: &mut [u8], queue: &mut [u32]) -> Option<PixelBox> {
+    /// them. The marks are `cells`, row by row of the lattice; those that `blocked` marks belong to something else. Returns the pixels they
+    /// lie in.
+    pub fn grow(&self, extent: &Extent, ground: Option<&Ground>, blocked: &[u8], cells: &mut [u8], queue: &mut [u32]) -> Option<PixelBox> {
         let reach = widened(extent);
         let bounds = self.bounds(&reach)?;
         let can_be_own = |column: usize, row: usize, within: &Extent| {
+            if blocked.get(row * self.columns + column).is_some_and(|blocked| *blocked > 0) {
+                return false;
+            }
             let point = self.point(column, row).filter(|point| within.contains(&(*point).into()));
             point.is_some_and(|point| ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M))
         };
         let cells = cells.get_mut(..self.columns * self.rows)?;
         cells.fill(0);
+        // Of an object that leaves the image, the members' extent may lie outside already.
+        let is_visible = bounds.cells().any(|(column, row)| can_be_own(column, row, extent));
+        let start = if is_visible { extent } else { &reach };
         let mut queued = 0;
         for (column, row) in bounds.cells() {
-            if can_be_own(column, row, extent) {
+            if can_be_own(column, row, start) {
                 let (cell, slot) = (cells.get_mut(row * self.columns + column)?, queue.get_mut(queued)?);
-                (*cell, *slot) = (1, (row * self.columns + column) as u32);
+                (*cell, *slot) = (GROWN, (row * self.columns + column) as u32);
                 queued += 1;
             }
         }
@@ -96,14 +123,15 @@ impl<'a> Lattice<'a> {
             next += 1;
             let (column, row) = (at % self.columns, at / self.columns);
             let disparity_px = self.disparity_px(self.pixel(column, row))?;
+            let step_px = step_px(disparity_px);
             let is_next = |column: usize, row: usize| {
-                self.disparity_px(self.pixel(column, row)).is_some_and(|other_px| libm::fabs(other_px - disparity_px) < STEP_PX)
+                self.disparity_px(self.pixel(column, row)).is_some_and(|other_px| libm::fabs(other_px - disparity_px) < step_px)
             };
             let around = [(column.wrapping_sub(1), row), (column + 1, row), (column, row.wrapping_sub(1)), (column, row + 1)];
             for (column, row) in around.into_iter().filter(|&(column, row)| bounds.contains(column, row)) {
                 let cell = cells.get_mut(row * self.columns + column)?;
                 if *cell == 0 && is_next(column, row) && can_be_own(column, row, &reach) {
-                    *cell = 1;
+                    *cell = GROWN;
                     *queue.get_mut(queued)? = (row * self.columns + column) as u32;
                     queued += 1;
                 }
@@ -112,6 +140,21 @@ impl<'a> Lattice<'a> {
         (queued > 0).then_some(())?;
         self.close(&bounds, cells);
         self.pixels(&bounds, cells)
+    }
+
+    /// Blocks the cell of a match that does not move, or frees that of one that does, where the disparity is the match's.
+    pub fn block(&self, [u, v, disparity_px]: [f32; 3], moves: bool, blocked: &mut [u8]) {
+        let cell = |px: f32| if px > 0.0 { px as usize / CELL_PX } else { 0 };
+        let (column, row, disparity_px) = (cell(u), cell(v), f64::from(disparity_px));
+        if column >= self.columns || row >= self.rows {
+            return;
+        }
+        let reach_px = larger(BLOCK_SHARE * disparity_px, BLOCK_PX);
+        let is_same = |other_px: f64| libm::fabs(other_px - disparity_px) < reach_px;
+        let slot = blocked.get_mut(row * self.columns + column);
+        if let Some(slot) = slot.filter(|_| self.disparity_px(self.pixel(column, row)).is_some_and(is_same)) {
+            *slot = u8::from(!moves);
+        }
     }
 
     /// The cells in which an extent can be seen.
@@ -137,13 +180,14 @@ impl<'a> Lattice<'a> {
 
     /// Fills cells between two marked ones, left and right or above and below.
     fn close(&self, bounds: &Bounds, cells: &mut [u8]) {
-        let is_marked =
-            |cells: &[u8], column: usize, row: usize| bounds.contains(column, row) && cells.get(row * self.columns + column) == Some(&1);
+        let is_marked = |cells: &[u8], column: usize, row: usize| {
+            bounds.contains(column, row) && cells.get(row * self.columns + column) == Some(&GROWN)
+        };
         for (column, row) in bounds.cells() {
             let is_between = (is_marked(cells, column.wrapping_sub(1), row) && is_marked(cells, column + 1, row))
                 || (is_marked(cells, column, row.wrapping_sub(1)) && is_marked(cells, column, row + 1));
             if let Some(cell) = cells.get_mut(row * self.columns + column).filter(|cell| is_between && **cell == 0) {
-                *cell = 2;
+                *cell = FILLED;
             }
         }
     }
@@ -162,11 +206,34 @@ impl<'a> Lattice<'a> {
         })
     }
 
-    /// Whether the cell of a pixel is marked.
-    pub fn is_marked(&self, cells: &[u8], u: i32, v: i32) -> bool {
-        let cell = usize::try_from(u).ok().zip(usize::try_from(v).ok()).map(|(u, v)| v / CELL_PX * self.columns + u / CELL_PX);
-        cell.and_then(|cell| cells.get(cell)).is_some_and(|cell| *cell > 0)
+    /// Whether a pixel belongs to the marked cells: it lies in one, has the disparity of that or of one beside it, and is above the ground. One
+    /// without a disparity belongs to the cell it lies in.
+    pub fn is_own(&self, ground: Option<&Ground>, cells: &[u8], u: i32, v: i32) -> bool {
+        let Some(at) = usize::try_from(u).ok().zip(usize::try_from(v).ok()).map(|(u, v)| [u, v]) else { return false };
+        let [column, row] = at.map(|px| px / CELL_PX);
+        let mark = |column: usize, row: usize| {
+            let is_within = column < self.columns && row < self.rows;
+            cells.get(row * self.columns + column).copied().filter(|_| is_within).unwrap_or_default()
+        };
+        let own = mark(column, row);
+        // A cell that fills a gap has no disparity of the object's.
+        if own != GROWN {
+            return own == FILLED;
+        }
+        let Some(disparity_px) = self.disparity_px(at) else { return true };
+        let is_like = |column: usize, row: usize| {
+            let like = |cell_px: f64| libm::fabs(cell_px - disparity_px) < step_px(cell_px);
+            mark(column, row) == GROWN && self.disparity_px(self.pixel(column, row)).is_some_and(like)
+        };
+        let near = [(column, row), (column.wrapping_sub(1), row), (column + 1, row), (column, row.wrapping_sub(1)), (column, row + 1)];
+        let is_above = |point: [f64; 3]| ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M);
+        near.into_iter().any(|(column, row)| is_like(column, row)) && self.point_at(at).is_some_and(is_above)
     }
+}
+
+/// How far disparities of neighbouring cells of one object differ at most, px.
+fn step_px(disparity_px: f64) -> f64 {
+    STEP_PX + STEP_SHARE * disparity_px
 }
 
 /// Cells of a rectangle: columns `left .. right`, rows `top .. bottom`.
@@ -192,11 +259,17 @@ impl Bounds {
 fn widened(extent: &Extent) -> Extent {
     let depth_m = extent.center().z;
     let length_m = extent.high[2] - extent.low[2];
+    let is_beside = libm::fabs(extent.center().x) > BESIDE * depth_m;
     let mut reach = *extent;
     for (axis, ((low, high), margin_m)) in reach.low.iter_mut().zip(&mut reach.high).zip(MARGIN_M).enumerate() {
-        let margin_m = margin_m + if axis == 2 { DEPTH_MARGIN * depth_m * depth_m } else { 0.0 };
+        let margin_m = if axis == 2 {
+            margin_m + DEPTH_MARGIN * depth_m * depth_m
+        } else {
+            larger(margin_m - MARGIN_PER_DEPTH * depth_m, MARGIN_MIN_M)
+        };
         let behind_m = if axis == 2 && length_m + margin_m < LENGTH_M { LENGTH_M - length_m } else { margin_m };
-        (*low, *high) = (*low - margin_m, *high + behind_m);
+        let before_m = if is_beside { behind_m } else { margin_m };
+        (*low, *high) = (*low - before_m, *high + behind_m);
     }
     reach
 }

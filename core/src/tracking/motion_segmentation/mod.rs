@@ -4,17 +4,19 @@
 //! moving platform* (IVC 68, 2017), on sparse matches over two stereo pairs in place of dense flow:
 //!
 //! 1. matches whose residual against the camera's motion is too large for its covariance are *candidates* (`residual`);
-//! 2. candidates that lie together and move alike form groups; a group must have enough members and motion, and nearly all matches
+//! 2. so are far matches that contradict it only together with their neighbours (`joint`): what keeps its distance to the camera;
+//! 3. candidates that lie together and move alike form groups; a group must have enough members and motion, and nearly all matches
 //!    within its box must be candidates (`groups`): of wrong matches and of poorly known depth that is not so;
-//! 3. where candidates are few, and where an object of the frame before must be, patches are searched for by projection (`patches`);
-//! 4. a group that agrees with one of the frames before is an object, and is predicted over frames without one (`hypotheses`);
-//! 5. its mask grows from its extent over the disparity image, above the ground (`lattice`, `ground`).
+//! 4. where candidates are few, and where an object of the frames before must be, patches are searched for by projection; a near group whose
+//!    patches are found as well where static points would be is one of a row of posts or the like, and no moving object (`patches`);
+//! 5. a group that agrees with one of the frames before is an object, and is predicted over frames without one (`hypotheses`);
+//! 6. its mask grows from its extent over the disparity image, above the ground, but not over matches that do not move (`lattice`, `ground`).
 //!
 //! Matches assigned to an instance of the detector are left out: an object is not found twice.
 //!
-//! Memory: 44 bytes for each of 1,024 candidates, a byte a match, 5 bytes for each 4 x 4 px of the image, 88 bytes for each of 64
-//! hypotheses, 72 for each of 32 supposed objects. Time: a triangulation and projection a match, a comparison for each pair of candidates,
-//! the cells of each mask, and at most 384 patches a frame.
+//! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 512 far matches, a byte a match, 6 bytes for each 4 x 4 px of the image, 88
+//! bytes for each of 64 hypotheses, 80 for each of 32 supposed objects. Time: a triangulation and projection a match, a comparison for each pair
+//! of candidates and of far matches, the cells of each mask, and at most 384 patches a frame.
 //!
 //! # What can go wrong
 //!
@@ -22,10 +24,12 @@
 //! of sight in the camera's own direction and speed has no residual in the image, but in disparity. A wrong camera motion makes
 //! everything a candidate: groups are then too large, and refused.
 
+mod collect;
 mod config;
 mod ground;
 mod groups;
 mod hypotheses;
+mod joint;
 mod lattice;
 mod patches;
 mod residual;
@@ -35,10 +39,7 @@ mod tests;
 pub use config::SegmentationConfig;
 pub use ground::Ground;
 
-use super::{
-    CameraMotion, Class, FrameMatches, GuidedMatching, Tracker,
-    match_assignment::{MatchOwner, OwnerCode},
-};
+use super::{CameraMotion, Class, FrameMatches, GuidedMatching, Tracker, match_assignment::OwnerCode};
 use crate::{
     geometry::StereoRig,
     image::View,
@@ -47,8 +48,10 @@ use crate::{
     scene_flow::Match,
     state::Visitor,
 };
+use collect::free_matches;
 use groups::{CANDIDATES_MAX, Candidate, GROUPS_MAX, Group};
 use hypotheses::{HYPOTHESES_MAX, Hypotheses, Hypothesis};
+use joint::{FarMatch, JOINT_MAX};
 use lattice::{CELL_PX, Lattice};
 use patches::{PATCHES_MAX, PatchMemory, PatchSearch, SEEDS_MAX, Seed};
 use residual::StaticModel;
@@ -58,6 +61,12 @@ const SCORE: f32 = 0.9;
 
 /// Variance of a sparse match, at whole pixels, against that of a refined one.
 const SPARSE_VARIANCE: f64 = 4.0;
+
+/// What the disparity image says of a frame.
+struct Shape<'a> {
+    lattice: Lattice<'a>,
+    ground: Option<Ground>,
+}
 
 /// What motion segmentation found in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,8 +91,10 @@ pub struct SegmentationReport {
 pub(super) struct MotionSegmenter<'s> {
     candidates: &'s mut [Candidate],
     is_candidate: &'s mut [u8],
+    far: &'s mut [FarMatch],
     values: &'s mut [f32],
     cells: &'s mut [u8],
+    blocked: &'s mut [u8],
     queue: &'s mut [u32],
     seeds: &'s mut [Seed],
     seed_count: usize,
@@ -101,8 +112,9 @@ impl<'s> MotionSegmenter<'s> {
     pub const fn bytes(capacity: &Capacity) -> usize {
         region_bytes::<Candidate>(CANDIDATES_MAX)
             + region_bytes::<u8>(capacity.matches)
+            + region_bytes::<FarMatch>(JOINT_MAX)
             + region_bytes::<f32>(CANDIDATES_MAX)
-            + region_bytes::<u8>(cells(capacity))
+            + 2 * region_bytes::<u8>(cells(capacity))
             + region_bytes::<u32>(cells(capacity))
             + region_bytes::<Seed>(SEEDS_MAX)
             + region_bytes::<Candidate>(PATCHES_MAX)
@@ -114,8 +126,10 @@ impl<'s> MotionSegmenter<'s> {
         Self {
             candidates: carver.alloc("segmentation.candidate", CANDIDATES_MAX),
             is_candidate: carver.alloc("segmentation.is_candidate", capacity.matches),
+            far: carver.alloc("segmentation.far", JOINT_MAX),
             values: carver.alloc("segmentation.value", CANDIDATES_MAX),
             cells: carver.alloc("segmentation.cell", cells(capacity)),
+            blocked: carver.alloc("segmentation.blocked", cells(capacity)),
             queue: carver.alloc("segmentation.queue", cells(capacity)),
             seeds: carver.alloc("segmentation.seed", SEEDS_MAX),
             seed_count: 0,
@@ -129,8 +143,10 @@ impl<'s> MotionSegmenter<'s> {
         let Self {
             candidates: _,
             is_candidate: _,
+            far: _,
             values: _,
             cells: _,
+            blocked: _,
             queue: _,
             seeds: _,
             seed_count: _,
@@ -148,22 +164,25 @@ impl<'s> MotionSegmenter<'s> {
         camera: &CameraMotion,
         matches: &FrameMatches<'_>,
         match_owners: [&[OwnerCode]; 2],
+        shape: &Shape<'_>,
         search: Option<PatchSearch<'_, '_>>,
     ) -> SegmentationReport {
         let mut report = SegmentationReport::default();
         let [match_owner, sparse_owner] = match_owners;
         let len = self.collect(model, matches.refined, match_owner, 1.0, &mut report);
+        let len = self.collect_joint(model, matches.refined, match_owner, shape.ground.as_ref(), len);
+        self.block_static(&shape.lattice, matches.refined, match_owner);
         let Some(candidates) = self.candidates.get_mut(..len) else { return report };
         groups::join(candidates, model.rig.focal_px);
-        let free = matches.refined.iter().zip(match_owner).zip(&*self.is_candidate).filter(|((_, match_owner), _)| is_free(**match_owner));
-        let marked = free.map(|((m, _), mark)| (m, *mark > 0));
+        let marked = free_matches(matches.refined, match_owner, self.is_candidate);
         let mut groups = groups::select(model, candidates, marked, self.values, &mut report.refused);
-        if let Some(search) = search {
+        if let Some(mut search) = search {
+            groups.retain(|group| !search.is_repeated(model, candidates, group));
             self.seed_count = 0;
             self.seed_predicted(camera);
             self.seed_small_groups(model.config, len);
             let len = self.collect(model, matches.sparse, sparse_owner, SPARSE_VARIANCE, &mut SegmentationReport::default());
-            groups::join(self.candidates.get_mut(..len).unwrap_or_default(), model.rig.focal_px);
+            self.add_sparse(model, (matches.sparse, sparse_owner), len, &mut search, &mut groups, &mut report);
             self.seed_small_groups(model.config, len);
             self.verify(model, search, &mut groups, &mut report);
         }
@@ -172,42 +191,25 @@ impl<'s> MotionSegmenter<'s> {
         report
     }
 
-    /// Collects the candidates among matches whose variance is `variance` times that of refined ones; how many they are.
-    fn collect(
+    /// Widens the groups by those among the first `len` candidates, of sparse matches: the sides of a near object are too steep for refined
+    /// ones, whose neighbours must have like disparities.
+    // Never inlined, so that its groups are off the stack when patches are searched for.
+    #[inline(never)]
+    fn add_sparse(
         &mut self,
         model: &StaticModel<'_>,
-        matches: &[Match],
-        match_owner: &[OwnerCode],
-        variance: f64,
+        (matches, match_owner): (&[Match], &[OwnerCode]),
+        len: usize,
+        search: &mut PatchSearch<'_, '_>,
+        groups: &mut heapless::Vec<Group, GROUPS_MAX>,
         report: &mut SegmentationReport,
-    ) -> usize {
-        let (mut len, mut stride, mut count) = (0, 1, 0usize);
-        let (least, far_m) = (variance * f64::from(model.config.candidate_chi_square), f64::from(model.config.far_m));
-        for ((m, match_owner), mark) in matches.iter().zip(match_owner).zip(self.is_candidate.iter_mut()) {
-            *mark = 0;
-            let residual = if is_free(*match_owner) { model.residual(m) } else { None };
-            report.matches += u32::from(is_free(*match_owner));
-            let Some(residual) = residual.filter(|found| found.chi_square > least && found.point_m.z < far_m) else { continue };
-            *mark = 1;
-            count += 1;
-            if !(count - 1).is_multiple_of(stride) {
-                continue;
-            }
-            if len == self.candidates.len() {
-                // Every second one stays.
-                len = thin(self.candidates);
-                stride *= 2;
-                if !(count - 1).is_multiple_of(stride) {
-                    continue;
-                }
-            }
-            if let Some(slot) = self.candidates.get_mut(len) {
-                *slot = Candidate::new(m, &residual, len);
-                len += 1;
-            }
-        }
-        report.candidates = count as u32;
-        len
+    ) {
+        let candidates = self.candidates.get_mut(..len).unwrap_or_default();
+        groups::join(candidates, model.rig.focal_px);
+        let marked = free_matches(matches, match_owner, self.is_candidate);
+        let mut sparse = groups::select(model, candidates, marked, self.values, &mut report.refused);
+        sparse.retain(|group| !search.is_repeated(model, candidates, group));
+        report.refused += groups::add(groups, &sparse, model.config.members_min);
     }
 
     /// Supposes an object; one beyond the bound is not searched for.
@@ -223,7 +225,7 @@ impl<'s> MotionSegmenter<'s> {
         for index in 0..self.hypotheses.all().len() {
             let Some(hypothesis) = self.hypotheses.all().get(index).copied() else { break };
             let (extent, motion_m) = hypothesis.predicted(&camera.t_world_camera);
-            self.seed(Seed::new(&extent, motion_m));
+            self.seed(Seed::new(&extent, motion_m).known(hypothesis.is_confirmed()));
         }
     }
 
@@ -249,40 +251,28 @@ impl<'s> MotionSegmenter<'s> {
         groups: &mut heapless::Vec<Group, GROUPS_MAX>,
         report: &mut SegmentationReport,
     ) {
-        let Self { seeds, seed_count, cells, queue, patches, values, .. } = self;
+        let Self { seeds, seed_count, cells, blocked, queue, patches, values, .. } = self;
         let mut memory = PatchMemory { cells, queue, members: patches, values };
         for seed in seeds.iter().take(*seed_count) {
             if groups.iter().any(|group| seed.is_at(group)) {
                 continue;
             }
             if let Some(group) = search.verify(model, seed, &mut memory) {
+                search.unblock(memory.members.get(..group.members as usize).unwrap_or_default(), blocked);
                 report.refused += u32::from(groups.push(group).is_err());
             }
         }
     }
 
     /// Grows the mask of the confirmed hypothesis at that position; the pixels it lies in.
-    fn grow(&mut self, index: usize, lattice: &Lattice<'_>, ground: Option<&Ground>, camera: &CameraMotion) -> Option<PixelBox> {
-        let hypothesis = self.hypotheses.all().get(index).filter(|hypothesis| hypothesis.is_confirmed())?;
-        lattice.grow(&hypothesis.extent(&camera.t_world_camera), ground, self.cells, self.queue)
+    fn grow(&mut self, config: &SegmentationConfig, index: usize, shape: &Shape<'_>, camera: &CameraMotion) -> Option<PixelBox> {
+        let hypothesis = self.hypotheses.all().get(index).filter(|hypothesis| hypothesis.is_shown(config))?;
+        let extent = hypothesis.extent(&camera.t_world_camera);
+        // Of what was not found again, far matches say nothing.
+        let is_decided = hypothesis.is_observed() || extent.center().z < joint::FROM_M;
+        let blocked = if is_decided { &*self.blocked } else { &[] };
+        shape.lattice.grow(&extent, shape.ground.as_ref(), blocked, self.cells, self.queue)
     }
-}
-
-/// Whether a match belongs to no instance.
-fn is_free(match_owner: OwnerCode) -> bool {
-    match_owner.get() == MatchOwner::None
-}
-
-/// Keeps every second candidate; how many those are.
-fn thin(candidates: &mut [Candidate]) -> usize {
-    let len = candidates.len().div_ceil(2);
-    for index in 0..len {
-        let kept = candidates.get(2 * index).copied();
-        if let Some((slot, kept)) = candidates.get_mut(index).zip(kept) {
-            *slot = kept.at(index);
-        }
-    }
-    len
 }
 
 impl Tracker<'_> {
@@ -301,15 +291,15 @@ impl Tracker<'_> {
         let bias_px = [config.motion.bias_px, config.motion.lens_px].map(f64::from);
         let model = StaticModel::new(&config.segmentation, rig, &t_current_previous, bias_px);
         let lattice = Lattice::new(rig, disparity_q8);
-        let ground = Ground::find(&lattice);
-        let search = search.map(|search| PatchSearch::new(search, &t_current_previous, &lattice, ground.as_ref()));
+        let shape = Shape { ground: Ground::find(&lattice), lattice };
+        let search = search.map(|search| PatchSearch::new(search, &t_current_previous, &shape));
         let match_owners = [&*self.refined_owner, &*self.sparse_owner];
-        let mut report = self.segmenter.observe(&model, camera, matches, match_owners, search);
+        let mut report = self.segmenter.observe(&model, camera, matches, match_owners, &shape, search);
         let first = self.instances.all().len();
         let mut index = 0;
         while index < self.segmenter.hypotheses.all().len() {
-            let grown = self.segmenter.grow(index, &lattice, ground.as_ref(), camera);
-            let added = grown.map(|pixels| self.add_moving_object(&lattice, pixels));
+            let grown = self.segmenter.grow(&config.segmentation, index, &shape, camera);
+            let added = grown.map(|pixels| self.add_moving_object(&shape, pixels));
             match added {
                 Some(Added::Covered) => {
                     // A detector's instance has taken over.
@@ -331,11 +321,11 @@ impl Tracker<'_> {
     }
 
     /// Adds the marked cells as an instance.
-    fn add_moving_object(&mut self, lattice: &Lattice<'_>, pixels: PixelBox) -> Added {
+    fn add_moving_object(&mut self, shape: &Shape<'_>, pixels: PixelBox) -> Added {
         let masks = self.masks.current_mut();
         let Some(mask) = masks.alloc(pixels) else { return Added::Full };
         let cells = &*self.segmenter.cells;
-        masks.fill(&mask, |u, v| lattice.is_marked(cells, u, v));
+        masks.fill(&mask, |u, v| shape.lattice.is_own(shape.ground.as_ref(), cells, u, v));
         let whole = masks.area(&mask);
         self.instances.all().iter().for_each(|instance| masks.subtract(&mask, &instance.mask));
         if 3 * masks.area(&mask) <= 2 * whole {

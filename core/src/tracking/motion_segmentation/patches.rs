@@ -8,11 +8,10 @@
 //! Time: at most [`SEARCHES_MAX`] patches a frame, each searched for once or twice.
 
 use super::{
-    SegmentationConfig,
-    ground::Ground,
+    SegmentationConfig, Shape,
     groups::{Candidate, Extent, Group, measure, motion_tolerance_m},
-    lattice::Lattice,
-    residual::StaticModel,
+    joint::FROM_M,
+    residual::{Residual, StaticModel},
 };
 use crate::{
     geometry::Transform,
@@ -32,6 +31,11 @@ const REACH_M: f64 = 0.3;
 /// The same along the depth, m for each m^2 of squared depth.
 const REACH_PER_SQUARED_DEPTH: f64 = 0.001;
 
+/// Least share of moving patches on an object that was found before.
+const KNOWN_SHARE_MIN: f64 = 0.7;
+/// What a motion to the side errs by, one sigma, by metre of depth.
+const SIDE_PER_DEPTH: f64 = 0.002;
+
 /// An object that is supposed to be there: its extent in the current camera, and its motion against the static prediction.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -39,11 +43,18 @@ pub(in crate::tracking) struct Seed {
     low_m: [f64; 3],
     high_m: [f64; 3],
     motion_m: [f64; 3],
+    /// Whether it was an object before: 0 or 1.
+    known: u64,
 }
 
 impl Seed {
     pub fn new(extent: &Extent, motion_m: Vector3<f64>) -> Self {
-        Self { low_m: extent.low, high_m: extent.high, motion_m: motion_m.into() }
+        Self { low_m: extent.low, high_m: extent.high, motion_m: motion_m.into(), known: 0 }
+    }
+
+    /// The same of an object that was found before.
+    pub fn known(self, known: bool) -> Self {
+        Self { known: u64::from(known), ..self }
     }
 
     /// Its extent and a little more.
@@ -63,6 +74,13 @@ impl Seed {
     }
 }
 
+/// The square of a motion, by what it errs by along the depth and to the side.
+fn scaled(motion_m: &Vector3<f64>, residual: &Residual) -> f64 {
+    let side = residual.point_m.z * SIDE_PER_DEPTH;
+    let along = motion_m.z / residual.depth_sigma_m;
+    (motion_m.x * motion_m.x + motion_m.y * motion_m.y) / (side * side) + along * along
+}
+
 /// What a patch shows.
 enum Patch {
     Moving(Candidate),
@@ -73,8 +91,7 @@ enum Patch {
 pub(super) struct PatchSearch<'a, 's> {
     images: GuidedMatching<'a, 's>,
     t_previous_current: Transform,
-    lattice: &'a Lattice<'a>,
-    ground: Option<&'a Ground>,
+    shape: &'a Shape<'a>,
     /// Patches left for this frame.
     left: usize,
 }
@@ -88,17 +105,11 @@ pub(super) struct PatchMemory<'m> {
 }
 
 impl<'a, 's> PatchSearch<'a, 's> {
-    pub fn new(
-        images: GuidedMatching<'a, 's>,
-        t_current_previous: &Transform,
-        lattice: &'a Lattice<'a>,
-        ground: Option<&'a Ground>,
-    ) -> Self {
+    pub fn new(images: GuidedMatching<'a, 's>, t_current_previous: &Transform, shape: &'a Shape<'a>) -> Self {
         Self {
             images,
             t_previous_current: t_current_previous.inverse(),
-            lattice,
-            ground,
+            shape,
             left: SEARCHES_MAX,
         }
     }
@@ -106,13 +117,13 @@ impl<'a, 's> PatchSearch<'a, 's> {
     /// The group of a supposed object's patches, if it passes the gates.
     pub fn verify(&mut self, model: &StaticModel<'_>, seed: &Seed, memory: &mut PatchMemory<'_>) -> Option<Group> {
         let PatchMemory { cells, queue, members, values } = memory;
-        let pixels = self.lattice.grow(&seed.extent(), self.ground, cells, queue)?;
-        let every = self.lattice.marked(cells, &pixels).count().div_ceil(PATCHES_MAX);
+        let pixels = self.shape.lattice.grow(&seed.extent(), self.shape.ground.as_ref(), &[], cells, queue)?;
+        let every = self.shape.lattice.marked(cells, &pixels).count().div_ceil(PATCHES_MAX);
         let (mut moving, mut still) = (0usize, 0usize);
-        let marked = self.lattice.marked(cells, &pixels).enumerate().filter(|(index, _)| index.is_multiple_of(every));
+        let marked = self.shape.lattice.marked(cells, &pixels).enumerate().filter(|(index, _)| index.is_multiple_of(every));
         for (_, at) in marked {
             self.left = self.left.checked_sub(1)?;
-            match self.search_patch(model, at, &seed.motion_m.into()) {
+            match self.search_patch(model, at, seed) {
                 Some(Patch::Moving(candidate)) => {
                     *members.get_mut(moving)? = candidate;
                     moving += 1;
@@ -121,35 +132,73 @@ impl<'a, 's> PatchSearch<'a, 's> {
                 None => {}
             }
         }
-        let share = f64::from(model.config.candidate_share_min);
+        let share = if seed.known > 0 { KNOWN_SHARE_MIN } else { f64::from(model.config.candidate_share_min) };
         let is_moving = moving as f64 >= share * (moving + still) as f64;
         let group = measure(members.get(..moving)?, 0, values).filter(|_| is_moving)?;
         group.passes(model.config).then_some(group)
     }
 
+    /// Frees the cells around the patches of an object.
+    pub fn unblock(&self, members: &[Candidate], blocked: &mut [u8]) {
+        members.iter().for_each(|member| self.shape.lattice.block(member.position(), true, blocked));
+    }
+
     /// Searches for the patch at a pixel.
-    fn search_patch(&self, model: &StaticModel<'_>, at: [usize; 2], motion_m: &Vector3<f64>) -> Option<Patch> {
+    fn search_patch(&self, model: &StaticModel<'_>, at: [usize; 2], seed: &Seed) -> Option<Patch> {
         let config: &SegmentationConfig = model.config;
-        let disparity_px = self.lattice.disparity_px(at)?;
+        let disparity_px = self.shape.lattice.disparity_px(at)?;
         let pixel = at.map(|at| at as i32);
         let found = |t_previous_current: &Transform| {
             let m = self.images.matcher.find(&expected(model.rig, pixel, disparity_px, t_previous_current)?)?;
             Some((m, model.residual(&m)?))
         };
         let is_static = |chi_square: f64| chi_square <= f64::from(config.candidate_chi_square);
+        let motion_m = Vector3::from(seed.motion_m);
         let back = Transform::from_translation((-motion_m).into());
         if let Some((m, residual)) = found(&(self.t_previous_current * back)) {
             let side_m = motion_tolerance_m(residual.point_m.z);
             let off = residual.motion_m - motion_m;
             let is_as_supposed =
                 libm::fabs(off.x) < side_m && libm::fabs(off.y) < side_m && libm::fabs(off.z) < side_m + 2.0 * residual.depth_sigma_m;
-            if is_static(residual.chi_square) {
+            // Of what is known to move, the nearer of both motions decides.
+            let is_static = if seed.known > 0 {
+                scaled(&residual.motion_m, &residual) < scaled(&off, &residual)
+            } else {
+                is_static(residual.chi_square)
+            };
+            if is_static {
                 return Some(Patch::Static);
             }
-            if is_as_supposed {
+            // In a row of posts the next one is found as well as the post itself.
+            let is_unsure = seed.known == 0 && residual.point_m.z < FROM_M && self.is_static_at(model, pixel, disparity_px);
+            if is_as_supposed && !is_unsure {
                 return Some(Patch::Moving(Candidate::new(&m, &residual, 0)));
             }
         }
-        found(&self.t_previous_current).filter(|(_, residual)| is_static(residual.chi_square)).map(|_| Patch::Static)
+        self.is_static_at(model, pixel, disparity_px).then_some(Patch::Static)
+    }
+
+    /// Whether a patch is found where a static point would be.
+    fn is_static_at(&self, model: &StaticModel<'_>, pixel: [i32; 2], disparity_px: f64) -> bool {
+        let expected = expected(model.rig, pixel, disparity_px, &self.t_previous_current);
+        let found = expected.and_then(|expected| self.images.matcher.find(&expected)).and_then(|m| model.residual(&m));
+        found.is_some_and(|residual| residual.chi_square <= f64::from(model.config.candidate_chi_square))
+    }
+
+    /// Whether a near group is one of a row of posts or the like, each taken for the next: more than a third of its members are found where static
+    /// points would be.
+    pub fn is_repeated(&mut self, model: &StaticModel<'_>, candidates: &[Candidate], group: &Group) -> bool {
+        if group.depth_m >= FROM_M {
+            return false;
+        }
+        let (mut still, mut searched) = (0u32, 0u32);
+        for member in candidates.iter().filter(|member| member.is_of(group.first)).take(PATCHES_MAX) {
+            let Some(left) = self.left.checked_sub(1) else { break };
+            self.left = left;
+            let [u, v, disparity_px] = member.position();
+            searched += 1;
+            still += u32::from(self.is_static_at(model, [u, v].map(|at| libm::roundf(at) as i32), f64::from(disparity_px)));
+        }
+        3 * still > searched
     }
 }

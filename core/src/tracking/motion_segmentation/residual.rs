@@ -38,6 +38,8 @@ pub(super) struct StaticModel<'a> {
 pub(super) struct Residual {
     /// Squared Mahalanobis distance from the static prediction; an upper bound of it where the bound suffices.
     pub chi_square: f64,
+    /// How far it is from the prediction: u, v and disparity, px.
+    pub residual_px: Vector3<f64>,
     /// Where the point is, in the current camera, m.
     pub point_m: Vector3<f64>,
     /// How it moved against the static prediction, m.
@@ -82,11 +84,7 @@ impl<'a> StaticModel<'a> {
         let before = self.centered(m.previous_left, m.previous_right)?;
         let now = self.centered(m.current_left, m.current_right)?;
         let previous = self.point(&before);
-        let predicted = self.rotation * previous + self.translation;
-        let is_visible = predicted.z > DEPTH_MIN_M;
-        if !is_visible {
-            return None;
-        }
+        let predicted = self.predicted(&previous)?;
         let per_m = self.rig.focal_px / predicted.z;
         let projected = Vector3::new(predicted.x * per_m, predicted.y * per_m, self.rig.baseline_m * per_m);
         let r = now - projected;
@@ -94,17 +92,40 @@ impl<'a> StaticModel<'a> {
         // The other terms only add to the covariance: what lies within these bounds needs no more.
         let bound = r.component_div(&self.noise).dot(&r);
         let (chi_square, depth_variance) = if bound > f64::from(self.config.candidate_chi_square) {
-            let covariance = self.covariance(&before, &previous, &predicted);
+            let [own, shared] = self.covariance(&before, &previous, &predicted);
+            let covariance = own + shared;
             let solved = Cholesky::new(covariance).map(|factor| factor.solve(&r))?;
             (r.dot(&solved), covariance.m33)
         } else {
             (bound, self.noise.z)
         };
         let depth_sigma_m = libm::sqrt(depth_variance) * point_m.z / now.z;
-        Some(Residual { chi_square, point_m, motion_m: point_m - predicted, depth_sigma_m })
+        Some(Residual {
+            chi_square,
+            residual_px: r,
+            point_m,
+            motion_m: point_m - predicted,
+            depth_sigma_m,
+        })
     }
 
-    fn covariance(&self, before: &Vector3<f64>, previous: &Vector3<f64>, predicted: &Vector3<f64>) -> Matrix3<f64> {
+    /// The residual of a match, and the part of its covariance that it shares with the matches beside it: what the camera's motion and both
+    /// disparities err by.
+    pub fn residual_and_shared(&self, m: &Match) -> Option<(Residual, Matrix3<f64>)> {
+        let before = self.centered(m.previous_left, m.previous_right)?;
+        let previous = self.point(&before);
+        let [_, shared] = self.covariance(&before, &previous, &self.predicted(&previous)?);
+        Some((self.residual(m)?, shared))
+    }
+
+    /// Where a point of the frame before is now, if it is in front of the camera.
+    fn predicted(&self, previous: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let predicted = self.rotation * previous + self.translation;
+        (predicted.z > DEPTH_MIN_M).then_some(predicted)
+    }
+
+    /// The covariance of a residual: the match's own part, and the part shared with the matches beside it.
+    fn covariance(&self, before: &Vector3<f64>, previous: &Vector3<f64>, predicted: &Vector3<f64>) -> [Matrix3<f64>; 2] {
         let (focal, per_px) = (self.rig.focal_px, self.rig.baseline_m / before.z);
         let by_match =
             Matrix3::new(per_px, 0.0, -previous.x / before.z, 0.0, per_px, -previous.y / before.z, 0.0, 0.0, -previous.z / before.z);
@@ -128,6 +149,7 @@ impl<'a> StaticModel<'a> {
         let side = before.x / self.rig.center_u_px;
         let [offset_px, lens_px] = self.bias_px;
         let bias = (jacobian.column(2) - Vector3::z()) * (offset_px + lens_px * side * side * side * side);
-        noise + jacobian * noise * jacobian.transpose() + by_point * camera * by_point.transpose() + bias * bias.transpose()
+        let own = noise + jacobian * noise * jacobian.transpose();
+        [own, by_point * camera * by_point.transpose() + bias * bias.transpose()]
     }
 }
