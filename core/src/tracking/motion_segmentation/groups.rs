@@ -224,15 +224,16 @@ fn root(earlier: &[Candidate], rest: &[Candidate], mut at: u32) -> u32 {
     }
 }
 
-/// The groups that pass the gates; those on one object are merged. `refused` counts groups beyond [`GROUPS_MAX`].
+/// Sets `groups` to those that pass the gates; those on one object are merged. `refused` counts groups beyond [`GROUPS_MAX`].
 pub(super) fn select<'m>(
     model: &StaticModel<'_>,
     candidates: &[Candidate],
     matches: impl Iterator<Item = (&'m Match, bool)> + Clone,
     values: &mut [f32],
+    groups: &mut Vec<Group, GROUPS_MAX>,
     refused: &mut u32,
-) -> Vec<Group, GROUPS_MAX> {
-    let mut groups = Vec::<Group, GROUPS_MAX>::new();
+) {
+    groups.clear();
     for (first, candidate) in (0u32..).zip(candidates) {
         if candidate.parent != first {
             continue;
@@ -257,7 +258,7 @@ pub(super) fn select<'m>(
         index += 1;
         f64::from(own) >= share * f64::from(all)
     });
-    merge(groups)
+    merge(groups);
 }
 
 /// The candidates of one group, and memory for one number of each.
@@ -321,22 +322,27 @@ pub(super) fn measure(candidates: &[Candidate], first: u32, values: &mut [f32]) 
 }
 
 /// Merges groups of one motion that lie close together: a near car has several.
-fn merge(groups: Vec<Group, GROUPS_MAX>) -> Vec<Group, GROUPS_MAX> {
-    let mut merged = Vec::<Group, GROUPS_MAX>::new();
-    // The largest first, by a key that no two groups share.
+fn merge(groups: &mut Vec<Group, GROUPS_MAX>) {
+    // The largest first, by a key that no two groups share; in place, for the stack.
     let key = |group: &Group| (u32::MAX - group.members, group.first);
-    let mut last = None;
-    while let Some(group) = groups.iter().filter(|group| last.is_none_or(|last| key(group) > last)).min_by_key(|group| key(group)) {
-        last = Some(key(group));
-        if let Some(other) = merged.iter_mut().find(|other| other.is_same(group)) {
-            other.extent = other.extent.union(&group.extent);
-            other.members += group.members;
-        } else {
-            let pushed = merged.push(*group).is_ok();
-            debug_assert!(pushed, "merging does not add groups");
+    for at in 0..groups.len() {
+        let next = groups.iter().enumerate().skip(at).min_by_key(|(_, group)| key(group)).map(|(index, _)| index);
+        if let Some(Ok([slot, next])) = next.map(|next| groups.get_disjoint_mut([at, next])) {
+            core::mem::swap(slot, next);
         }
     }
-    merged
+    let mut merged = 0;
+    for at in 0..groups.len() {
+        let Some(group) = groups.get(at).copied() else { break };
+        if let Some(other) = groups.iter_mut().take(merged).find(|other| other.is_same(&group)) {
+            other.extent = other.extent.union(&group.extent);
+            other.members += group.members;
+        } else if let Some(slot) = groups.get_mut(merged) {
+            *slot = group;
+            merged += 1;
+        }
+    }
+    groups.truncate(merged);
 }
 
 /// Adds the groups of sparse matches: each widens the one on the same object, or is a new one where none lies, if it has `members_min`

@@ -175,7 +175,8 @@ impl<'s> MotionSegmenter<'s> {
         let Some(candidates) = self.candidates.get_mut(..len) else { return report };
         groups::join(candidates, model.rig.focal_px);
         let marked = free_matches(matches.refined, match_owner, self.is_candidate);
-        let mut groups = groups::select(model, candidates, marked, self.values, &mut report.refused);
+        let mut groups = heapless::Vec::<Group, GROUPS_MAX>::new();
+        groups::select(model, candidates, marked, self.values, &mut groups, &mut report.refused);
         if let Some(mut search) = search {
             groups.retain(|group| !search.is_repeated(model, candidates, group));
             self.seed_count = 0;
@@ -207,7 +208,8 @@ impl<'s> MotionSegmenter<'s> {
         let candidates = self.candidates.get_mut(..len).unwrap_or_default();
         groups::join(candidates, model.rig.focal_px);
         let marked = free_matches(matches, match_owner, self.is_candidate);
-        let mut sparse = groups::select(model, candidates, marked, self.values, &mut report.refused);
+        let mut sparse = heapless::Vec::<Group, GROUPS_MAX>::new();
+        groups::select(model, candidates, marked, self.values, &mut sparse, &mut report.refused);
         sparse.retain(|group| !search.is_repeated(model, candidates, group));
         report.refused += groups::add(groups, &sparse, model.config.members_min);
     }
