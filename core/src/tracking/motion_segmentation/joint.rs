@@ -16,7 +16,7 @@ use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Vector3};
 
 /// Most far matches of a frame.
-pub(super) const JOINT_MAX: usize = 512;
+pub(super) const JOINT_MAX: usize = 1024;
 /// Depth from which on matches are tested together, m.
 pub(super) const FROM_M: f64 = 10.0;
 /// Distance in the image at which two matches are neighbours, m, and at least, px.

@@ -14,7 +14,7 @@
 //!
 //! Matches assigned to an instance of the detector are left out: an object is not found twice.
 //!
-//! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 512 far matches, a byte a match, 6 bytes for each 4 x 4 px of the image, 88
+//! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 1,024 far matches, a byte a match, 6 bytes for each 4 x 4 px of the image, 88
 //! bytes for each of 64 hypotheses, 80 for each of 32 supposed objects. Time: a triangulation and projection a match, a comparison for each pair
 //! of candidates and of far matches, the cells of each mask, and at most 384 patches a frame.
 //!
