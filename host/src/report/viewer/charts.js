@@ -21,6 +21,10 @@ class Charts {
   }
 
   draw(at, colours) {
+    // Turning the map changes nothing here.
+    const shown = [at, this.charts[0]?.canvas.clientWidth, window.devicePixelRatio, colours.line].join();
+    if (shown === this.shown) return;
+    this.shown = shown;
     for (const { name, unit, values, canvas, caption, highest } of this.charts) {
       const ratio = Math.min(window.devicePixelRatio || 1, 2), width = Math.max(canvas.clientWidth, 1), height = CHART_HEIGHT_PX;
       Object.assign(canvas, { width: width * ratio, height: height * ratio });
