@@ -39,7 +39,7 @@ impl Folder {
 
     fn file(&self, name: &str, content: &[u8]) -> PathBuf {
         let path = self.0.join(name);
-        fs::write(&path, content).expect("room for temporary files");
+        fs::write(&path, content).expect("the temporary folder can be written to");
         path
     }
 }
@@ -105,7 +105,7 @@ pub fn recording(bytes: &[u8]) -> bool {
     for (file, content) in whole.into_iter().chain([(name, content)]) {
         let path = folder.0.join("training").join(file);
         fs::create_dir_all(path.parent().unwrap_or(&folder.0)).expect("a folder");
-        fs::write(path, content).expect("room for temporary files");
+        fs::write(path, content).expect("the temporary folder can be written to");
     }
     open(&folder.0, &OpenOptions::default()).is_ok_and(|source| source.frame(0).is_ok() && source.lidar(0).is_ok())
 }
@@ -150,7 +150,7 @@ pub fn masks(bytes: &[u8]) -> bool {
     folder.file("calib.txt", super::seeds::RIG);
     let path = folder.0.join(name);
     fs::create_dir_all(path.parent().unwrap_or(Path::new(""))).expect("a folder");
-    fs::write(&path, content).expect("room for temporary files");
+    fs::write(&path, content).expect("the temporary folder can be written to");
     let source = open(&folder.0, &OpenOptions::default()).expect("the images are sound");
     let from = if name.contains('/') { path.parent().unwrap_or(&path) } else { &path };
     let Ok(choice) = format!("{choice}{}", from.display()).parse::<MaskChoice>() else { return false };

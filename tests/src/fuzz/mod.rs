@@ -4,8 +4,8 @@
 //! The same targets run three ways: as seeded tests (`cargo test --test fuzz`, a fixed number of mutations of valid inputs), for a given time
 //! (`DYNVOX_FUZZ_SECONDS=1800 cargo test --release --test fuzz`), and under cargo-fuzz with coverage (`tests/fuzz`).
 
-mod drive;
 mod files;
+mod mapper;
 mod mutate;
 mod seeds;
 
@@ -33,15 +33,15 @@ pub const TARGETS: [Target; 12] = [
     Target { name: "masks", seeds: seeds::masks, run: files::masks },
     Target { name: "store", seeds: seeds::store, run: files::store },
     Target { name: "stream", seeds: seeds::stream, run: files::stream },
-    Target { name: "clip", seeds: seeds::clip, run: drive::clip },
-    Target { name: "snapshot", seeds: drive::snapshots, run: drive::snapshot },
-    Target { name: "settings", seeds: seeds::settings, run: drive::settings },
+    Target { name: "clip", seeds: seeds::clip, run: mapper::clip },
+    Target { name: "snapshot", seeds: mapper::snapshots, run: mapper::snapshot },
+    Target { name: "settings", seeds: seeds::settings, run: mapper::settings },
 ];
 
 /// Hands bytes to the target of a name.
 ///
 /// # Panics
-/// There is none, or it has a fault.
+/// No target has that name, or it has a fault.
 pub fn run(name: &str, bytes: &[u8]) {
     let target = TARGETS.iter().find(|target| target.name == name).expect("the target is listed");
     (target.run)(bytes);

@@ -78,7 +78,7 @@ pub fn recording() -> Vec<Vec<u8>> {
 pub fn pictures() -> Vec<Vec<u8>> {
     let png = written("deep.png", |path| {
         let pixels = Image::new(2, 2, vec![1, 256, 40_000, 65_535]).expect("four pixels");
-        write_png_deep(path, &pixels).expect("room for temporary files");
+        write_png_deep(path, &pixels).expect("the temporary folder can be written to");
     });
     let ppm: &[u8] = b"P6\n2 1\n255\nabcdef";
     chosen(&[(0, &png), (1, &pgm([3, 2])), (1, ppm), (1, b"P2\n2 1\n255\n1 2\n")])
@@ -105,7 +105,7 @@ pub fn masks() -> Vec<Vec<u8>> {
 pub fn store() -> Vec<Vec<u8>> {
     let store = |blocks: i16| {
         written("map.blocks", |path| {
-            let (mut file, _) = BlockFile::open(path, VOXEL_M, TRUNCATION_M).expect("room for temporary files");
+            let (mut file, _) = BlockFile::open(path, VOXEL_M, TRUNCATION_M).expect("the temporary folder can be written to");
             for x in 0..blocks {
                 let block = EvictedBlock {
                     coord: BlockCoord { x, y: 0, z: 9 },
