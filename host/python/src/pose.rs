@@ -8,8 +8,11 @@ use pyo3::types::PyDict;
 
 /// A pose as a matrix of 4 x 4 or 3 x 4, or as reports have it: a dictionary with `rotation` (quaternion, x y z w) and `translation_m`.
 pub fn given(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Transform> {
-    let refused =
-        || refuse(format!("{name} cannot be read as a pose. Pass a matrix of 4 x 4 or 3 x 4 numbers, or a dictionary with rotation and translation_m"));
+    let refused = || {
+        refuse(format!(
+            "{name} cannot be read as a pose. Pass a matrix of 4 x 4 or 3 x 4 numbers, or a dictionary with rotation and translation_m"
+        ))
+    };
     if let Ok(parts) = value.cast::<PyDict>() {
         let part = |key: &str| parts.get_item(key)?.ok_or_else(refused);
         let rotation = part("rotation")?.extract().map_err(|_| refused())?;
