@@ -8,6 +8,7 @@ use dynvox_core::geometry::StereoRig;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::{Class, Ground};
+use std::collections::BTreeMap;
 
 /// Boxes of fewer pixels are shrunk only.
 const SMALL_PX: i64 = 1_500;
@@ -23,6 +24,8 @@ const DEPTH_ERROR: f64 = 0.0012;
 const STEP_PX: f64 = 1.2;
 /// Gaps up to this share of a box's width are filled.
 const GAP: f64 = 0.1;
+/// The left image's first columns, as many as the disparity and these, are beyond the right image's edge or too close to it to match, px.
+const UNMATCHED_EDGE_PX: f64 = 6.0;
 /// Least share of a box that a mask fills: less is another object's, and the box is shrunk only.
 const FILLED_MIN: f64 = 0.25;
 
@@ -100,8 +103,26 @@ impl<'a> Scene<'a> {
         };
         let components = Marks::new(*pixels, is_own).components(|a, b| self.is_next(a, b));
         // Of equals the first.
-        let largest = components.iter().rev().max_by_key(|component| component.len())?;
-        self.filled(one.class, one.score, largest, |_, _| true)
+        let largest = components.into_iter().rev().max_by_key(Vec::len)?;
+        let to_edge = self.with_unmatched_edge(largest, pixels.left);
+        self.filled(one.class, one.score, &to_edge, |_, _| true)
+    }
+
+    /// A component with what is left of it up to a box's left edge, in rows where the right camera cannot see that: it has no disparity.
+    fn with_unmatched_edge(&self, component: Vec<(i32, i32)>, left: i32) -> Vec<(i32, i32)> {
+        let mut first_of_rows = BTreeMap::new();
+        for &(u, v) in &component {
+            let first = first_of_rows.entry(v).or_insert(u);
+            *first = u.min(*first);
+        }
+        let mut whole = component;
+        for (v, first) in first_of_rows {
+            let edge = self.disparity_px(first, v).unwrap_or_default() + UNMATCHED_EDGE_PX;
+            if f64::from(first) <= edge && (left..first).all(|u| self.disparity_px(u, v).is_none()) {
+                whole.extend((left..first).map(|u| (u, v)));
+            }
+        }
+        whole
     }
 
     /// Whether neighbours can be on one surface.
@@ -202,6 +223,32 @@ mod tests {
         let found = mask(Class::Car, [60.0, 22.0, 140.0, 90.0]).unwrap();
         assert_eq!(found.pixels, PixelBox { left: 70, top: 30, width: 60, height: 50 });
         assert_eq!(filled(&found), 3_000, "the pane is filled");
+    }
+
+    #[test]
+    fn a_car_at_the_left_edge_has_its_columns_that_the_right_camera_does_not_see() {
+        // Disparity 24 px: the first 26 columns have none. Of a car inside the image, what is left of it has none either: it hides that.
+        let car = |first: usize| {
+            let disparity: Vec<u16> = (0..200 * 100)
+                .map(|at| (at % 200, at / 200))
+                .map(|(u, v)| {
+                    if u < first || !(30..80).contains(&v) {
+                        0
+                    } else if u < 90 {
+                        24 * 256
+                    } else {
+                        6 * 256
+                    }
+                })
+                .collect();
+            let edges = [first as f64 - 20.0, 30.0, 90.0, 80.0];
+            Scene::new(&RIG, View::new(&disparity, 200, 100).unwrap(), None)
+                .mask(&DetectedBox { class: Class::Car, score: 0.5, edges })
+                .unwrap()
+                .pixels
+        };
+        assert_eq!((car(26).left, car(26).width), (6, 84));
+        assert_eq!((car(40).left, car(40).width), (40, 50));
     }
 
     #[test]
