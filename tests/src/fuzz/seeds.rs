@@ -99,7 +99,7 @@ pub fn masks() -> Vec<Vec<u8>> {
 \"bbox\": [9, 8, 3, 20], \"score\": 0.5}]}";
     let yolo: &[u8] = b"2 0.2 0.3 0.7 0.3 0.7 0.8 0.2 0.8\n2 0.5 0.5 0.4 0.4\n";
     let mot: &[u8] = b"1,1,10,10,20,14,0.9,-1,-1,-1\n";
-    chosen(&[(1, coco), (2, yolo), (3, LABEL), (3, mot), (5, yolo)])
+    chosen(&[(1, coco), (2, yolo), (3, LABEL), (3, mot), (5, b"# id class score x1 y1 x2 y2\n1 car 0.9 10 10 30 24\n")])
 }
 
 pub fn store() -> Vec<Vec<u8>> {
