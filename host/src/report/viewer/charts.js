@@ -26,9 +26,16 @@ class Charts {
     if (shown === this.shown) return;
     this.shown = shown;
     for (const { name, unit, values, canvas, caption, highest } of this.charts) {
+      const value = values[at];
+      caption.textContent = `${name}: ${value === undefined ? "-" : value.toLocaleString("en")}${unit ? ` ${unit}` : ""}`;
       const ratio = Math.min(window.devicePixelRatio || 1, 2), width = Math.max(canvas.clientWidth, 1), height = CHART_HEIGHT_PX;
       Object.assign(canvas, { width: width * ratio, height: height * ratio });
       const context = canvas.getContext("2d");
+      if (!context) {
+        // A browser whose drawing process starts anew has none: the next draw tries again.
+        this.shown = undefined;
+        continue;
+      }
       context.scale(ratio, ratio);
       const x = (frame) => frame / Math.max(values.length - 1, 1) * (width - 2) + 1;
       const y = (value) => height - 2 - value / highest * (height - LABEL_PX);
@@ -39,8 +46,6 @@ class Charts {
       context.stroke();
       context.fillStyle = colours.cursor;
       context.fillRect(x(at) - 0.75, 0, 1.5, height);
-      const value = values[at];
-      caption.textContent = `${name}: ${value === undefined ? "-" : value.toLocaleString("en")}${unit ? ` ${unit}` : ""}`;
     }
   }
 }

@@ -63,6 +63,7 @@ class Pictures {
 
   paint(left, mask, tracks) {
     const canvas = this.left, context = canvas.getContext("2d");
+    if (!context) return;
     Object.assign(canvas, { width: left.naturalWidth, height: left.naturalHeight });
     context.drawImage(left, 0, 0);
     if (mask) context.drawImage(mask, 0, 0, canvas.width, canvas.height);
