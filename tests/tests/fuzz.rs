@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use dynvox_tests::fuzz::{Mutator, TARGETS, Target};
 
 /// Mutations of a target in an ordinary run.
-const MUTATIONS: u32 = 150;
+const MUTATIONS: u32 = 1_000;
 /// Longest time one input may take. It is far above what any takes: it tells a hang from a slow machine.
 const INPUT_MAX: Duration = Duration::from_secs(20);
 

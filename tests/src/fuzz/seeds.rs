@@ -128,7 +128,7 @@ pub fn stream() -> Vec<Vec<u8>> {
 pub fn clip() -> Vec<Vec<u8>> {
     let rig = [40.0_f64, 24.0, 16.0, 0.5].map(f64::to_le_bytes);
     let head = |kind: u32, frames: u32| {
-        let numbers = [kind, SIZE[0], SIZE[1], frames].map(u32::to_le_bytes);
+        let numbers = [kind, 96, 64, frames].map(u32::to_le_bytes);
         [b"DVXCLIP1".as_slice(), numbers.as_flattened(), rig.as_flattened()].concat()
     };
     vec![head(0, 0), head(1, 0), head(2, 0)]
