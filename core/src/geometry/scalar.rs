@@ -10,6 +10,16 @@ pub(crate) fn max_f32(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// As [`min_f32`].
+pub(crate) fn min_f64(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// As [`max_f32`].
+pub(crate) fn max_f64(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// `value` held within `low..=high`; `low` when it is NaN.
 pub(crate) fn clamp_f32(value: f32, low: f32, high: f32) -> f32 {
     min_f32(max_f32(value, low), high)

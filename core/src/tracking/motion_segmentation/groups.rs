@@ -4,7 +4,7 @@ use super::{
     SegmentationConfig,
     residual::{Residual, StaticModel},
 };
-use crate::scene_flow::Match;
+use crate::{geometry::scalar::max_f64, scene_flow::Match};
 use bytemuck::{Pod, Zeroable};
 use heapless::Vec;
 use nalgebra::Vector3;
@@ -88,7 +88,7 @@ impl Candidate {
     fn is_neighbour(&self, other: &Self, reach_px: f64) -> bool {
         let depth_m = f64::from(self.point_m[2]);
         let apart = |a: f32, b: f32| libm::fabs(f64::from(a) - f64::from(b));
-        let disparity_px = larger(DISPARITY_SHARE * f64::from(self.disparity_px), DISPARITY_MIN_PX);
+        let disparity_px = max_f64(DISPARITY_SHARE * f64::from(self.disparity_px), DISPARITY_MIN_PX);
         if apart(self.u, other.u) > reach_px
             || apart(self.v, other.v) > reach_px
             || apart(self.disparity_px, other.disparity_px) > disparity_px
@@ -105,10 +105,6 @@ impl Candidate {
 /// How far motions on one object may differ, along the image's axes, m.
 pub(super) fn motion_tolerance_m(depth_m: f64) -> f64 {
     MOTION_M + MOTION_PER_DEPTH * depth_m
-}
-
-pub(super) fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 /// A box in the camera's axes, m.
@@ -134,7 +130,7 @@ impl Extent {
             *low = if theirs < *low { theirs } else { *low };
         }
         for (high, theirs) in joined.high.iter_mut().zip(other.high) {
-            *high = larger(theirs, *high);
+            *high = max_f64(theirs, *high);
         }
         joined
     }
@@ -144,7 +140,7 @@ impl Extent {
         let mut squared = 0.0;
         for axis in 0..3 {
             let at = |values: &[f64; 3]| values.get(axis).copied().unwrap_or(0.0);
-            let gap = larger(at(&other.low) - at(&self.high), at(&self.low) - at(&other.high));
+            let gap = max_f64(at(&other.low) - at(&self.high), at(&self.low) - at(&other.high));
             squared += if gap > 0.0 { gap * gap } else { 0.0 };
         }
         libm::sqrt(squared)
@@ -183,7 +179,7 @@ impl Group {
     /// Whether it has members enough as well.
     pub fn passes(&self, config: &SegmentationConfig) -> bool {
         let Extent { low: [left, _, near], high: [right, _, far] } = self.extent;
-        let is_wide = larger(right - left, far - near) > WIDTH_MIN_M;
+        let is_wide = max_f64(right - left, far - near) > WIDTH_MIN_M;
         let is_sparse = self.depth_m > f64::from(config.sparse_from_m) || self.depth_m < SPARSE_UP_TO_M && is_wide;
         let least = if is_sparse { config.far_members_min } else { config.members_min };
         self.members >= u32::from(least) && self.is_plausible(config)
@@ -195,7 +191,7 @@ pub(super) fn join(candidates: &mut [Candidate], focal_px: f64) {
     for later in 1..candidates.len() {
         let Some((earlier, rest)) = candidates.split_at_mut_checked(later) else { return };
         let Some(candidate) = rest.first().copied() else { return };
-        let reach_px = larger(NEIGHBOUR_M * focal_px / f64::from(candidate.point_m[2]), NEIGHBOUR_MIN_PX);
+        let reach_px = max_f64(NEIGHBOUR_M * focal_px / f64::from(candidate.point_m[2]), NEIGHBOUR_MIN_PX);
         for index in 0..earlier.len() {
             let is_neighbour = earlier.get(index).is_some_and(|other| candidate.is_neighbour(other, reach_px));
             if is_neighbour {

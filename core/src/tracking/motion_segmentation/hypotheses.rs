@@ -2,9 +2,17 @@
 
 use super::{
     SegmentationConfig,
-    groups::{Extent, GROUPS_MAX, Group, larger},
+    groups::{Extent, GROUPS_MAX, Group},
 };
-use crate::{geometry::Transform, part::part, state::Visitor, tracking::association::remove_at};
+use crate::{
+    geometry::{
+        Transform,
+        scalar::{max_f64, min_f64},
+    },
+    part::part,
+    state::Visitor,
+    tracking::association::remove_at,
+};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
@@ -24,10 +32,6 @@ const KEPT_MAX_M: [f64; 3] = [1.8, 1.4, 4.0];
 const HIDDEN_FRAMES: u32 = 7;
 /// Frames of the history that count.
 const RECENT: u32 = 0b111;
-
-fn smaller(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
 
 /// A group that is followed over frames.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -109,9 +113,9 @@ impl Hypothesis {
             self.half_m.iter_mut().zip(found.half).zip(offset_m.iter().zip(shift_m.iter_mut())).zip(KEPT_MAX_M)
         {
             let kept_m = if is_known { KEPT_SHARE * *half_m } else { 0.0 };
-            let free_m = larger(found_m, most_m - found_m);
-            let low_m = if is_known { larger(-free_m, smaller(-found_m, offset_m - kept_m)) } else { -found_m };
-            let high_m = if is_known { smaller(free_m, larger(found_m, offset_m + kept_m)) } else { found_m };
+            let free_m = max_f64(found_m, most_m - found_m);
+            let low_m = if is_known { max_f64(-free_m, min_f64(-found_m, offset_m - kept_m)) } else { -found_m };
+            let high_m = if is_known { min_f64(free_m, max_f64(found_m, offset_m + kept_m)) } else { found_m };
             (*half_m, *shift_m) = (0.5 * (high_m - low_m), 0.5 * (high_m + low_m));
         }
         self.center_m = (found.center + t_world_camera.rotate(shift_m)).into();

@@ -1,11 +1,9 @@
 //! The disparity image on a lattice: where a group's mask grows.
 
-use super::{
-    ground::Ground,
-    groups::{Extent, larger},
-};
+use super::{ground::Ground, groups::Extent};
 use crate::{
     geometry::StereoRig,
+    geometry::scalar::max_f64,
     image::{DISPARITY_ONE_PX, View},
     masks::PixelBox,
 };
@@ -149,7 +147,7 @@ impl<'a> Lattice<'a> {
         if column >= self.columns || row >= self.rows {
             return;
         }
-        let reach_px = larger(BLOCK_SHARE * disparity_px, BLOCK_PX);
+        let reach_px = max_f64(BLOCK_SHARE * disparity_px, BLOCK_PX);
         let is_same = |other_px: f64| libm::fabs(other_px - disparity_px) < reach_px;
         let slot = blocked.get_mut(row * self.columns + column);
         if let Some(slot) = slot.filter(|_| self.disparity_px(self.pixel(column, row)).is_some_and(is_same)) {
@@ -265,7 +263,7 @@ fn widened(extent: &Extent) -> Extent {
         let margin_m = if axis == 2 {
             margin_m + DEPTH_MARGIN * depth_m * depth_m
         } else {
-            larger(margin_m - MARGIN_PER_DEPTH * depth_m, MARGIN_MIN_M)
+            max_f64(margin_m - MARGIN_PER_DEPTH * depth_m, MARGIN_MIN_M)
         };
         let behind_m = if axis == 2 && length_m + margin_m < LENGTH_M { LENGTH_M - length_m } else { margin_m };
         let before_m = if is_beside { behind_m } else { margin_m };

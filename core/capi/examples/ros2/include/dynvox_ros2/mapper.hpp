@@ -62,11 +62,11 @@ class Mapper {
     const DynvoxStatus divided = dynvox_capacity_for_budget(&budget, &capacity, &least);
     if (divided == DYNVOX_STATUS_TOO_SMALL) throw std::runtime_error("too few bytes of memory: at least " + std::to_string(least) + " are needed");
     check(divided, "the memory cannot be divided");
-    // A window of pruning is as long as the memory remembers.
     const size_t alignment = dynvox_alignment();
     const size_t size = (bytes + alignment - 1) / alignment * alignment;
     memory_.reset(static_cast<uint8_t *>(std::aligned_alloc(alignment, size)));
     if (!memory_) throw std::bad_alloc();
+    // A window of pruning is as long as the memory remembers.
     if (capacity.history_frames < 40)
       check(dynvox_config_set(&config, "volume.prune_lag", std::to_string(capacity.history_frames).c_str()), "the pruning window");
     check(dynvox_create(&capacity, &config, memory_.get(), size, &mapper_), "no mapper");
