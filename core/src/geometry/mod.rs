@@ -2,6 +2,7 @@
 
 mod correction;
 mod depth;
+mod oriented_box;
 mod rig;
 pub mod scalar;
 mod transform;
@@ -9,6 +10,7 @@ mod transform;
 pub(crate) use correction::ColumnCorrection;
 pub use correction::DisparityCorrection;
 pub use depth::depth_from_disparity;
+pub(crate) use oriented_box::OrientedBox;
 pub(crate) use rig::StereoObservation;
 pub use rig::{DEPTH_MIN_M, DISPARITY_MIN_PX, RigProblem, StereoRig};
 pub use transform::Transform;

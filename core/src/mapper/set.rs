@@ -189,7 +189,7 @@ section!(state: StateConfig {
 });
 section!(segmentation: SegmentationConfig {
     enabled, noise_px, disparity_noise_px, camera_m, camera_rad, candidate_chi_square, far_m, members_min, far_members_min, sparse_from_m,
-    candidate_share_min, motion_min_m, confirm_frames, predict_frames,
+    candidate_share_min, motion_min_m, confirm_frames, predict_frames, erase_frames,
 });
 section!(objects: ObjectsConfig {
     voxel_size_m, truncation_m, far_m, extent_m, observation_weight, max_weight, prune_weight, prune_frames,

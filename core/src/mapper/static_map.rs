@@ -17,6 +17,15 @@ pub(super) struct StaticMap<'m, 's> {
 }
 
 impl StaticMap<'_, '_> {
+    /// Erases what moving objects left before they were known to move. Returns how many voxels.
+    pub fn erase_trails(&mut self, camera: &CameraMotion, tracked: &mut Tracked<'_, '_>) -> u32 {
+        let mut erased = 0;
+        tracked.take_trails(&camera.t_world_camera, |trail| {
+            erased += trail.boxes().map(|before| self.background.erase(&before, trail.frames())).sum::<u32>();
+        });
+        erased
+    }
+
     /// Turns the disparity into depth, removes what moves or may move, allocates blocks around the rest and averages it in.
     pub fn fuse<E: Executor, S: BlockStore>(
         &mut self,

@@ -111,6 +111,7 @@ impl Mapper<'_> {
         // (E) The static map, without what moves or may move, and the objects' maps; unless the pose is extrapolated.
         let fused = located.found.origin != PoseOrigin::Held && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
         let mut map = StaticMap { config, disparity_q8, background: &mut self.background, depth_m: self.depth_m };
+        let voxels_erased = executor.stage(Stage::Prune, || map.erase_trails(&located.camera, &mut tracked));
         let allocation = if fused { map.fuse(frame, &located.camera, &mut tracked, executor, store) } else { AllocationReport::default() };
         let picture = Picture { grey: frame.left, colour: frame.colour };
         let shown = ObjectFrame { rig: &rig, t_world_camera: &located.camera.t_world_camera, picture, disparity_q8 };
@@ -120,6 +121,7 @@ impl Mapper<'_> {
         });
         // (F) Noise last observed a fixed lag ago is removed.
         let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
+        let prune = PruneReport { voxels_erased, ..prune };
         if self.camera.since_reference() > 0 {
             self.scene_flow.keep_previous();
         }

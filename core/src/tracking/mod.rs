@@ -91,6 +91,7 @@ use guided_matching::GUIDED_MATCHES_MAX;
 use instance::Instances;
 use match_assignment::OwnerCode;
 use motion_segmentation::MotionSegmenter;
+pub(crate) use motion_segmentation::Trail;
 use motions::MotionInput;
 
 /// Instances and tracks.

@@ -1,9 +1,9 @@
 //! The stages of tracking in a frame, each a value that the next one takes.
 
-use super::{CameraMotion, Detection, EgomotionMask, FrameMatches, GuidedMatching, MotionInput, Tracker, TrackingReport};
+use super::{CameraMotion, Detection, EgomotionMask, FrameMatches, GuidedMatching, MotionInput, Tracker, TrackingReport, Trail};
 use crate::{
     egomotion::Estimator,
-    geometry::StereoRig,
+    geometry::{StereoRig, Transform},
     image::{View, ViewMut},
 };
 
@@ -82,6 +82,11 @@ impl<'s> Tracked<'_, 's> {
     /// Sets the depth of what moves or may move to 0, so that the static map does not get it.
     pub(crate) fn mask_dynamic_depth(&mut self, depth_m: &mut ViewMut<'_, f32>) {
         self.tracker.report.pixels_masked = self.tracker.mask_dynamic_depth(depth_m);
+    }
+
+    /// Visits where objects were before they were known to move.
+    pub(crate) fn take_trails(&mut self, t_world_camera: &Transform, visit: impl FnMut(&Trail)) {
+        self.tracker.segmenter.take_trails(t_world_camera, visit);
     }
 
     /// The tracks with their instances and masks.

@@ -16,6 +16,16 @@ pub enum ObservationWeight {
     Depth,
 }
 
+impl ObservationWeight {
+    /// The most that one observation weighs.
+    pub(super) const fn most(self) -> u32 {
+        match self {
+            Self::One => 1,
+            Self::Depth => 10,
+        }
+    }
+}
+
 /// Along what a voxel's distance from the surface is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]

@@ -8,6 +8,7 @@
 mod allocate;
 pub(crate) mod block;
 mod config;
+mod erase;
 mod fuse;
 mod history;
 mod index;

@@ -24,6 +24,8 @@ pub struct PruneReport {
     pub carried_over: u32,
     /// Frames taken out of the history before their time, because it was full.
     pub early: u32,
+    /// Voxels reset because a moving object was there.
+    pub voxels_erased: u32,
 }
 
 impl PruneReport {

@@ -48,6 +48,8 @@ pub struct BlockTotals {
     pub carried_over_most: u32,
     /// Frames pruned early because the history was full.
     pub early: u64,
+    /// Voxels reset because a moving object had been there.
+    pub voxels_erased: u64,
     /// Most frames in the history.
     pub history_frames_most: usize,
 }
@@ -103,6 +105,7 @@ impl Observer for BlocksObserver {
         totals.blocks_freed += u64::from(prune.blocks_freed);
         totals.carried_over_most = totals.carried_over_most.max(prune.carried_over);
         totals.early += u64::from(prune.early);
+        totals.voxels_erased += u64::from(prune.voxels_erased);
         totals.history_frames_most = totals.history_frames_most.max(row.history_frames);
         Ok(())
     }

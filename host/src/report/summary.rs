@@ -160,6 +160,7 @@ struct PruneSummary {
     blocks_freed: u64,
     carried_over_most: u32,
     early: u64,
+    voxels_erased: u64,
 }
 
 #[derive(Debug, Serialize)]
@@ -262,6 +263,7 @@ impl PruneSummary {
             blocks_freed: totals.blocks_freed,
             carried_over_most: totals.carried_over_most,
             early: totals.early,
+            voxels_erased: totals.voxels_erased,
         }
     }
 }

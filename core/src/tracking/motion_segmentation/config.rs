@@ -35,6 +35,8 @@ pub struct SegmentationConfig {
     pub confirm_frames: u8,
     /// Frames without a group over which an object's mask is predicted; 0 to 10; 3.
     pub predict_frames: u8,
+    /// Frames before an object was known to move, over which what it left in the static map is erased; 0 to 30, 0 is off; 8.
+    pub erase_frames: u8,
 }
 
 impl Default for SegmentationConfig {
@@ -54,6 +56,7 @@ impl Default for SegmentationConfig {
             motion_min_m: 0.1,
             confirm_frames: 2,
             predict_frames: 3,
+            erase_frames: 8,
         }
     }
 }
@@ -78,5 +81,6 @@ impl SegmentationConfig {
         check(not_negative(self.motion_min_m), "tracking.segmentation.motion_min_m", "must be at least 0");
         check((1..=3).contains(&self.confirm_frames), "tracking.segmentation.confirm_frames", "must be in 1..=3");
         check(self.predict_frames <= 10, "tracking.segmentation.predict_frames", "must be at most 10");
+        check(self.erase_frames <= 30, "tracking.segmentation.erase_frames", "must be at most 30");
     }
 }

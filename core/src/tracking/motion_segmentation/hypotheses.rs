@@ -3,6 +3,7 @@
 use super::{
     SegmentationConfig,
     groups::{Extent, GROUPS_MAX, Group},
+    trail::Trail,
 };
 use crate::{
     geometry::{
@@ -49,6 +50,10 @@ pub(in crate::tracking) struct Hypothesis {
     confirmed: u32,
     /// Frames without a group.
     missed: u32,
+    /// Frames up to now in which its mask was not shown, as far as they count.
+    unmasked: u32,
+    /// Those over which what it left in the static map is to be erased, told in this frame.
+    trail_frames: u32,
     /// Unused.
     padding: u32,
 }
@@ -60,11 +65,21 @@ impl Hypothesis {
 
     /// Visits every field.
     fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { center_m, motion_m, half_m, history, confirmed, missed, padding: _ } = self;
+        let Self {
+            center_m,
+            motion_m,
+            half_m,
+            history,
+            confirmed,
+            missed,
+            unmasked,
+            trail_frames,
+            padding: _,
+        } = self;
         visitor.f64s(center_m);
         visitor.f64s(motion_m);
         visitor.f64s(half_m);
-        visitor.u32s([history, confirmed, missed]);
+        visitor.u32s([history, confirmed, missed, unmasked, trail_frames]);
     }
 
     /// Where it is in the camera's axes.
@@ -95,6 +110,11 @@ impl Hypothesis {
     /// Whether a group of this frame is its own.
     pub fn is_observed(&self) -> bool {
         self.missed == 0
+    }
+
+    /// Its mask is shown in this frame, or it is given up: what it left in the frames before without one is to be erased.
+    fn end_unmasked(&mut self) {
+        self.trail_frames = core::mem::take(&mut self.unmasked);
     }
 
     /// Updates it by the group of this frame.
@@ -208,27 +228,49 @@ impl<'s> Hypotheses<'s> {
                 refused += 1;
                 continue;
             };
-            *slot = Hypothesis::default();
+            *slot = Hypothesis { unmasked: u32::from(config.erase_frames), ..Hypothesis::default() };
             slot.update(config, &observed(group), t_world_camera);
             self.len += 1;
         }
         refused
     }
 
-    /// Drops the hypotheses missed for too long: an unconfirmed one once no recent frame agrees.
+    /// Drops the hypotheses missed for too long: an unconfirmed one once no recent frame agrees, a confirmed one after a frame in which it is given up.
     fn drop_missed(&mut self, config: &SegmentationConfig) {
         let mut kept = 0;
+        let frames_most = u32::from(config.predict_frames) + HIDDEN_FRAMES;
         for index in 0..self.len {
-            let Some(hypothesis) = self.table.get(index).copied() else { break };
+            let Some(mut hypothesis) = self.table.get(index).copied() else { break };
+            let is_given_up = hypothesis.is_confirmed() && hypothesis.missed == frames_most + 1;
+            if is_given_up {
+                hypothesis.end_unmasked();
+            }
             let is_recent = hypothesis.history & RECENT != 0;
-            let stays =
-                if hypothesis.is_confirmed() { hypothesis.missed <= u32::from(config.predict_frames) + HIDDEN_FRAMES } else { is_recent };
+            let stays = if hypothesis.is_confirmed() { is_given_up || hypothesis.missed <= frames_most } else { is_recent };
             if let Some(slot) = self.table.get_mut(kept).filter(|_| stays) {
                 *slot = hypothesis;
                 kept += 1;
             }
         }
         self.len = kept;
+    }
+
+    /// Notes whether the mask of the hypothesis at that position is shown in this frame.
+    pub fn note_shown(&mut self, config: &SegmentationConfig, index: usize, shown: bool) {
+        let Some(hypothesis) = self.table.get_mut(..self.len).and_then(|all| all.get_mut(index)) else { return };
+        if shown {
+            hypothesis.end_unmasked();
+        } else {
+            hypothesis.unmasked = (hypothesis.unmasked + 1).min(u32::from(config.erase_frames));
+        }
+    }
+
+    /// Visits where objects were in frames in which their depth was not kept out of the static map, each once.
+    pub fn take_trails(&mut self, t_world_camera: &Transform, mut visit: impl FnMut(&Trail)) {
+        for hypothesis in self.table.iter_mut().take(self.len).filter(|hypothesis| hypothesis.trail_frames > 0) {
+            let frames = core::mem::take(&mut hypothesis.trail_frames);
+            visit(&Trail::new(&hypothesis.extent(t_world_camera), t_world_camera, Vector3::from(hypothesis.motion_m), frames));
+        }
     }
 
     /// Drops the hypothesis at that position.
@@ -286,6 +328,31 @@ mod tests {
             counts[0] += hypotheses.all().len() as u32;
             counts[1] += u32::from(hypotheses.all().iter().any(|hypothesis| hypothesis.is_shown(&config)));
         }
-        assert_eq!(counts, [u32::from(config.predict_frames) + HIDDEN_FRAMES, u32::from(config.predict_frames)]);
+        // One frame more, in which it is given up.
+        assert_eq!(counts, [u32::from(config.predict_frames) + HIDDEN_FRAMES + 1, u32::from(config.predict_frames)]);
+    }
+
+    #[test]
+    fn what_was_left_before_the_mask_and_while_it_was_lost_is_told_once() {
+        let (mut table, config) = (vec![Hypothesis::default(); 2], SegmentationConfig::default());
+        let mut hypotheses = Hypotheses::new(&mut table);
+        let (camera, moving) = (Transform::IDENTITY, Group { motion_m: Vector3::new(0.2, 0.0, 0.0), ..group(0.0, 1.6) });
+        let mut frame = |groups: &[Group], shown: bool| {
+            hypotheses.update(&config, groups, &camera);
+            hypotheses.note_shown(&config, 0, shown);
+            let mut trails = vec![];
+            hypotheses.take_trails(&camera, |trail| trails.push(*trail));
+            trails
+        };
+        assert!(frame(&[moving], false).is_empty(), "nothing is known yet");
+        let first = frame(&[moving], true);
+        let boxes: std::vec::Vec<_> = first[0].boxes().collect();
+        assert_eq!((first.len(), boxes.len()), (1, usize::from(config.erase_frames)));
+        assert!(boxes[0].contains([-0.9, 0.5, 10.0]) && !boxes[0].contains([-1.4, 0.5, 10.0]), "0.2 m back and a margin of 0.3 m");
+        assert!(boxes[7].contains([-2.3, 0.5, 10.0]) && !boxes[7].contains([-0.2, 0.5, 10.0]), "1.6 m back");
+        assert!(!boxes[0].contains([-0.2, 1.1, 10.0]), "not the ground below it");
+        assert!(frame(&[moving], true).is_empty(), "its mask was shown");
+        let lost: u32 = (0..20).map(|_| frame(&[], false).iter().map(Trail::frames).sum::<u32>()).sum();
+        assert_eq!(lost, u32::from(config.erase_frames), "all frames in which it was searched for, up to the most");
     }
 }

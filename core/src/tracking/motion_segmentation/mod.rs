@@ -10,11 +10,12 @@
 //! 4. where candidates are few, and where an object of the frames before must be, patches are searched for by projection; a near group whose
 //!    patches are found as well where static points would be is one of a row of posts or the like, and no moving object (`patches`);
 //! 5. a group that agrees with one of the frames before is an object, and is predicted over frames without one (`hypotheses`);
-//! 6. its mask grows from its extent over the disparity image, above the ground, but not over matches that do not move (`lattice`, `ground`).
+//! 6. what it left in the static map before that is erased (`trail`);
+//! 7. its mask grows from its extent over the disparity image, above the ground, but not over matches that do not move (`lattice`, `ground`).
 //!
 //! Matches assigned to an instance of the detector are left out: an object is not found twice.
 //!
-//! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 1,024 far matches, a byte a match, 6 bytes for each 4 x 4 px of the image, 88
+//! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 1,024 far matches, a byte a match, 6 bytes for each 4 x 4 px of the image, 96
 //! bytes for each of 64 hypotheses, 80 for each of 32 supposed objects. Time: a triangulation and projection a match, a comparison for each pair
 //! of candidates and of far matches, the cells of each mask, and at most 384 patches a frame.
 //!
@@ -35,13 +36,15 @@ mod patches;
 mod residual;
 #[cfg(test)]
 mod tests;
+mod trail;
 
 pub use config::SegmentationConfig;
 pub use ground::Ground;
+pub(crate) use trail::Trail;
 
 use super::{CameraMotion, Class, FrameMatches, GuidedMatching, Tracker, match_assignment::OwnerCode};
 use crate::{
-    geometry::StereoRig,
+    geometry::{StereoRig, Transform},
     image::View,
     masks::PixelBox,
     memory::{Capacity, Carver, region_bytes},
@@ -154,6 +157,11 @@ impl<'s> MotionSegmenter<'s> {
             hypotheses,
         } = self;
         hypotheses.visit(visitor);
+    }
+
+    /// Visits where objects were before they were known to move.
+    pub fn take_trails(&mut self, t_world_camera: &Transform, visit: impl FnMut(&Trail)) {
+        self.hypotheses.take_trails(t_world_camera, visit);
     }
 
     /// Groups what contradicts the static model and continues the hypotheses. With `search`, the places that have too few matches are searched
@@ -312,6 +320,8 @@ impl Tracker<'_> {
                 Some(Added::Full) => report.refused += 1,
                 None => {}
             }
+            let shown = matches!(added, Some(Added::Yes));
+            self.segmenter.hypotheses.note_shown(&config.segmentation, index, shown);
             index += 1;
         }
         self.report.segmentation = report;

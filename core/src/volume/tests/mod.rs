@@ -1,6 +1,7 @@
 //! Analytic scenes with closed answers, and slow twins of the fast kernels.
 
 pub(crate) mod analytic;
+mod erasing;
 mod eviction;
 mod fusion;
 mod pruning;

@@ -57,7 +57,8 @@ fn frees_low_weight_blocks_lag_frames_after_they_were_seen_and_no_others() {
                 voxels_reset: 60 * 512,
                 blocks_freed: 60,
                 carried_over: 0,
-                early: 0
+                early: 0,
+                voxels_erased: 0
             }
         );
         assert_eq!((volume.pool.len(), volume.index.len()), (40, 40));

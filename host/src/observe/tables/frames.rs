@@ -53,6 +53,7 @@ struct BlockColumns {
     prune_blocks_freed: u32,
     prune_carried_over: u32,
     prune_early: u32,
+    prune_voxels_erased: u32,
     history_frames: usize,
 }
 
@@ -206,6 +207,7 @@ fn block_columns(row: &FrameRow) -> BlockColumns {
         prune_blocks_freed: prune.blocks_freed,
         prune_carried_over: prune.carried_over,
         prune_early: prune.early,
+        prune_voxels_erased: prune.voxels_erased,
         history_frames: row.history_frames,
     }
 }

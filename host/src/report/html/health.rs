@@ -60,6 +60,7 @@ fn counters(run: &RunRecord) -> Vec<Vec<String>> {
         ("blocks freed by pruning", totals.blocks_freed),
         ("most pruning visits carried over", u64::from(totals.carried_over_most)),
         ("frames pruned early", totals.early),
+        ("voxels erased where moving objects had been", totals.voxels_erased),
         ("features and matches dropped", health.matches_dropped),
         ("values of given depth refused", health.depth_values_refused),
         ("detections refused", u64::from(health.detections.refused())),
