@@ -20,8 +20,9 @@ SCHEMAS = {
     "/tf": "foxglove.FrameTransform", "/camera/pose": "foxglove.PoseInFrame", "/camera/left/image": "foxglove.CompressedImage",
     "/camera/left/calibration": "foxglove.CameraCalibration", "/camera/disparity": "foxglove.CompressedImage",
     "/objects": "foxglove.SceneUpdate", "/figures": None, "/map/seen": "foxglove.PointCloud", "/trajectory": "foxglove.PosesInFrame",
+    "/planning/grid": "foxglove.Grid",
 }
-EVERY_FRAME = [topic for topic in SCHEMAS if topic not in ("/map/seen", "/trajectory")]
+EVERY_FRAME = [topic for topic in SCHEMAS if topic not in ("/map/seen", "/planning/grid", "/trajectory")]
 counts, bytes_of, times, validators, failures = collections.Counter(), collections.Counter(), collections.defaultdict(list), {}, []
 
 
@@ -58,6 +59,10 @@ with open(folder / "run.mcap", "rb") as file:
             image = Image.open(io.BytesIO(base64.b64decode(text["data"])))
             image.load()
             require(image.width > 0 and image.format == text["format"].upper(), f"{topic} {at} is {image.format}, not {text['format']}")
+        if topic == "/planning/grid":
+            cells = np.frombuffer(base64.b64decode(text["data"]), np.dtype([("distance_m", "<f4"), ("height_m", "<f4"), ("occupancy", "i1"), ("", "V3")]))
+            require(cells.size % text["column_count"] == 0 and set(cells["occupancy"]) <= {-1, 0, 100}, f"{topic} {at} has other cells")
+            require(bool(np.all(cells["distance_m"][cells["occupancy"] == 100] < 0)), f"{topic} {at}: an obstacle has a distance above 0")
         if topic == "/map/seen":
             points = len(base64.b64decode(text["data"])) / text["point_stride"]
             require(points > 0 and points == int(points), f"{topic} has {points} points")
@@ -68,6 +73,7 @@ for topic in EVERY_FRAME:
     apart = max((abs(a - b) for a, b in zip(times[topic], frame_times)), default=0)
     require(apart <= 1_000, f"{topic} is {apart} ns off the times of frames.csv")
 require(counts["/map/seen"] == -(-len(rows) // 10), f"/map/seen has {counts['/map/seen']} messages")
+require(counts["/planning/grid"] in (0, counts["/map/seen"]), f"/planning/grid has {counts['/planning/grid']} messages")
 require(counts["/trajectory"] == 1, f"/trajectory has {counts['/trajectory']} messages")
 require(summary.statistics.message_count == sum(counts.values()), "the statistics count other messages")
 for topic, count in sorted(counts.items()):

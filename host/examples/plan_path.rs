@@ -2,9 +2,10 @@
 //!
 //! `cargo run --release -p dynvox --example plan_path -- [streets=100] [frames=16] [out=DIR] [planning.KEY=VALUE]`
 //!
-//! A robot of 0.4 m radius stands where the camera is after a second and a half and moves to a goal 11 m ahead at 4 m/s. The path is planned once, on what
-//! stereo images alone showed until then, with moving cars where they are predicted to be at the time the robot gets to a place. Then it is followed
-//! past the street's exact cars and walls, and compared with the path that the same planner finds on the exact geometry.
+//! A robot of 0.4 m radius stands where the camera is after a second and a half and moves to a goal 11 m ahead at 4 m/s, or to the nearest place beside
+//! it that is clear. The path is planned once, on what stereo images alone showed until then, with moving cars where they are predicted to be at the time
+//! the robot gets to a place. Then it is followed past the street's exact cars and walls, and compared with the path that the same planner finds to the
+//! same goal on the exact geometry.
 
 use dynvox::synth::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, Street, StreetConfig, SynthFrame, Traffic};
 use dynvox_core::memory::{Carver, SLAB_ALIGN};
@@ -58,7 +59,21 @@ fn plan(fields: &Fields, start: [i32; 2], goal: [i32; 2]) -> Option<Vec<[i32; 2]
     None
 }
 
+/// How far a goal that nothing may stand at is moved at most, cells: 1.5 m.
+const GOAL_CELLS: i32 = 8;
+
 impl Fields {
+    /// The cell nearest to a goal at which the robot can stand when it gets there.
+    fn reachable_goal(&self, start: [i32; 2], goal: [i32; 2]) -> [i32; 2] {
+        let clear = |cell: &[i32; 2]| {
+            let length = f64::from(cell[0] - start[0]).hypot(f64::from(cell[1] - start[1]));
+            self.clear_m(*cell, length * self.cell_m / SPEED_M_S) >= CLEAR_M
+        };
+        let around = (-GOAL_CELLS..=GOAL_CELLS).flat_map(|y| (-GOAL_CELLS..=GOAL_CELLS).map(move |x| [x, y]));
+        let nearest = around.filter(|[x, y]| clear(&[goal[0] + x, goal[1] + y])).min_by_key(|[x, y]| x * x + y * y);
+        nearest.map_or(goal, |[x, y]| [goal[0] + x, goal[1] + y])
+    }
+
     /// How far the nearest obstacle is, at the two nearest times.
     fn clear_m(&self, [x, y]: [i32; 2], time_s: f64) -> f64 {
         let inside = (0..SIDE as i32).contains(&x) && (0..SIDE as i32).contains(&y);
@@ -261,7 +276,8 @@ fn main() -> anyhow::Result<()> {
         let (fields, truth, origin, camera) = map(&street(seed)?, frames, &mut slab, &capacity)?;
         let cell = |at: [f64; 2]| [0, 1].map(|axis| ((at[axis] - origin[axis]) / fields.cell_m).floor() as i32);
         let [side, ahead] = GOALS[seed as usize % GOALS.len()];
-        let (start, goal) = (cell(camera), cell([camera[0] + side, camera[1] + ahead]));
+        let start = cell(camera);
+        let goal = fields.reachable_goal(start, cell([camera[0] + side, camera[1] + ahead]));
         let exact = plan(&exact_fields(&truth, fields.cell_m, origin)?, start, goal);
         let point_of = |cell: [i32; 2]| [0, 1].map(|axis| origin[axis] + (f64::from(cell[axis]) + 0.5) * fields.cell_m);
         let Some(way) = plan(&fields, start, goal) else {

@@ -3,6 +3,7 @@
 
 mod binary;
 
+use base64::{Engine, engine::general_purpose::STANDARD};
 use binary::{dynvox, names, output_text, rig};
 use dynvox::formats::{PlyMesh, read_numbered, read_poses};
 use dynvox::run::stereo_frame;
@@ -143,7 +144,8 @@ fn cars_stand_in_the_map_where_the_raycast_of_the_last_frame_shows_them() {
 fn a_recording_has_every_frame_of_every_topic() {
     let root = TempDir::new().unwrap();
     rig(root.path(), 12);
-    run(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--out", "result", "--mcap"]);
+    let window = ["--planning", "100x100x16", "--set", "planning.level=true", "--set", "planning.camera_height_m=1.2"];
+    run(root.path(), &[&["run", "rig", "--profile", "tiny", "--quiet", "--out", "result", "--mcap"][..], &window].concat());
     let bytes = fs::read(root.path().join("result/run.mcap")).unwrap();
     let (mut counts, mut times) = (BTreeMap::<String, usize>::new(), Vec::new());
     for message in mcap::MessageStream::new(&bytes).unwrap() {
@@ -152,6 +154,13 @@ fn a_recording_has_every_frame_of_every_topic() {
         let schema: serde_json::Value = serde_json::from_slice(&message.channel.schema.as_ref().unwrap().data).unwrap();
         for key in json.as_object().unwrap().keys() {
             assert!(!schema["properties"][key].is_null(), "{} is in the schema of {}", key, message.channel.topic);
+        }
+        if message.channel.topic == "/planning/grid" {
+            let number = |key: &str| json[key].as_u64().unwrap();
+            assert_eq!([number("column_count"), number("row_stride"), number("cell_stride")], [100, 1_200, 12]);
+            let data = STANDARD.decode(json["data"].as_str().unwrap()).unwrap();
+            let states: BTreeSet<i8> = data.chunks(12).map(|cell| cell[8] as i8).collect();
+            assert!(data.len() == 100 * 100 * 12 && states == [-1, 0, 100].into(), "{states:?}");
         }
         *counts.entry(message.channel.topic.clone()).or_default() += 1;
         times.push(message.log_time);
@@ -165,6 +174,7 @@ fn a_recording_has_every_frame_of_every_topic() {
         ("/figures", 12),
         ("/map/seen", 2),
         ("/objects", 12),
+        ("/planning/grid", 2),
         ("/tf", 12),
         ("/trajectory", 1),
     ];

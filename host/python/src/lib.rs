@@ -11,6 +11,7 @@ mod error;
 mod images;
 mod mapper;
 mod options;
+mod planning;
 mod pose;
 mod rig;
 mod running;

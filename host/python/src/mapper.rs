@@ -5,6 +5,7 @@ use super::blocks::BlocksChoice;
 use super::detection::BorrowedDetection;
 use super::error::{raise, refuse};
 use super::images::{Borrowed, Picture};
+use super::planning::Plan;
 use super::rig::Rig;
 use super::running::{Recipe, Running, State};
 use super::{options, pose};
@@ -140,6 +141,12 @@ impl Mapper {
             })
         })?;
         shown.dictionary(py, &ids)
+    }
+
+    #[pyo3(signature = (ahead_s=0.0))]
+    fn plan<'py>(&self, py: Python<'py>, ahead_s: f32) -> PyResult<Bound<'py, PyDict>> {
+        let plan = self.with(py, |running| Ok(running.mapper.with_dependent_mut(|_, mapper| Plan::of(mapper, ahead_s))))?;
+        plan.ok_or_else(|| refuse("the mapper has no window for planners. Make it with planning=\"200x200x20\""))?.dictionary(py)
     }
 
     #[pyo3(signature = (object=None))]

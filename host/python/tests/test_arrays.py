@@ -147,3 +147,23 @@ def test_a_scan_of_lidar(data):
     dataset = dynvox.Dataset(data / "kitti-odometry", sequence="r1405", frames=30)
     scans = [scan for scan in map(dataset.lidar, range(len(dataset))) if scan is not None]
     assert scans and all(scan.shape[1] == 3 and scan.dtype == np.float32 for scan in scans)
+
+
+def test_a_planner_gets_the_window_around_the_camera():
+    dataset = dynvox.Dataset(frames=6, planning="100x100x16", memory="96MiB")
+    mapper = dataset.mapper()
+    for frame in dataset:
+        mapper.step(**frame)
+    digest = mapper.digest
+    plan = mapper.plan()
+    assert plan["occupancy"].shape == plan["distance_m"].shape == plan["height_m"].shape == (100, 100)
+    assert plan["occupancy"].dtype == np.int8 and set(np.unique(plan["occupancy"])) == {-1, 0, 100}
+    assert (plan["distance_m"][plan["occupancy"] == 100] < 0).all()
+    assert (plan["distance_m"][plan["occupancy"] == 0] > 0).all()
+    assert abs(plan["cell_m"] - 0.2) < 1e-6
+    # Up in the window is against the first camera's y, ahead is along its z.
+    assert np.allclose(plan["t_world_corner"][:3, 1:3], [[0, 0], [0, -1], [1, 0]], atol=1e-3)
+    assert np.nanmedian(plan["height_m"]) < 0.5
+    assert plan["report"]["free"] > 100 and mapper.digest == digest
+    with pytest.raises(dynvox.Error, match="no window for planners. Make it with planning="):
+        dynvox.Dataset(frames=1).mapper().plan()

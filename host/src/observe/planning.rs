@@ -46,9 +46,9 @@ struct Description {
     boxes: Vec<BoxDescription>,
 }
 
-/// A moving object.
+/// A moving object in the planner's window: lengths in m along the window's axes.
 #[derive(Clone, Debug, Serialize)]
-struct BoxDescription {
+pub struct BoxDescription {
     track: u32,
     center_m: [f32; 3],
     half_m: [f32; 3],

@@ -144,6 +144,22 @@ def detections_of(instances: ArrayLike, class_names: Sequence[str], scores: Sequ
 def matrix(pose: Pose) -> NDArray[np.float64]:
     """A pose of a report as a matrix of 4 x 4."""
 
+class Plan(TypedDict):
+    """The planner's window from above: rows from the nearest to the farthest ahead, columns from left to right."""
+
+    occupancy: NDArray[np.int8]
+    """0 free, 100 occupied, -1 never seen, as in `nav_msgs/OccupancyGrid`."""
+    distance_m: NDArray[np.float32]
+    """To the nearest obstacle, negative within one, NaN without any."""
+    height_m: NDArray[np.float32]
+    """Of the ground above the corner, NaN without ground."""
+    cell_m: float
+    t_world_corner: NDArray[np.float64]
+    """The corner of the first cell at the height of the lowest ground, 4 x 4; its axes are right, ahead and up."""
+    boxes: list[dict[str, Any]]
+    """Moving objects, along the window's axes."""
+    report: dict[str, Any]
+
 @final
 class Mapper:
     """A stereo mapper in one slab of memory, which is taken when the pictures' size is known: with `image`, else at the first pair.
@@ -205,6 +221,10 @@ class Mapper:
 
     def raycast(self, t_world_camera: ArrayLike | Pose | None = None, *, objects: bool = True) -> Raycast:
         """The map seen from a pose, the last one of the camera without one; with the objects where they are now."""
+
+    def plan(self, ahead_s: float = 0.0) -> Plan:
+        """The window around the camera for planners, with moving objects where they will be `ahead_s` seconds after the last frame; an error of a mapper
+        made without `planning`."""
 
     def triangles(self, object: int | None = None) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
         """Triangles of the static map, evicted blocks included, or of one track's object, in the world: positions in metres and colours, both

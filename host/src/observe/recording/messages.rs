@@ -1,6 +1,6 @@
 //! Messages of a recording. Frames of reference: `world` is the first camera's, `left` the left camera's.
 
-use crate::observe::{FrameRow, pictures, state_name};
+use crate::observe::{FrameRow, PlanningLayers, pictures, state_name};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::view::Raycaster;
@@ -14,9 +14,12 @@ const LEFT: &str = "left";
 const POINT_EVERY: usize = 3;
 /// Bytes of a point: three floats, four bytes of colour.
 const POINT_BYTES: usize = 16;
-/// Foxglove's numbers of the types of a point's fields.
+/// Foxglove's numbers of the types of a point's or a cell's fields.
 const FLOAT32: u32 = 7;
 const UINT8: u32 = 1;
+const INT8: u32 = 2;
+/// Bytes of a cell of the planner's window: two floats, a byte and three without a meaning.
+const CELL_BYTES: usize = 12;
 
 /// Time of a message, ns.
 #[derive(Clone, Copy)]
@@ -133,7 +136,6 @@ pub fn cloud(stamp: Stamp, seen: &Raycaster<'_>, rig: &StereoRig) -> Option<Valu
             }
         }
     }
-    let field = |(name, offset, kind): (&str, usize, u32)| json!({ "name": name, "offset": offset, "type": kind });
     let fields = [
         ("x", 0, FLOAT32),
         ("y", 4, FLOAT32),
@@ -147,4 +149,25 @@ pub fn cloud(stamp: Stamp, seen: &Raycaster<'_>, rig: &StereoRig) -> Option<Valu
         "timestamp": stamp.json(), "frame_id": LEFT, "pose": pose_of(&Transform::IDENTITY), "point_stride": POINT_BYTES,
         "fields": fields.map(field), "data": STANDARD.encode(data),
     }))
+}
+
+/// The planner's window from above: distance to obstacles, height of the ground, occupancy.
+pub fn planning(stamp: Stamp, layers: &PlanningLayers) -> Value {
+    let [columns, _] = layers.size;
+    let mut data = Vec::with_capacity(CELL_BYTES * layers.occupancy.len());
+    for ((distance_m, height_m), occupancy) in layers.distance_m.iter().zip(&layers.height_m).zip(&layers.occupancy) {
+        data.extend([distance_m, height_m].into_iter().flat_map(|value| value.to_le_bytes()));
+        data.extend([occupancy.to_le_bytes()[0], 0, 0, 0]);
+    }
+    let fields = [("distance_m", 0, FLOAT32), ("height_m", 4, FLOAT32), ("occupancy", 8, INT8)];
+    json!({
+        "timestamp": stamp.json(), "frame_id": WORLD, "pose": pose_of(&layers.t_world_corner), "column_count": columns,
+        "cell_size": { "x": layers.cell_m, "y": layers.cell_m }, "row_stride": columns * CELL_BYTES, "cell_stride": CELL_BYTES,
+        "fields": fields.map(field), "data": STANDARD.encode(data),
+    })
+}
+
+/// What lies where in a point or a cell.
+fn field((name, offset, kind): (&str, usize, u32)) -> Value {
+    json!({ "name": name, "offset": offset, "type": kind })
 }

@@ -1,10 +1,10 @@
-//! The run as an MCAP recording, written frame by frame: images, disparity, poses, objects, what the map shows, and figures, in Foxglove's
+//! The run as an MCAP recording, written frame by frame: images, disparity, poses, objects, what the map shows, the planner's window, and figures, in Foxglove's
 //! schemas as JSON. Memory: one chunk of the file, and 100 bytes for each chunk before.
 
 mod messages;
 mod schemas;
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, keyframes, pictures};
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup, keyframes, pictures};
 use dynvox_core::geometry::Transform;
 use mcap::records::MessageHeader;
 use messages::Stamp;
@@ -16,8 +16,8 @@ use std::io::BufWriter;
 
 /// Name of the file in the run folder.
 pub const RECORDING_FILE: &str = "run.mcap";
-/// What the map shows is in every so many frames.
-const CLOUD_EVERY: usize = 10;
+/// What the map shows, and the planner's window, are in every so many frames.
+const MAP_EVERY: usize = 10;
 /// Poses in the trajectory at the end, at most.
 const MOST_POSES: usize = 5_000;
 
@@ -93,10 +93,16 @@ impl Recording {
         self.write(Topic::Disparity, time_ns, &messages::image(stamp, &disparity))?;
         self.write(Topic::Objects, time_ns, &messages::objects(stamp, frame.view.mapper()))?;
         self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
-        if frame.position.is_multiple_of(CLOUD_EVERY)
+        if frame.position.is_multiple_of(MAP_EVERY)
             && let Some(cloud) = frame.view.raycast(&t_world_camera).and_then(|seen| messages::cloud(stamp, seen, &setup.config.rig))
         {
             self.write(Topic::Map, time_ns, &cloud)?;
+        }
+        if frame.position.is_multiple_of(MAP_EVERY) && !frame.view.mapper().planning().is_empty() {
+            frame.view.plan(0.0);
+            if let Some(layers) = PlanningLayers::of(frame.view.mapper().planning()) {
+                self.write(Topic::Planning, time_ns, &messages::planning(stamp, &layers))?;
+            }
         }
         Ok(())
     }

@@ -21,12 +21,14 @@ pub enum Topic {
     Figures,
     /// Points of the map that the camera sees.
     Map,
+    /// The planner's window from above, where the run has one.
+    Planning,
     /// All poses, at the end.
     Trajectory,
 }
 
 /// All topics, in the order of the enumeration.
-pub const TOPICS: [Topic; 9] = [
+pub const TOPICS: [Topic; 10] = [
     Topic::Transform,
     Topic::Pose,
     Topic::Calibration,
@@ -35,6 +37,7 @@ pub const TOPICS: [Topic; 9] = [
     Topic::Objects,
     Topic::Figures,
     Topic::Map,
+    Topic::Planning,
     Topic::Trajectory,
 ];
 
@@ -49,6 +52,7 @@ impl Topic {
             Self::Objects => "/objects",
             Self::Figures => "/figures",
             Self::Map => "/map/seen",
+            Self::Planning => "/planning/grid",
             Self::Trajectory => "/trajectory",
         }
     }
@@ -62,6 +66,7 @@ impl Topic {
             Self::Objects => "foxglove.SceneUpdate",
             Self::Figures => "dynvox.FrameFigures",
             Self::Map => "foxglove.PointCloud",
+            Self::Planning => "foxglove.Grid",
             Self::Trajectory => "foxglove.PosesInFrame",
         }
     }
@@ -86,8 +91,11 @@ impl Topic {
                 "blocks_used": integer(), "tracks": integer(), "dynamic": integer(),
             }),
             Self::Map => json!({
-                "frame_id": text(), "pose": pose(), "point_stride": integer(), "data": bytes(),
-                "fields": array(&object(&json!({ "name": text(), "offset": integer(), "type": integer() }))),
+                "frame_id": text(), "pose": pose(), "point_stride": integer(), "data": bytes(), "fields": fields(),
+            }),
+            Self::Planning => json!({
+                "frame_id": text(), "pose": pose(), "column_count": integer(), "cell_size": object(&json!({ "x": number(), "y": number() })),
+                "row_stride": integer(), "cell_stride": integer(), "data": bytes(), "fields": fields(),
             }),
             Self::Trajectory => json!({ "frame_id": text(), "poses": array(&pose()) }),
         };
@@ -138,6 +146,11 @@ fn quaternion() -> Value {
 
 fn pose() -> Value {
     object(&json!({ "position": vector(), "orientation": quaternion() }))
+}
+
+/// What lies where in a point or a cell.
+fn fields() -> Value {
+    array(&object(&json!({ "name": text(), "offset": integer(), "type": integer() })))
 }
 
 fn entity() -> Value {
