@@ -26,6 +26,8 @@ const BESIDE: f64 = 0.25;
 const STEP_PX: f64 = 0.4;
 /// The same as a share of the disparity.
 const STEP_SHARE: f64 = 0.04;
+/// How much wider than the disparity the part of the image is at most that the right camera does not see, px: matching needs some pixels about each.
+const BORDER_PX: f64 = 16.0;
 /// A match decides on cells whose disparity differs from its own by less, as a share and px.
 const BLOCK_SHARE: f64 = 0.06;
 const BLOCK_PX: f64 = 0.4;
@@ -137,6 +139,7 @@ impl<'a> Lattice<'a> {
         }
         (queued > 0).then_some(())?;
         self.close(&bounds, cells);
+        self.reach_border(&bounds, cells);
         self.pixels(&bounds, cells)
     }
 
@@ -186,6 +189,21 @@ impl<'a> Lattice<'a> {
                 || (is_marked(cells, column, row.wrapping_sub(1)) && is_marked(cells, column, row + 1));
             if let Some(cell) = cells.get_mut(row * self.columns + column).filter(|cell| is_between && **cell == 0) {
                 *cell = FILLED;
+            }
+        }
+    }
+
+    /// Fills the cells between a mask and the left border where none has a disparity: the right camera does not see what is there.
+    fn reach_border(&self, bounds: &Bounds, cells: &mut [u8]) {
+        for row in bounds.top..bounds.bottom {
+            let at = |column: usize| row * self.columns + column;
+            let is_marked = |column: &usize| cells.get(at(*column)).is_some_and(|cell| *cell > 0);
+            let Some(first) = (bounds.left..bounds.right).find(is_marked) else { continue };
+            let own_px = self.disparity_px(self.pixel(first, row)).unwrap_or_default();
+            let is_unseen = (0..first).all(|column| self.disparity_px(self.pixel(column, row)).is_none());
+            if is_unseen && ((first * CELL_PX) as f64) < own_px + BORDER_PX {
+                let unseen = cells.get_mut(at(bounds.left)..at(first)).unwrap_or_default();
+                unseen.fill(FILLED);
             }
         }
     }

@@ -239,6 +239,24 @@ fn a_mask_does_not_grow_over_matches_that_do_not_move() {
 }
 
 #[test]
+fn a_mask_reaches_the_left_border_where_only_the_left_camera_sees() {
+    // A car 8 m ahead, cut by the border; so near the border that its disparity of 18.75 px is missing, and farther from it than that explains.
+    for (unseen, left) in [(24, 0), (60, 60)] {
+        let disparity = |at: usize| match (at % WIDTH, at / WIDTH) {
+            (u, _) if u < unseen => 0,
+            (u, v) if u < 100 && (30..90).contains(&v) => 4_800,
+            _ => 1_024,
+        };
+        let disparity_q8: Vec<u16> = (0..WIDTH * HEIGHT).map(disparity).collect();
+        let lattice = Lattice::new(&RIG, View::new(&disparity_q8, WIDTH, HEIGHT).unwrap());
+        let extent = groups::Extent { low: [-5.2, -0.5, 7.9], high: [-2.7, 1.0, 8.1] };
+        let mut working = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
+        let pixels = lattice.grow(&extent, None, &[], &mut working.0, &mut working.1).unwrap();
+        assert_eq!((pixels.left, pixels.left + pixels.width), (left, 100), "{pixels:?}");
+    }
+}
+
+#[test]
 fn a_masked_car_is_not_found_twice() {
     let world = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.2 };
     let mask = |frame: u32| vec![world.mask(frame)];
