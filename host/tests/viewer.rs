@@ -6,7 +6,7 @@ mod browser;
 mod run_folder;
 
 use binary::{dynvox, output_text, rig};
-use browser::{Browser, Visit, Window};
+use browser::{Visit, Window};
 use run_folder::FakeRun;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -42,9 +42,9 @@ fn viewer(folder: &Path) -> PathBuf {
 }
 
 /// What a script reports on a page of a desktop's size.
-fn visit(browser: &Browser, page: &Path, before: &str, script: &str) -> serde_json::Value {
+fn visit(page: &Path, before: &str, script: &str) -> serde_json::Value {
     let script = &[HELPERS, script].concat();
-    browser.visit(&Visit { page, part: "", window: Window::DESKTOP, before, script })
+    Visit { page, part: "", window: Window::DESKTOP, before, script }.report()
 }
 
 #[test]
@@ -65,9 +65,9 @@ fn view_writes_one_file_that_fetches_nothing_and_refuses_what_is_no_run() {
     assert!(!refused.status.success() && output_text(&refused).contains("is not a run folder"), "{}", output_text(&refused));
 }
 
+#[dynvox_needs::browser]
 #[test]
 fn the_viewer_draws_scrubs_and_toggles() {
-    let Some(browser) = Browser::find("the_viewer_draws_scrubs_and_toggles") else { return };
     let root = TempDir::new().unwrap();
     FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());
     let script = r#"
@@ -103,7 +103,7 @@ await drawn(() => turn("pointermove", 320));
 result.turned = shown().red !== before;
 report(result);
 "#;
-    let of = visit(&browser, &viewer(root.path()), "", script);
+    let of = visit(&viewer(root.path()), "", script);
     assert!(of["share"].as_f64().unwrap() > 0.1, "the map is drawn: {of}");
     assert_eq!((&of["first"], &of["last"]), (&"0".into(), &"22".into()), "{of}");
     assert!(of["caption"].as_str().unwrap().ends_with("frame 0") && of["lastCaption"].as_str().unwrap().ends_with("frame 22"), "{of}");
@@ -117,9 +117,9 @@ report(result);
     }
 }
 
+#[dynvox_needs::browser]
 #[test]
 fn without_a_graphics_card_motion_is_coarse_and_rest_is_whole() {
-    let Some(browser) = Browser::find("without_a_graphics_card_motion_is_coarse_and_rest_is_whole") else { return };
     let root = TempDir::new().unwrap();
     FakeRun { frames: 4, objects: 0, squares: 190, pictures: false }.write(root.path());
     let script = r#"
@@ -132,15 +132,15 @@ const moving = Number(data.triangles), movingShare = shown().share;
 await until(() => Number(data.triangles) > moving);
 report({ whole, moving, rest: Number(data.triangles), share, movingShare });
 "#;
-    let of = visit(&browser, &viewer(root.path()), "", script);
+    let of = visit(&viewer(root.path()), "", script);
     let triangles = |key: &str| of[key].as_f64().unwrap();
     assert!(triangles("whole") > 60_000.0 && triangles("rest") > 8.0 * triangles("moving") && triangles("moving") > 100.0, "{of}");
     assert!((triangles("share") - triangles("movingShare")).abs() < 0.1, "the same is seen: {of}");
 }
 
+#[dynvox_needs::browser]
 #[test]
 fn an_address_chooses_the_frame_and_a_phone_shows_it_without_sideways_scrolling() {
-    let Some(browser) = Browser::find("an_address_chooses_the_frame_and_a_phone_shows_it_without_sideways_scrolling") else { return };
     let root = TempDir::new().unwrap();
     FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());
     let script = r#"
@@ -148,20 +148,21 @@ report({ share: shown().share, frame: data.frame, map: layer("map").checked, wid
 "#;
     let page = viewer(root.path());
     let script = &[HELPERS, script].concat();
-    let of = browser.visit(&Visit {
+    let of = Visit {
         page: &page,
         part: "#frame=6&hide=tracks&view=follow",
         window: Window::PHONE,
         before: "",
         script,
-    });
+    }
+    .report();
     assert!(of["share"].as_f64().unwrap() > 0.05 && of["frame"] == "6" && of["map"] == true, "{of}");
     assert!(of["wide"].as_i64().unwrap() <= 0, "{of}");
 }
 
+#[dynvox_needs::browser]
 #[test]
 fn extremes_give_a_page_that_makes_sense() {
-    let Some(browser) = Browser::find("extremes_give_a_page_that_makes_sense") else { return };
     let script = r#"
 report({
   frame: data.frame, note: root.querySelector(".note").textContent, reason: root.querySelector(".reason").textContent,
@@ -171,7 +172,7 @@ report({
     let of = |run: FakeRun, before: &str| {
         let root = TempDir::new().unwrap();
         run.write(root.path());
-        visit(&browser, &viewer(root.path()), before, script)
+        visit(&viewer(root.path()), before, script)
     };
     let empty = of(FakeRun { frames: 3, objects: 0, squares: 0, pictures: false }, "");
     assert!(empty["note"] == "The map is empty" && empty["live"] == true, "{empty}");
@@ -183,12 +184,18 @@ report({
     assert!(none["live"] == false && none["reason"].as_str().unwrap().contains("no WebGL 2"), "{none}");
 }
 
-#[test]
-fn the_report_of_a_run_has_the_viewer_and_its_pictures() {
+/// A run of three frames, in `result`.
+fn finished_run() -> TempDir {
     let root = TempDir::new().unwrap();
     rig(root.path(), 3);
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--quiet"]);
     assert!(run.status.success(), "{}", output_text(&run));
+    root
+}
+
+#[test]
+fn the_report_of_a_run_has_the_viewer_and_its_pictures() {
+    let root = finished_run();
     let result = root.path().join("result");
     let report = fs::read_to_string(result.join("report.html")).unwrap();
     assert!(report.contains("id=\"dynvox-viewer\"") && report.contains("dynvox-000002_left.jpg") && !report.contains("no viewer"));
@@ -196,7 +203,12 @@ fn the_report_of_a_run_has_the_viewer_and_its_pictures() {
     assert_eq!(index, serde_json::json!({ "width": 160, "height": 64, "frames": [0, 1, 2] }));
     let left = image::open(result.join("pictures/000001_left.jpg")).unwrap();
     assert_eq!((left.width(), left.height()), (160, 64));
-    let Some(browser) = Browser::find("the_report_of_a_run_has_the_viewer_and_its_pictures") else { return };
-    let of = visit(&browser, &result.join("report.html"), "", "report({ share: shown().share });");
+}
+
+#[dynvox_needs::browser]
+#[test]
+fn the_viewer_in_the_report_of_a_run_draws() {
+    let root = finished_run();
+    let of = visit(&root.path().join("result/report.html"), "", "report({ share: shown().share });");
     assert!(of["share"].as_f64().unwrap() > 0.01, "{of}");
 }

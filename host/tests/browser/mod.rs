@@ -1,4 +1,4 @@
-//! A browser without a window, where one is installed.
+//! A browser without a window: for tests that have `#[dynvox_needs::browser]`.
 
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
@@ -8,8 +8,6 @@ use std::sync::mpsc;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// Names of the program.
-const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 /// The longest that a page may take, on a machine that does other work too.
 const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -34,9 +32,6 @@ pub struct Visit<'a> {
     pub script: &'a str,
 }
 
-/// The program.
-pub struct Browser(&'static str);
-
 /// A process that ends with the test.
 struct Running(Child);
 
@@ -48,24 +43,13 @@ impl Drop for Running {
     }
 }
 
-impl Browser {
-    /// The browser; without one a line that says which test is skipped.
-    pub fn find(test: &str) -> Option<Self> {
-        let is_there = |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
-        let found = NAMES.into_iter().find(is_there);
-        if found.is_none() {
-            eprintln!("skipped: {test} (no Chromium is installed)");
-        }
-        found.map(Self)
-    }
-
+impl Visit<'_> {
     /// Opens a page from disk and returns what the visit's script hands to `report`. An error on the console fails the test.
-    pub fn visit(&self, visit: &Visit<'_>) -> Value {
-        let Window(width, height) = visit.window;
-        let part = visit.part;
+    pub fn report(&self) -> Value {
+        let Window(width, height) = self.window;
         let profile = TempDir::new().unwrap();
-        let url = format!("file://{}{part}", visit.page().display());
-        let mut command = Command::new(self.0);
+        let url = format!("file://{}{}", self.page().display(), self.part);
+        let mut command = Command::new(dynvox_needs::browser_program!());
         command.args(["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]);
         command.args(["--hide-scrollbars", "--enable-logging=stderr", "--v=0", &format!("--window-size={width},{height}")]);
         command.arg(format!("--user-data-dir={}", profile.path().display())).arg(url);
@@ -82,14 +66,7 @@ impl Browser {
         let text = line.split_once("\"RESULT ").unwrap_or_else(|| panic!("an error on the console: {line}")).1;
         serde_json::from_str(text.rsplit_once("\", source:").expect("a line of the console").0).unwrap()
     }
-}
 
-/// Whether a line of the log is the page's: what the driver remarks about speed is not.
-fn is_of_the_page(line: &str) -> bool {
-    line.contains(":CONSOLE:") && !line.contains("GL Driver Message")
-}
-
-impl Visit<'_> {
     /// A copy of the page, next to it, that runs the scripts.
     fn page(&self) -> PathBuf {
         let html = std::fs::read_to_string(self.page).unwrap();
@@ -100,4 +77,9 @@ impl Visit<'_> {
         std::fs::write(&copy, format!("{head}<body><script>{}{late}</script>{body}", self.before)).unwrap();
         std::fs::canonicalize(copy).unwrap()
     }
+}
+
+/// Whether a line of the log is the page's: what the driver remarks about speed is not.
+fn is_of_the_page(line: &str) -> bool {
+    line.contains(":CONSOLE:") && !line.contains("GL Driver Message")
 }

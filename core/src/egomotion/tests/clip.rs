@@ -28,26 +28,25 @@ struct Errors {
 }
 
 fn root() -> PathBuf {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    std::env::var_os("DYNVOX_DATA").map_or_else(beside, PathBuf::from).join("kitti-odometry")
+    Path::new(dynvox_needs::data_folder!()).join("kitti-odometry")
 }
 
-fn numbers(path: &Path) -> Option<Vec<f64>> {
-    Some(fs::read_to_string(path).ok()?.split_whitespace().filter_map(|word| word.parse().ok()).collect())
+fn numbers(path: &Path) -> Vec<f64> {
+    fs::read_to_string(path).unwrap().split_whitespace().filter_map(|word| word.parse().ok()).collect()
 }
 
-fn rig(path: &Path) -> Option<StereoRig> {
-    let values = numbers(path)?;
-    let (p0, p1) = (values.get(..12)?, values.get(12..24)?);
-    Some(StereoRig {
+fn rig(path: &Path) -> StereoRig {
+    let values = numbers(path);
+    let (p0, p1) = (&values[..12], &values[12..24]);
+    StereoRig {
         focal_px: p0[0],
         center_u_px: p0[2],
         center_v_px: p0[6],
         baseline_m: -p1[3] / p1[0],
-    })
+    }
 }
 
-fn poses(path: &Path) -> Option<Vec<Matrix4<f64>>> {
+fn poses(path: &Path) -> Vec<Matrix4<f64>> {
     let matrix = |row: &[f64]| {
         let mut matrix = Matrix4::identity();
         for (i, value) in row.iter().enumerate() {
@@ -55,7 +54,7 @@ fn poses(path: &Path) -> Option<Vec<Matrix4<f64>>> {
         }
         matrix
     };
-    Some(numbers(path)?.chunks_exact(12).map(matrix).collect())
+    numbers(path).chunks_exact(12).map(matrix).collect()
 }
 
 fn grey(folder: &Path, frame: usize) -> Option<(Vec<u8>, usize, usize)> {
@@ -108,10 +107,10 @@ fn relative_errors(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors 
     }
 }
 
-/// Runs a clip and returns its trajectory; `None` where the clip is missing.
-fn run(name: &str) -> Option<Vec<Matrix4<f64>>> {
+/// Runs a clip and returns its trajectory.
+fn run(name: &str) -> Vec<Matrix4<f64>> {
     let folder = root().join("sequences").join(name);
-    let rig = rig(&folder.join("calib.txt"))?;
+    let rig = rig(&folder.join("calib.txt"));
     let capacity = Capacity::ONBOARD;
     let bytes = FlowMatcher::bytes(&capacity) + Estimator::bytes(&capacity);
     let mut slab: Vec<[u64; 8]> = vec![[0; 8]; bytes / 64 + 1];
@@ -125,7 +124,7 @@ fn run(name: &str) -> Option<Vec<Matrix4<f64>>> {
     let (mut matching_ms, mut moving_ms) = (0.0, 0.0);
     for frame in 0.. {
         let (Some(left), Some(right)) = (grey(&folder.join("image_0"), frame), grey(&folder.join("image_1"), frame)) else { break };
-        let (left_view, right_view) = (View::new(&left.0, left.1, left.2)?, View::new(&right.0, right.1, right.2)?);
+        let (left_view, right_view) = (View::new(&left.0, left.1, left.2).unwrap(), View::new(&right.0, right.1, right.2).unwrap());
         let begin = cpu_ms();
         let report = matcher.push(&SceneFlowConfig::default(), left_view, right_view, &Serial);
         let matched = cpu_ms();
@@ -139,7 +138,8 @@ fn run(name: &str) -> Option<Vec<Matrix4<f64>>> {
     }
     let mean = |total: f64| total / trajectory.len() as f64;
     println!("{name}: scene flow {:.1} ms, egomotion {:.1} ms a frame", mean(matching_ms), mean(moving_ms));
-    (trajectory.len() > 1).then_some(trajectory)
+    assert!(trajectory.len() > 1, "{name} has images");
+    trajectory
 }
 
 fn print_errors(what: &str, errors: &Errors) {
@@ -156,34 +156,30 @@ fn cpu_ms() -> f64 {
     times.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).map_or(0.0, |ns| ns * 1e-6)
 }
 
-fn truth(name: &str) -> Option<Vec<Matrix4<f64>>> {
+fn truth(name: &str) -> Vec<Matrix4<f64>> {
     poses(&root().join("poses").join(name))
 }
 
+#[dynvox_needs::clips("kitti-odometry/sequences/06", "kitti-odometry/poses/06.txt")]
 #[test]
 fn tracks_sequence_06_as_well_as_the_best_stereo_odometry_measured() {
-    let Some(trajectory) = run("06") else {
-        println!("skipped: kitti-odometry/06");
-        return;
-    };
-    let errors = relative_errors(&truth("06.txt").unwrap(), &trajectory);
+    let trajectory = run("06");
+    let errors = relative_errors(&truth("06.txt"), &trajectory);
     print_errors("06", &errors);
     assert!(errors.translation_percent <= 0.80);
     assert!(errors.rotation_deg_per_m <= 0.025);
     assert!(errors.frame_rms_m <= 0.010);
 }
 
+#[dynvox_needs::clips("kitti-odometry/sequences/r1405", "kitti-odometry/poses/r1405.txt", "kitti-odometry/poses/r1405.vo.txt")]
 #[test]
 fn tracks_a_residential_street() {
-    let Some(trajectory) = run("r1405") else {
-        println!("skipped: kitti-odometry/r1405");
-        return;
-    };
-    let errors = relative_errors(&truth("r1405.txt").unwrap(), &trajectory);
+    let trajectory = run("r1405");
+    let errors = relative_errors(&truth("r1405.txt"), &trajectory);
     print_errors("r1405 against GPS and inertial unit", &errors);
     // That truth is good over the clip and noisy from frame to frame.
     assert!(errors.translation_percent <= 1.5 && errors.rotation_deg_per_m <= 0.025);
-    let errors = relative_errors(&truth("r1405.vo.txt").unwrap(), &trajectory);
+    let errors = relative_errors(&truth("r1405.vo.txt"), &trajectory);
     print_errors("r1405 against another stereo odometry", &errors);
     assert!(errors.translation_percent <= 0.5 && errors.rotation_deg_per_m <= 0.01 && errors.frame_rms_m <= 0.0075);
 }

@@ -1,23 +1,24 @@
-//! Real pairs against their truth; skipped where the clips are missing.
+//! Real pairs against their truth.
 
 use super::*;
-use std::{format, path::PathBuf, println};
+use image::DynamicImage;
+use std::{format, path::Path, println};
 
-fn data() -> PathBuf {
-    std::env::var_os("DYNVOX_DATA").map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")), PathBuf::from)
+fn read(path: &str) -> DynamicImage {
+    image::open(Path::new(dynvox_needs::data_folder!()).join(path)).unwrap()
 }
 
-pub(super) fn grey(path: &str) -> Option<Grey> {
-    let image = image::open(data().join(path)).ok()?.into_luma8();
-    Some(Grey {
+fn grey(path: &str) -> Grey {
+    let image = read(path).into_luma8();
+    Grey {
         width: image.width() as usize,
         height: image.height() as usize,
         pixels: image.into_raw(),
-    })
+    }
 }
 
-fn deep(path: &str) -> Option<Vec<u16>> {
-    Some(image::open(data().join(path)).ok()?.into_luma16().into_raw())
+fn deep(path: &str) -> Vec<u16> {
+    read(path).into_luma16().into_raw()
 }
 
 /// Share of pixels with truth and estimate that are off by more than 3 px; share of truth covered; median and mean |error| of those within 3 px.
@@ -30,11 +31,11 @@ fn score(estimate: &[u16], truth: &[u16]) -> [f64; 4] {
     [100.0 * (off.len() - good) as f64 / off.len() as f64, 100.0 * off.len() as f64 / known as f64, f64::from(off[good / 2]) / 256.0, mean]
 }
 
-fn kitti_2012(config: &StereoConfig, name: &str) -> Option<[f64; 4]> {
+fn kitti_2012(config: &StereoConfig, name: &str) -> [f64; 4] {
     let mut sums = [0.0; 4];
     for pair in ["000027", "000151", "000174"] {
         let path = |folder: &str| format!("kitti-stereo-2012/training/{folder}/{pair}_10.png");
-        let (left, right, truth) = (grey(&path("image_0"))?, grey(&path("image_1"))?, deep(&path("disp_noc"))?);
+        let (left, right, truth) = (grey(&path("image_0")), grey(&path("image_1")), deep(&path("disp_noc")));
         let (report, estimate) = disparity(config, &left, &right, &Serial);
         let scores = score(&estimate, &truth);
         println!(
@@ -46,32 +47,28 @@ fn kitti_2012(config: &StereoConfig, name: &str) -> Option<[f64; 4]> {
         }
     }
     println!("{name} mean: {:.2} % off at {:.2} % covered, median {:.3} px, mean {:.3} px", sums[0], sums[1], sums[2], sums[3]);
-    Some(sums)
+    sums
 }
 
+#[dynvox_needs::clips("kitti-stereo-2012/training")]
 #[test]
 fn both_presets_are_as_true_as_published_on_kitti_2012() {
     let figures = [("dynslam", StereoConfig::dynslam(), 5.5, 87.0), ("robotics", StereoConfig::robotics(), 4.3, 83.0)];
     for (name, config, off, covered) in figures {
-        let Some(scores) = kitti_2012(&config, name) else {
-            println!("skipped: both_presets_are_as_true_as_published_on_kitti_2012");
-            return;
-        };
+        let scores = kitti_2012(&config, name);
         assert!(scores[0] <= off, "{name}: {:.2} % off", scores[0]);
         assert!(scores[1] >= covered, "{name}: {:.2} % covered", scores[1]);
     }
 }
 
 /// Another implementation's disparities of the same pairs: not truth, but a matcher that disagrees with them everywhere is wrong.
+#[dynvox_needs::clips("kitti-odometry/sequences/06/disp_elas")]
 #[test]
 fn agrees_with_the_published_implementation_where_both_see() {
     let clip = |folder: &str, frame: usize| format!("kitti-odometry/sequences/06/{folder}/{frame:06}.png");
     for frame in [0, 25, 50] {
-        let (Some(left), Some(right)) = (grey(&clip("image_0", frame)), grey(&clip("image_1", frame))) else {
-            println!("skipped: agrees_with_the_published_implementation_where_both_see");
-            return;
-        };
-        let published = deep(&clip("disp_elas", frame)).unwrap();
+        let [left, right] = ["image_0", "image_1"].map(|camera| grey(&clip(camera, frame)));
+        let published = deep(&clip("disp_elas", frame));
         let (report, estimate) = disparity(&StereoConfig::dynslam(), &left, &right, &Serial);
         let [off, covered, median, _] = score(&estimate, &published);
         println!(

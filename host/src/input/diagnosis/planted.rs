@@ -172,11 +172,11 @@ fn faults_planted_into_the_street_are_named() {
     each_fault_is_named(&StreetFrames::new(config).unwrap());
 }
 
+#[dynvox_needs::clips("kitti-odometry/sequences/06")]
 #[test]
 fn faults_planted_into_a_real_clip_are_named() {
-    let Some(path) = data("kitti-odometry") else { return };
     let options = OpenOptions { sequence: Some("06".to_owned()), ..OpenOptions::default() };
-    each_fault_is_named(open(&path, &options).unwrap().as_ref());
+    each_fault_is_named(open(&data("kitti-odometry"), &options).unwrap().as_ref());
 }
 
 #[test]

@@ -91,16 +91,18 @@ fn shuffled_frames_are_out_of_order_and_a_gap_is_a_jump() {
     assert!(order::check(&thumbnails(&[5.0; 16]), 0).is_none(), "a standing camera");
 }
 
-/// A folder of the clips; `None`, and a line that says so, where it is not there.
-pub fn data(path: &str) -> Option<PathBuf> {
-    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let path = std::env::var_os("DYNVOX_DATA").map_or_else(beside, PathBuf::from).join(path);
-    if !path.is_dir() {
-        eprintln!("skipped: {} is missing", path.display());
-    }
-    path.is_dir().then_some(path)
+/// A folder of the clips.
+pub fn data(path: &str) -> PathBuf {
+    PathBuf::from(dynvox_needs::data_folder!()).join(path)
 }
 
+#[dynvox_needs::clips(
+    "kitti-odometry/sequences/06",
+    "kitti-odometry/sequences/r1405",
+    "kitti-tracking/training/image_02/0003",
+    "kitti-tracking/training/image_02/0005",
+    "kitti-raw/2011_09_26/2011_09_26_drive_1405_extract"
+)]
 #[test]
 fn real_clips_give_no_false_alarm() {
     let clips: [(&str, Option<&str>); 5] = [
@@ -111,17 +113,17 @@ fn real_clips_give_no_false_alarm() {
         ("kitti-raw/2011_09_26/2011_09_26_drive_1405_extract", None),
     ];
     for (path, sequence) in clips {
-        let Some(path) = data(path) else { continue };
         let options = OpenOptions { sequence: sequence.map(str::to_owned), ..OpenOptions::default() };
-        let source = open(&path, &options).unwrap();
+        let source = open(&data(path), &options).unwrap();
         let findings = examine(source.as_ref(), &(0..source.len()).collect::<Vec<_>>()).unwrap();
         assert!(findings.is_empty(), "{sequence:?}: {findings:?}");
     }
 }
 
+#[dynvox_needs::clips("kitti-stereo-2012/training")]
 #[test]
 fn single_real_pairs_give_no_false_alarm() {
-    let Some(folder) = data("kitti-stereo-2012/training") else { return };
+    let folder = data("kitti-stereo-2012/training");
     for name in ["000027_10.png", "000151_10.png", "000174_10.png"] {
         let [left, right] = ["image_0", "image_1"].map(|camera| read_picture(&folder.join(camera).join(name)).unwrap().to_8_bit(None).grey);
         let findings = diagnose(&[Pair::of(&left, &right)]);

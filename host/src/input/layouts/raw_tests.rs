@@ -7,23 +7,16 @@ use dynvox_core::{
     memory::{Carver, SLAB_ALIGN},
     rectify::{Pair, RectifiedImages, Rectifier},
 };
-use std::path::PathBuf;
+use std::path::Path;
 
 /// Position in r1405 of the first raw frame.
 const FIRST: usize = 45;
 
-fn data(path: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data").join(path);
-    path.is_dir().then_some(path)
-}
-
+#[dynvox_needs::clips("kitti-raw/2011_09_26/2011_09_26_drive_1405_extract", "kitti-odometry/sequences/r1405")]
 #[test]
 fn kitti_raw_rectifies_to_the_pictures_opencv_makes_of_it() {
-    let (Some(raw), Some(rectified)) = (data("kitti-raw/2011_09_26/2011_09_26_drive_1405_extract"), data("kitti-odometry/sequences/r1405"))
-    else {
-        eprintln!("left out: the clip is not beside the checkout");
-        return;
-    };
+    let [raw, rectified] = ["kitti-raw/2011_09_26/2011_09_26_drive_1405_extract", "kitti-odometry/sequences/r1405"]
+        .map(|path| Path::new(dynvox_needs::data_folder!()).join(path));
     let source = open(&raw, &OpenOptions::default()).unwrap();
     let rectification = *source.rectification().expect("the calibration is found by itself");
     assert_eq!((source.len(), source.size()), (36, (1242, 375)));

@@ -367,16 +367,18 @@ fn sources_are_named_on_the_command_line() {
     assert_eq!(["auto", "motion", "none", "files:a", "exact"].map(finds_motion), [Some(true), Some(true), Some(false), None, None]);
 }
 
+#[dynvox_needs::clips(
+    "kitti-odometry/sequences/06/instances",
+    "kitti-odometry/sequences/r1405/instances",
+    "kitti-tracking/training/image_02/0003",
+    "kitti-tracking/training/image_02/0005"
+)]
 #[test]
 fn masks_of_the_real_clips_are_read_whole() {
-    let data =
-        std::env::var_os("DYNVOX_DATA").map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
+    let data = Path::new(dynvox_needs::data_folder!());
     let clips = [("kitti-odometry", "06"), ("kitti-odometry", "r1405"), ("kitti-tracking", "0003"), ("kitti-tracking", "0005")];
     for (root, sequence) in clips {
-        let Ok(clip) = input::open(&data.join(root), &OpenOptions { sequence: Some(sequence.into()), ..OpenOptions::default() }) else {
-            println!("skipped: masks_of_the_real_clips_are_read_whole {root} {sequence}");
-            continue;
-        };
+        let clip = input::open(&data.join(root), &OpenOptions { sequence: Some(sequence.into()), ..OpenOptions::default() }).unwrap();
         let clip = attach(clip, &MaskChoice::Auto, EVERY).unwrap();
         let frames: Vec<FrameMasks> = [0, clip.len() / 2, clip.len() - 1].iter().map(|&at| clip.frame(at).unwrap().masks).collect();
         assert!(frames.iter().all(|masks| masks.instances.len() > 1 && masks.refusals == MaskRefusals::default()), "{root} {sequence}");

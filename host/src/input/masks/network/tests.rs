@@ -3,7 +3,7 @@
 use super::model::Output;
 use super::*;
 use crate::input::masks::boxes::{BoxMasks, FrameDisparity};
-use crate::input::{self, FrameSource, OpenOptions};
+use crate::input::{self, OpenOptions};
 use dynvox_core::masks::PixelBox;
 use tempfile::TempDir;
 
@@ -205,22 +205,14 @@ fn what_is_no_network_is_refused_with_what_to_do() {
     assert!(refusal(&root, "net.toml").contains("does not name its network"));
 }
 
-/// The clips' networks, and a clip.
-fn clips(model: &str) -> Option<(PathBuf, Box<dyn FrameSource>)> {
-    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let path = data.join("models").join(model);
-    let options = OpenOptions { sequence: Some("0003".to_owned()), ..OpenOptions::default() };
-    let found = path.is_file().then(|| input::open(&data.join("kitti-tracking"), &options).ok()).flatten();
-    if found.is_none() {
-        eprintln!("skipped: {model}");
-    }
-    found.map(|dataset| (path, dataset))
-}
-
+#[dynvox_needs::clips("models/yolox_nano.onnx", "models/deeplab_cityscapes_513x161.onnx", "kitti-tracking/training/image_02/0003")]
 #[test]
 fn the_clips_networks_find_the_overtaking_car_in_the_same_pixels_twice() {
+    let data = Path::new(dynvox_needs::data_folder!());
+    let options = OpenOptions { sequence: Some("0003".to_owned()), ..OpenOptions::default() };
+    let dataset = input::open(&data.join("kitti-tracking"), &options).unwrap();
     for model in ["yolox_nano.onnx", "deeplab_cityscapes_513x161.onnx"] {
-        let Some((path, dataset)) = clips(model) else { return };
+        let path = data.join("models").join(model);
         let images = dataset.frame(10).unwrap();
         let masks = || {
             let source = BoxMasks::of_pictures(Networks::open(std::slice::from_ref(&path)).unwrap(), dataset.as_ref()).unwrap();

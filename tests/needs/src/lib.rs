@@ -1,0 +1,96 @@
+//! Marks tests that need what a checkout does not hold. Where it is missing when they are compiled, the test runner shows them as ignored,
+//! with the reason: a test that did not run never passes.
+//!
+//! Clips are looked for in `DYNVOX_DATA`, an absolute path, else in `../shared/data` next to the checkout. A browser installed later is
+//! noticed when this crate is compiled again: `touch tests/needs/build.rs`.
+
+use proc_macro::{TokenStream, TokenTree};
+use std::path::{Path, PathBuf};
+
+/// Names of the browser, the first one found is taken.
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+/// Where the clips are for the crate that is being compiled, a folder of the repository.
+fn data() -> PathBuf {
+    let krate = || PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the crate's folder"));
+    std::env::var_os("DYNVOX_DATA").map_or_else(|| krate().join("../../shared/data"), PathBuf::from)
+}
+
+/// Why a test that needs these paths cannot run.
+fn missing(data: &Path, paths: &[String]) -> Option<String> {
+    let missing: Vec<&str> = paths.iter().filter(|path| !data.join(path).exists()).map(String::as_str).collect();
+    (!missing.is_empty()).then(|| format!("no {} in DYNVOX_DATA or ../shared/data", missing.join(", ")))
+}
+
+/// The first of the programs that is in one of the folders.
+fn program<'a>(folders: &[PathBuf], names: &[&'a str]) -> Option<&'a str> {
+    names.iter().copied().find(|name| folders.iter().any(|folder| folder.join(name).is_file()))
+}
+
+fn browser_found() -> Option<&'static str> {
+    let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
+    program(&folders, &BROWSERS)
+}
+
+/// The test, ignored where there is a reason.
+fn ignored(reason: Option<String>, test: TokenStream) -> TokenStream {
+    let mut marked: TokenStream = reason.map(|reason| format!("#[ignore = {reason:?}]").parse().expect("an attribute")).unwrap_or_default();
+    marked.extend(test);
+    marked
+}
+
+/// The content of string literals between commas.
+fn strings(tokens: TokenStream) -> Vec<String> {
+    let literal = |token: TokenTree| match token {
+        TokenTree::Literal(literal) => Some(literal.to_string().trim_matches('"').to_owned()),
+        _ => None,
+    };
+    tokens.into_iter().filter_map(literal).collect()
+}
+
+/// `#[clips("kitti-odometry/sequences/06", "...")]` above `#[test]`: the test needs all of these files and folders of the clips.
+#[proc_macro_attribute]
+pub fn clips(paths: TokenStream, test: TokenStream) -> TokenStream {
+    let paths = strings(paths);
+    assert!(!paths.is_empty(), "name what the test needs");
+    ignored(missing(&data(), &paths), test)
+}
+
+/// `#[browser]` above `#[test]`: the test needs Chromium or Chrome.
+#[proc_macro_attribute]
+pub fn browser(_: TokenStream, test: TokenStream) -> TokenStream {
+    ignored(browser_found().is_none().then(|| "no Chromium is installed".to_owned()), test)
+}
+
+/// `data_folder!()`: the folder of the clips, a string literal.
+#[proc_macro]
+pub fn data_folder(_: TokenStream) -> TokenStream {
+    format!("{:?}", data().to_string_lossy()).parse().expect("a literal")
+}
+
+/// `browser_program!()`: the browser's name, a string literal.
+#[proc_macro]
+pub fn browser_program(_: TokenStream) -> TokenStream {
+    format!("{:?}", browser_found().unwrap_or(BROWSERS[0])).parse().expect("a literal")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_named_and_what_is_there_is_not() {
+        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let of = |paths: &[&str]| missing(here, &paths.iter().map(|&path| path.to_owned()).collect::<Vec<_>>());
+        assert_eq!(of(&["src/lib.rs", "src"]), None);
+        assert_eq!(of(&["src", "none", "neither"]).unwrap(), "no none, neither in DYNVOX_DATA or ../shared/data");
+    }
+
+    #[test]
+    fn the_first_program_that_is_there_is_taken() {
+        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let folders = [here.join("nowhere"), here.to_owned()];
+        assert_eq!(program(&folders, &["none", "build.rs", "Cargo.toml"]), Some("build.rs"));
+        assert_eq!(program(&folders, &["none", "src"]), None, "a folder is no program");
+    }
+}
