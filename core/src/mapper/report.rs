@@ -156,3 +156,6 @@ impl Report {
         flow.left.dropped + flow.right.dropped + flow.sparse.dropped + flow.dense.dropped
     }
 }
+
+#[cfg(test)]
+mod tests;
