@@ -1,0 +1,112 @@
+//! SIGKILL at random moments of runs that stream blocks to disk and meet cars, also while they resume: the finished run equals the one never killed.
+//!
+//! `DYNVOX_KILL_TRIALS` says how many runs are killed; every second one is killed again while it resumes.
+#![allow(missing_docs)]
+#![cfg(unix)]
+
+mod binary;
+mod same_run;
+
+use binary::{dynvox, names, output_text};
+use dynvox_core::random::Random;
+use same_run::{assert_same, summary};
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Runs that are killed where the environment does not say.
+const TRIALS: u32 = 4;
+/// A small street with traffic, found by exact masks, whose map outgrows its pool.
+const STREET: [&str; 17] = [
+    "run",
+    "--profile",
+    "tiny",
+    "--set",
+    "street.width=192",
+    "--set",
+    "street.height=64",
+    "--set",
+    "street.frames=16",
+    "--set",
+    "volume.voxel_size_m=0.07",
+    "--set",
+    "volume.prune_lag=4",
+    "--instances",
+    "exact",
+    "--threads",
+    "1",
+];
+
+/// What became of the killed runs.
+#[derive(Debug, Default)]
+struct Counts {
+    /// Killed before their end.
+    killed: u32,
+    /// Of these, killed again before the end of their resumption.
+    killed_again: u32,
+    /// Had no snapshot yet, and were started again.
+    started_again: u32,
+}
+
+/// Starts the binary and kills it after a while. Whether the kill ended it.
+fn killed_after(root: &Path, args: &[&str], delay: Duration) -> bool {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
+        .args(args)
+        .current_dir(root)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(delay);
+    // SIGKILL: the run cannot clean up.
+    run.kill().unwrap();
+    run.wait().unwrap().signal().is_some()
+}
+
+/// Resumes the killed run, or starts it again where it had no snapshot, until it is complete.
+fn complete(root: &Path, start: &[&str], counts: &mut Counts) {
+    let resumed = dynvox(root, &["run", "--resume", "killed", "--quiet"]);
+    if !resumed.status.success() {
+        let text = output_text(&resumed);
+        assert!(text.contains("there is no such run") || text.contains("it was interrupted before its first snapshot"), "{text}");
+        counts.started_again += 1;
+        let again = dynvox(root, start);
+        assert!(again.status.success(), "{}", output_text(&again));
+    }
+}
+
+#[test]
+fn runs_killed_at_any_moment_equal_the_run_never_killed() {
+    let trials = std::env::var("DYNVOX_KILL_TRIALS").ok().and_then(|text| text.parse().ok()).unwrap_or(TRIALS);
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    let begin = Instant::now();
+    let args = |out: &'static str| [&STREET[..], &["--snapshot-every", "2", "--quiet", "--out", out]].concat();
+    assert!(dynvox(root, &args("whole")).status.success());
+    let longest = begin.elapsed();
+    let of = summary(&root.join("whole"));
+    assert!(of["evict"]["out"].as_u64() > Some(0) && of["evict"]["back"].as_u64() > Some(0), "{of}");
+    assert!(of["objects"].as_array().unwrap().len() > 1, "{of}");
+    let (mut random, mut counts) = (Random::new(17), Counts::default());
+    let start = args("killed");
+    let mut delay = || longest * random.below(1_000) / 1_000;
+    while counts.killed < trials || counts.killed_again < trials / 2 {
+        if !killed_after(root, &start, delay()) {
+            std::fs::remove_dir_all(root.join("killed")).unwrap();
+            continue;
+        }
+        counts.killed += 1;
+        if counts.killed_again < counts.killed / 2 {
+            counts.killed_again += u32::from(killed_after(root, &["run", "--resume", "killed", "--quiet"], delay()));
+        }
+        if !root.join("killed").exists() {
+            complete(root, &start, &mut counts);
+        }
+        assert_same(root, "whole", "killed");
+        std::fs::remove_dir_all(root.join("killed")).unwrap();
+        assert_eq!(names(root), ["whole"], "nothing is left over");
+        println!("{counts:?}");
+    }
+}
