@@ -66,4 +66,4 @@ macro_rules! targets {
         }
     };
 }
-targets!(calibration, poses, times, recording, pictures, depth, masks, store, stream, clip, snapshot, settings);
+targets!(calibration, poses, times, recording, pictures, depth, masks, store, stream, clip, snapshot, settings, calls);

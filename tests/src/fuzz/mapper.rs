@@ -8,7 +8,7 @@ use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame};
 use crate::HeapSlab;
 
 /// Bounds small enough for thousands of mappers a second.
-const CAPACITY: Capacity = Capacity {
+pub const CAPACITY: Capacity = Capacity {
     image_width: 64,
     image_height: 48,
     features: 100,

@@ -1,9 +1,10 @@
-//! Everything that reads bytes from outside, as fuzz targets: each takes any bytes and may refuse them, but neither panics nor hangs nor takes
+//! Everything that reads bytes from outside, and the C interface, as fuzz targets: each takes any bytes and may refuse them, but neither panics nor hangs nor takes
 //! memory that the bytes do not pay for.
 //!
 //! The same targets run three ways: as seeded tests (`cargo test --test fuzz`, a fixed number of mutations of valid inputs), for a given time
 //! (`DYNVOX_FUZZ_SECONDS=1800 cargo test --release --test fuzz`), and under cargo-fuzz with coverage (`tests/fuzz`).
 
+mod calls;
 mod files;
 mod mapper;
 mod mutate;
@@ -23,7 +24,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 12] = [
+pub const TARGETS: [Target; 13] = [
     Target { name: "calibration", seeds: seeds::calibrations, run: files::calibration },
     Target { name: "poses", seeds: seeds::poses, run: files::poses },
     Target { name: "times", seeds: seeds::times, run: files::times },
@@ -36,6 +37,7 @@ pub const TARGETS: [Target; 12] = [
     Target { name: "clip", seeds: seeds::clip, run: mapper::clip },
     Target { name: "snapshot", seeds: mapper::snapshots, run: mapper::snapshot },
     Target { name: "settings", seeds: seeds::settings, run: mapper::settings },
+    Target { name: "calls", seeds: calls::programs, run: calls::calls },
 ];
 
 /// Hands bytes to the target of a name.
