@@ -24,6 +24,7 @@ fn a_run_leaves_its_folder_and_json_alone_on_standard_output() {
     }
     assert!(summary["stages"]["stereo"]["cpu_median_ms"].as_f64().unwrap() > 0.0);
     let files = [
+        "blocks.csv",
         "capacity.toml",
         "config.toml",
         "frames.csv",

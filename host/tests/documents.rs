@@ -129,9 +129,14 @@ fn every_file_key_and_column_of_a_run_folder_is_on_its_page() {
     keys("", &summary, &mut found);
     let missing: Vec<_> = found.iter().filter(|key| !is_documented(key, &documented)).collect();
     assert!(missing.is_empty() && found.len() > 60, "keys of summary.json that no line describes: {missing:?}");
-    for (file, heading) in
-        [("frames.csv", "`frames.csv`"), ("tracks.csv", "`tracks.csv`"), ("tracks_truth.csv", "`tracks.csv`"), ("lidar.csv", "`lidar.csv`")]
-    {
+    for (file, heading) in [
+        ("frames.csv", "`frames.csv`"),
+        ("tracks.csv", "`tracks.csv`"),
+        ("tracks_truth.csv", "`tracks.csv`"),
+        ("lidar.csv", "`lidar.csv`"),
+        ("surface_errors.csv", "`surface_errors.csv`"),
+        ("blocks.csv", "`surface_errors.csv`"),
+    ] {
         let table = fs::read_to_string(folder.join(file)).unwrap();
         let columns: Vec<&str> = table.lines().next().unwrap().split(',').collect();
         assert_eq!(undocumented(columns, &names(section(&page, heading))), Vec::<&str>::new(), "columns of {file}");

@@ -71,7 +71,7 @@ fn a_run_killed_three_times_equals_the_uninterrupted_run() {
         .and_then(|mut file| std::io::Write::write_all(&mut file, &[7; 99]))
         .unwrap();
     // Rows that came after it, the last one torn.
-    for table in ["frames.csv", "tracks.csv", "trajectory_kitti.txt", "trajectory_tum.txt"] {
+    for table in ["blocks.csv", "frames.csv", "tracks.csv", "trajectory_kitti.txt", "trajectory_tum.txt"] {
         let file = fs::OpenOptions::new().append(true).open(partial.join(table));
         file.and_then(|mut file| std::io::Write::write_all(&mut file, b"8,0.8\n9,0.")).unwrap();
     }
@@ -175,7 +175,7 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
         bytes
     };
     refused(b"P5 3 1 255", "is not a snapshot of a run");
-    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 5");
+    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 6");
     for at in [15, 20, 30, 5_000, whole.len() / 2, whole.len() - 1] {
         refused(&changed(at, !whole[at]), "run.snapshot is damaged");
     }
@@ -186,7 +186,7 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
     assert_refused(&root, "map.blocks is missing");
     fs::rename(path("blocks"), &blocks).unwrap();
     assert_refused_with(&root, "out/it/map.blocks", b"dynvox", "map.blocks is not as the run left it");
-    for table in ["frames.csv", "tracks.csv", "trajectory_tum.txt"] {
+    for table in ["blocks.csv", "frames.csv", "tracks.csv", "trajectory_tum.txt"] {
         let known = fs::read(path(&format!("out/it/{table}"))).unwrap();
         if known.is_empty() {
             continue;

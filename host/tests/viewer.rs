@@ -84,6 +84,13 @@ result.left = root.querySelector("canvas.left").width;
 const plain = shown().red;
 await toggle("swept");
 result.swept = shown().red !== plain;
+for (const name of ["pruned", "planning"]) {
+  const without = shown().red;
+  await toggle(name);
+  result[name] = shown().red !== without;
+  await toggle(name);
+}
+result.prunedName = layer("pruned").parentElement.textContent.trim();
 await toggle("map");
 result.objects = Number(data.triangles);
 await toggle("later");
@@ -91,9 +98,13 @@ result.now = Number(data.triangles);
 await toggle("map");
 result.back = Number(data.triangles);
 const photo = shown().red, select = root.querySelector(".colour");
-for (const value of ["1", "2", "3"]) {
+result.colours = [...select.options].map((option) => option.textContent);
+const legend = root.querySelector(".legend");
+result.photoLegend = legend.hidden;
+for (const value of ["1", "2", "3", "4", "5", "6"]) {
   await drawn(() => { select.value = value; select.dispatchEvent(new Event("change")); });
   result[`colour${value}`] = shown().red !== photo;
+  result[`legend${value}`] = legend.hidden ? "" : [...legend.querySelectorAll("span")].map((end) => end.textContent).join(" to ");
 }
 const turn = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, { pointerId: 1, clientX: x, clientY: 200, buttons: 1, bubbles: true }));
 canvas.setPointerCapture = () => {};
@@ -112,9 +123,22 @@ report(result);
     // The first object is last seen in the middle, the second at the end.
     assert_eq!((triangles("objects"), triangles("now")), (2 * 12, 12), "{of}");
     assert_eq!(triangles("back"), 2 * 60 * 60 + 12, "{of}");
-    for key in ["colour1", "colour2", "colour3", "turned", "swept"] {
+    for key in ["colour1", "colour2", "colour3", "colour4", "colour5", "colour6", "pruned", "planning", "photoLegend", "turned", "swept"] {
         assert_eq!(of[key], true, "{key}: {of}");
     }
+    assert_eq!(of["colours"], serde_json::json!(["photo", "height", "normal", "state", "weight", "last seen", "error"]));
+    assert_eq!(
+        (&of["legend1"], &of["legend3"], &of["legend4"], &of["legend5"], &of["legend6"], &of["prunedName"]),
+        (
+            &"-1.7 m to -1.6 m".into(),
+            &"".into(),
+            &"1 observation to 47 observations and more".into(),
+            &"frame 0 to frame 22".into(),
+            &"0 m from the reference to 0.30 m and more".into(),
+            &"pruned blocks (2)".into(),
+        ),
+        "{of}"
+    );
 }
 
 #[dynvox_needs::browser]
@@ -166,7 +190,7 @@ fn extremes_give_a_page_that_makes_sense() {
     let script = r#"
 report({
   frame: data.frame, note: root.querySelector(".note").textContent, reason: root.querySelector(".reason").textContent,
-  triangles: Number(data.triangles || 0), live: root.classList.contains("live"), frames: root.querySelector(".slider").max,
+  triangles: Number(data.triangles || 0), colours: root.querySelector(".colour").options.length, live: root.classList.contains("live"), frames: root.querySelector(".slider").max,
 });
 "#;
     let of = |run: FakeRun, before: &str| {
@@ -175,7 +199,7 @@ report({
         visit(&viewer(root.path()), before, script)
     };
     let empty = of(FakeRun { frames: 3, objects: 0, squares: 0, pictures: false }, "");
-    assert!(empty["note"] == "The map is empty" && empty["live"] == true, "{empty}");
+    assert!(empty["note"] == "The map is empty" && empty["live"] == true && empty["colours"] == 4, "{empty}");
     let many = of(FakeRun { frames: 40, objects: 64, squares: 60, pictures: true }, "");
     assert!(many["triangles"].as_u64().unwrap() > 7_200, "{many}");
     let long = of(FakeRun { frames: 5_000, objects: 1, squares: 60, pictures: true }, "");

@@ -2,7 +2,6 @@
 
 use dynvox::run::store::{BlockFile, mesh};
 use dynvox_core::objects::NoSink;
-use dynvox_core::view::Triangle;
 use dynvox_core::volume::{BlockStore, NoStore};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, Severity};
 use dynvox_tests::{Clip, HeapSlab};
@@ -28,10 +27,10 @@ fn file(folder: &tempfile::TempDir) -> BlockFile<std::fs::File> {
 /// A triangle's bits: places and colours.
 type Bits = [(u32, u32, u32, [u8; 3]); 3];
 
-fn bits(Triangle { vertices }: Triangle) -> Bits {
-    vertices.map(|vertex| {
-        let [x, y, z] = vertex.position_m.map(f32::to_bits);
-        (x, y, z, vertex.colour)
+fn bits(corners: [([f32; 3], [u8; 3]); 3]) -> Bits {
+    corners.map(|(position_m, colour)| {
+        let [x, y, z] = position_m.map(f32::to_bits);
+        (x, y, z, colour)
     })
 }
 
@@ -52,7 +51,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let mut mapper = Mapper::new(&LARGE, &config, slab.bytes()).expect("a slab that fits");
     let reports = map_clip(&clip, &mut mapper, &mut NoStore);
     assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0, "the large pool holds it all");
-    mapper.triangles(&mut |triangle| unbounded.push(bits(triangle)));
+    mapper.triangles(&mut |triangle| unbounded.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour)))));
 
     let folder = tempfile::TempDir::new().expect("a folder for the blocks");
     let (mut store, mut streamed) = (file(&folder), Vec::new());
@@ -66,7 +65,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     drop(mapper);
     let count =
         mesh::triangles(&mut store, (&config.volume, &config.mesh), (slab.bytes(), false), &hashbrown::HashSet::new(), &mut |triangle| {
-            streamed.push(bits(triangle))
+            streamed.push(bits(triangle.map(|corner| (corner.position_m, corner.colour))))
         });
     assert_eq!(count.ok(), Some(streamed.len() as u64));
     assert!(unbounded.len() > 100_000, "{} triangles", unbounded.len());

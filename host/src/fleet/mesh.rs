@@ -68,9 +68,7 @@ pub fn write_mesh(folder: &Path, out: &Path, min_weight: u8, axes: Axes) -> Resu
     // Any profile's slab holds a piece of the map.
     let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
     let mut ply = PlyWriter::begin_in(out, "the world", axes).map_err(FleetError::io(out))?;
-    let meshed = triangles(&mut store, how, (&mut slab, lattice.colour), &HashSet::new(), &mut |triangle| {
-        ply.triangle(triangle.vertices.map(|vertex| (vertex.position_m, vertex.colour)));
-    });
+    let meshed = triangles(&mut store, how, (&mut slab, lattice.colour), &HashSet::new(), &mut |corners| ply.triangle(corners));
     meshed.map_err(|error| FleetError::content(out, format!("cannot be made: {error}")))?;
     let mesh = ply.finish().map_err(FleetError::io(out))?;
     Ok(MeshedMap { mesh, blocks, overflowed })

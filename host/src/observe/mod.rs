@@ -1,6 +1,7 @@
 //! What is measured during a run. Each observer sees every frame after its step, keeps plain data that goes into checkpoints, and returns
 //! a section of the run's record in the end.
 
+mod block_history;
 mod blocks;
 mod bounds;
 mod chart_values;
@@ -22,8 +23,10 @@ mod thumbnail;
 mod tracks;
 mod trajectory;
 mod volume_copy;
+mod weights;
 mod written_file;
 
+pub use block_history::BlockHistoryObserver;
 pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
 pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
 pub use chart_values::{ChartValues, Charted};
@@ -42,6 +45,7 @@ pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, 
 pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
 pub use trajectory::{ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first};
 pub use volume_copy::VolumeCopy;
+pub use weights::weighed_triangles;
 pub use written_file::WrittenFile;
 
 use crate::formats::{Axes, Mesh};
@@ -51,8 +55,9 @@ use dynvox_core::memory::Region;
 use dynvox_core::objects::ObjectSummary;
 use dynvox_core::planning::PlanningReport;
 use dynvox_core::view::Raycaster;
-use dynvox_core::volume::PruneReport;
+use dynvox_core::volume::{BlockCoord, PruneReport};
 use dynvox_core::{Capacity, Config, Mapper};
+use hashbrown::HashSet;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -137,6 +142,8 @@ pub struct FrameContext<'a, 's> {
     pub images: &'a StereoImages,
     /// Objects that left the mapper in this step.
     pub retired: &'a [RetiredVolume],
+    /// Blocks of the static map that were evicted in this step.
+    pub evicted: &'a HashSet<BlockCoord>,
     /// The map.
     pub view: &'a mut dyn MapView<'s>,
 }
@@ -225,6 +232,7 @@ pub struct Observers {
     tracks: TracksObserver,
     objects: ObjectsObserver,
     blocks: BlocksObserver,
+    block_history: BlockHistoryObserver,
     bounds: BoundsObserver,
     health: HealthObserver,
     instances: InstancesObserver,
@@ -267,7 +275,7 @@ impl Observer for Observers {
     type Section = Sections;
 
     fn files(&mut self) -> Vec<&mut GrowingFile> {
-        self.trajectory.files().into_iter().chain(self.tracks.files()).collect()
+        self.trajectory.files().into_iter().chain(self.tracks.files()).chain(self.block_history.files()).collect()
     }
 
     fn checkpoint(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
@@ -288,6 +296,7 @@ impl Observer for Observers {
         self.tracks.frame(setup, frame)?;
         self.objects.frame(setup, frame)?;
         self.blocks.frame(setup, frame)?;
+        self.block_history.frame(setup, frame)?;
         self.bounds.frame(setup, frame)?;
         self.health.frame(setup, frame)?;
         self.instances.frame(setup, frame)?;
@@ -299,11 +308,13 @@ impl Observer for Observers {
         self.gallery.end(setup, end)?;
         self.recording.end(setup, end)?;
         self.objects.end(setup, end)?;
+        self.block_history.end(setup, end)?;
         self.planning.end(setup, end)
     }
 
     fn finish(self, setup: &Setup<'_>, finished: &Finished) -> Result<Sections, ObserveError> {
         self.planning.finish(setup, finished)?;
+        self.block_history.finish(setup, finished)?;
         Ok(Sections {
             trajectory: self.trajectory.finish(setup, finished)?,
             keyframes: self.keyframes.finish(setup, finished)?,

@@ -3,7 +3,7 @@
 use super::{Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
 use crate::evaluate::reference::{
     DepthErrors, EvaluatedFrame, Field, PendingFrame, PendingFrames, PointOutcomes, ProjectedScan, ReferenceFigures, Region, Sample,
-    project_scan, sample_exact_depth,
+    SurfaceErrors, project_scan, sample_exact_depth,
 };
 use crate::formats::Image;
 use crate::input::InstanceMask;
@@ -102,6 +102,8 @@ pub struct ReferenceSection {
     pub frames: Vec<EvaluatedFrame>,
     /// What became of each point of the static map.
     pub outcomes: Vec<PointOutcomes>,
+    /// How far the static map is off, place by place.
+    pub surface_errors: SurfaceErrors,
     /// Pictures of some.
     pub pictures: Vec<ErrorPictures>,
 }
@@ -113,6 +115,7 @@ pub struct ReferenceObserver {
     depth_errors: DepthErrors,
     #[serde(default)]
     outcomes: Vec<PointOutcomes>,
+    surface_errors: SurfaceErrors,
     pictures: Vec<ErrorPictures>,
     /// Empty after every frame unless there is a delay, and a run with a delay has no checkpoints.
     #[serde(skip)]
@@ -142,6 +145,7 @@ impl Observer for ReferenceObserver {
             figures: ReferenceFigures::of(plan.reference.name(), plan.delay, &self.frames, self.depth_errors.figures()),
             frames: self.frames,
             outcomes: self.outcomes,
+            surface_errors: self.surface_errors,
             pictures: self.pictures,
         }))
     }
@@ -160,7 +164,13 @@ impl ReferenceObserver {
         let depth_m = |px: f32| focal_baseline_px_m / f64::from(px);
         for (sample, &shown_px) in due.samples.iter().zip(&shown_px).filter(|(sample, _)| sample.region == Region::Static) {
             if shown_px > 0.0 {
-                self.depth_errors.add(depth_m(shown_px), depth_m(sample.point.disparity_px), along_normal(rig, normal, sample));
+                let (shown_m, true_m) = (depth_m(shown_px), depth_m(sample.point.disparity_px));
+                let (ray, along_normal) = (ray(rig, sample), along_normal(rig, normal, sample));
+                self.depth_errors.add(shown_m, true_m, along_normal);
+                if let Some(along_normal) = along_normal {
+                    let at = due.t_world_camera.transform_point(ray.map(|part| part * shown_m));
+                    self.surface_errors.add(at, ((shown_m - true_m) * along_normal).abs());
+                }
             }
         }
         if let Some(picture) = due.picture.as_ref().and_then(|picture| picture.view()) {
@@ -177,8 +187,14 @@ impl ReferenceObserver {
 /// Length of a sample's ray of depth 1 along the normal that the map shows there; `None` where it shows none.
 fn along_normal(rig: &StereoRig, normal: &View<'_, [i8; 3]>, sample: &Sample) -> Option<f64> {
     let [x, y, z] = normal.get(sample.point.u.into(), sample.point.v.into())?.map(|n| f64::from(n) / f64::from(NORMAL_ONE));
-    let ray = [f64::from(sample.point.u) - rig.center_u_px, f64::from(sample.point.v) - rig.center_v_px].map(|px| px / rig.focal_px);
+    let ray = ray(rig, sample);
     ([x, y, z] != [0.0; 3]).then(|| x * ray[0] + y * ray[1] + z)
+}
+
+/// A sample's ray of depth 1, in the camera's axes.
+fn ray(rig: &StereoRig, sample: &Sample) -> [f64; 3] {
+    let across = |px: u16, center_px: f64| (f64::from(px) - center_px) / rig.focal_px;
+    [across(sample.point.u, rig.center_u_px), across(sample.point.v, rig.center_v_px), 1.0]
 }
 
 /// The points of a frame, with their regions and what the input measured there; `None` without a reference.

@@ -12,5 +12,5 @@ pub mod text;
 pub mod viewer;
 
 pub use console::summary_lines;
-pub use csv::{write_reference, write_tracks_truth};
+pub use csv::{write_reference, write_surface_errors, write_tracks_truth};
 pub use summary::Summary;

@@ -3,9 +3,8 @@
 use super::map_objects::{MapObjects, add_objects};
 use super::store::{self, BlockFile, Position, StoreError};
 use super::{FolderError, RunFolder};
-use crate::formats::{Axes, Mesh, PlyWriter};
-use crate::observe::StoreStats;
-use dynvox_core::view::Triangle;
+use crate::formats::{Axes, Mesh, MeshVertex, PlyWriter};
+use crate::observe::{StoreStats, weighed_triangles};
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
 use dynvox_core::{Capacity, Config, Mapper};
 use hashbrown::HashSet;
@@ -27,48 +26,62 @@ pub struct Streaming {
 
 /// A file of blocks, or none.
 #[derive(Debug)]
-pub struct DiskStore(Option<BlockFile<File>>);
+pub struct DiskStore {
+    file: Option<BlockFile<File>>,
+    /// Blocks evicted since they were last taken.
+    evicted: HashSet<BlockCoord>,
+}
 
 impl BlockStore for DiskStore {
     fn store(&mut self, block: EvictedBlock<'_>) -> bool {
-        self.0.as_mut().is_some_and(|file| file.store(block))
+        self.evicted.insert(block.coord);
+        self.file.as_mut().is_some_and(|file| file.store(block))
     }
 
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
-        self.0.as_mut().is_some_and(|file| file.load(block))
+        self.file.as_mut().is_some_and(|file| file.load(block))
     }
 }
 
 impl DiskStore {
+    fn of(file: Option<BlockFile<File>>) -> Self {
+        Self { file, evicted: HashSet::new() }
+    }
+
+    /// The blocks that were evicted since this was last asked, stored or lost.
+    pub fn take_evicted(&mut self) -> HashSet<BlockCoord> {
+        std::mem::take(&mut self.evicted)
+    }
+
     /// Opens the file in the run folder if blocks are to be stored.
     pub fn begin(streaming: Option<Streaming>, folder: &RunFolder, config: &Config) -> Result<Self, StoreError> {
-        let Some(streaming) = streaming else { return Ok(Self(None)) };
+        let Some(streaming) = streaming else { return Ok(Self::of(None)) };
         let (mut file, _) = BlockFile::open(&folder.file(BLOCKS_FILE), config.volume.voxel_size_m, config.volume.truncation_m)?;
         file.limit(streaming.most_bytes.unwrap_or(u64::MAX));
-        Ok(Self(Some(file)))
+        Ok(Self::of(Some(file)))
     }
 
     /// Opens the file of a resumed run, as it was at the checkpoint.
     pub fn resume(streaming: Option<Streaming>, folder: &RunFolder, config: &Config, at: Option<&Position>) -> Result<Self, StoreError> {
-        let (Some(streaming), Some(at)) = (streaming, at) else { return Ok(Self(None)) };
+        let (Some(streaming), Some(at)) = (streaming, at) else { return Ok(Self::of(None)) };
         let mut file = BlockFile::reopen(&folder.file(BLOCKS_FILE), config.volume.voxel_size_m, config.volume.truncation_m, at)?;
         file.limit(streaming.most_bytes.unwrap_or(u64::MAX));
-        Ok(Self(Some(file)))
+        Ok(Self::of(Some(file)))
     }
 
     /// The end of the file, if there is one; synced to the disk up to there.
     pub fn position(&self) -> std::io::Result<Option<Position>> {
-        self.0.as_ref().map(BlockFile::position).transpose()
+        self.file.as_ref().map(BlockFile::position).transpose()
     }
 
     /// Whether the disk refused, and not the limit that was asked for.
     pub fn disk_failed(&self) -> bool {
-        self.0.as_ref().is_some_and(BlockFile::disk_failed)
+        self.file.as_ref().is_some_and(BlockFile::disk_failed)
     }
 
     /// Why blocks are no longer stored, if so.
     pub fn failure(&self) -> Option<String> {
-        self.0.as_ref().and_then(BlockFile::failure).map(ToString::to_string)
+        self.file.as_ref().and_then(BlockFile::failure).map(ToString::to_string)
     }
 }
 
@@ -90,9 +103,9 @@ impl MeshOutput {
         let mut report = EvictionReport::default();
         let mut meshed = HashSet::new();
         let keeps_file = streaming.is_some_and(|streaming| streaming.keep_file);
-        if store.0.as_ref().is_none_or(|file| file.records() == 0 && !keeps_file || file.failure().is_some()) {
-            mapper.triangles(&mut |triangle| add(&mut ply, triangle));
+        if store.file.as_ref().is_none_or(|file| file.records() == 0 && !keeps_file || file.failure().is_some()) {
             let volume = mapper.background();
+            weighed_triangles(volume, &mapper.config().mesh, |_| true, &mut |corners| add(&mut ply, corners));
             meshed.extend(volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)));
         } else {
             report = mapper.stream_out(&mut store);
@@ -109,10 +122,10 @@ impl MeshOutput {
     ) -> (Result<Mesh, FolderError>, StoreStats) {
         let mut stats = StoreStats { end: self.report, failure: self.store.failure(), ..StoreStats::default() };
         let mut failed = None;
-        if let Some(file) = self.store.0.as_mut() {
+        if let Some(file) = self.store.file.as_mut() {
             let ply = &mut self.ply;
             let (how, memory) = ((&config.volume, &config.mesh), (slab, capacity.colour));
-            let meshed = store::mesh::triangles(file, how, memory, &self.meshed, &mut |triangle| add(ply, triangle));
+            let meshed = store::mesh::triangles(file, how, memory, &self.meshed, &mut |corners| add(ply, corners));
             failed = meshed.err().map(|error| std::io::Error::other(format!("the slab is too small for a piece of the map: {error:?}")));
             (stats.records, stats.bytes, stats.unreadable) = (file.records(), file.bytes(), file.unreadable());
         }
@@ -131,7 +144,7 @@ impl MeshOutput {
     }
 }
 
-fn add(ply: &mut std::io::Result<PlyWriter>, Triangle { vertices }: Triangle) {
+fn add(ply: &mut std::io::Result<PlyWriter>, corners: [MeshVertex; 3]) {
     let Ok(ply) = ply else { return };
-    ply.triangle(vertices.map(|vertex| (vertex.position_m, vertex.colour)));
+    ply.triangle(corners);
 }

@@ -1,6 +1,6 @@
 //! Objects in `map.ply`, next to the static map.
 
-use crate::formats::{Axes, PlyMesh, PlyWriter, read_numbered};
+use crate::formats::{Axes, MeshVertex, PlyMesh, PlyVertex, PlyWriter, read_numbered};
 use crate::scene::{OBJECTS_FOLDER, object_files};
 use dynvox_core::geometry::Transform;
 use std::io;
@@ -44,7 +44,13 @@ pub(super) fn add_objects(ply: &mut PlyWriter, run: &Path, which: MapObjects) ->
         for (_, t_world_object) in &poses[first..] {
             ply.begin_object(id);
             let mesh = PlyMesh::open(&folder.join(format!("{name}.ply"))).map_err(io::Error::other)?;
-            mesh.triangles(|corners| ply.triangle(corners.map(|corner| (moved(t_world_object, corner.position_m), corner.colour))))?;
+            mesh.triangles(|corners| {
+                ply.triangle(corners.map(|PlyVertex { position_m, colour, weight, .. }| MeshVertex {
+                    position_m: moved(t_world_object, position_m),
+                    colour,
+                    weight,
+                }));
+            })?;
         }
     }
     Ok(())

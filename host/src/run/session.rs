@@ -182,8 +182,16 @@ impl<'p, 's> Session<'p, 's> {
         let blocks = row.report.blocks;
         let fps = (frames.len() + 1) as f64 / timers.mapping().as_secs_f64();
         progress.frame(position + 1, fps, f64::from(blocks.used) / f64::from(blocks.capacity), row.held());
+        let evicted = self.store.take_evicted();
         let mut view = LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
-        let mut context = FrameContext { position, row: &row, images: &images, retired: &retired, view: &mut view };
+        let mut context = FrameContext {
+            position,
+            row: &row,
+            images: &images,
+            retired: &retired,
+            evicted: &evicted,
+            view: &mut view,
+        };
         let observed = observers.frame(&self.setup, &mut context);
         row.stages[Stage::Raycast as usize] = view.first_raycast.unwrap_or_default();
         frames.add(row).map_err(|source| ObserveError::Write { path: frames.file().path(&self.setup.folder), source })?;

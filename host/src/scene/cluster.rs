@@ -4,6 +4,7 @@
 //! the result, not by the input, and the order of the input alone decides the result.
 
 use super::IndexedMesh;
+use crate::formats::MeshVertex;
 use hashbrown::{HashMap, HashSet};
 
 /// Side of the first cells, m.
@@ -20,16 +21,18 @@ struct Cluster {
     count: f64,
     colour_sum: [f64; 3],
     coloured: f64,
+    weight_sum: f64,
 }
 
 impl Cluster {
-    fn of(position_m: [f32; 3], colour: [u8; 3]) -> Self {
+    fn of(MeshVertex { position_m, colour, weight }: MeshVertex) -> Self {
         let coloured = if colour == [0; 3] { 0.0 } else { 1.0 };
         Self {
             position_sum_m: position_m.map(f64::from),
             count: 1.0,
             colour_sum: colour.map(f64::from),
             coloured,
+            weight_sum: f64::from(weight),
         }
     }
 
@@ -40,10 +43,16 @@ impl Cluster {
         }
         self.count += other.count;
         self.coloured += other.coloured;
+        self.weight_sum += other.weight_sum;
     }
 
     fn position_m(&self) -> [f32; 3] {
         self.position_sum_m.map(|sum| (sum / self.count) as f32)
+    }
+
+    /// Mean of the observations.
+    fn weight(&self) -> u8 {
+        (self.weight_sum / self.count).round() as u8
     }
 
     fn colour(&self) -> [u8; 3] {
@@ -75,12 +84,13 @@ impl VertexClustering {
         }
     }
 
-    /// Adds a triangle: positions in m, and colours.
-    pub fn add(&mut self, corners: [([f32; 3], [u8; 3]); 3]) {
-        if corners.iter().flat_map(|(position_m, _)| position_m).any(|metres| !metres.is_finite()) {
+    /// Adds a triangle.
+    pub fn add(&mut self, corners: [impl Into<MeshVertex>; 3]) {
+        let corners: [MeshVertex; 3] = corners.map(Into::into);
+        if corners.iter().flat_map(|corner| corner.position_m).any(|metres| !metres.is_finite()) {
             return;
         }
-        let triangle = corners.map(|(position_m, colour)| self.cluster(position_m, &Cluster::of(position_m, colour)));
+        let triangle = corners.map(|corner| self.cluster(corner.position_m, &Cluster::of(corner)));
         self.connect(triangle);
         while self.triangles.len() > self.most_triangles || self.clusters.len() > CELLS_PER_TRIANGLE * self.most_triangles {
             self.coarsen();
@@ -128,6 +138,7 @@ impl VertexClustering {
                     *number = mesh.positions_m.len() as u32;
                     mesh.positions_m.push(cluster.position_m());
                     mesh.colours.push(cluster.colour());
+                    mesh.weights.push(cluster.weight());
                 }
                 *number
             });

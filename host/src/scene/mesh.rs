@@ -9,6 +9,8 @@ pub struct IndexedMesh {
     pub positions_m: Vec<[f32; 3]>,
     /// Their colours; all 0 where unknown.
     pub colours: Vec<[u8; 3]>,
+    /// How often they were observed; all 0 where unknown.
+    pub weights: Vec<u8>,
     /// Numbers of each triangle's corners, counter-clockwise seen from free space.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -43,6 +45,7 @@ mod tests {
         let mesh = IndexedMesh {
             positions_m: vec![[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [9.0, 9.0, 9.0]],
             colours: vec![[0; 3]; 4],
+            weights: vec![0; 4],
             triangles: vec![[0, 1, 2]],
         };
         assert_eq!(mesh.normals(), [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3]]);

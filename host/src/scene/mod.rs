@@ -1,16 +1,22 @@
 //! A finished run as a viewer shows it, read from the run folder and bounded: so many triangles, frames and pictures, however long the run.
 
+mod block_history;
 mod cluster;
 pub mod glb;
 mod mesh;
 mod pictures;
+mod planning;
 mod read;
+mod surface_errors;
 mod tables;
 
+pub use block_history::BlockHistory;
 pub use cluster::VertexClustering;
 pub use mesh::IndexedMesh;
 pub use pictures::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
+pub use planning::{PlanningCell, PlanningWindow};
 pub use read::object_files;
+pub use surface_errors::SurfaceErrorMap;
 pub use tables::{FrameColumns, TrackColumns};
 
 use dynvox_core::geometry::Transform;
@@ -55,6 +61,12 @@ pub struct Scene {
     pub static_map: IndexedMesh,
     /// Triangles of the static map on disk.
     pub static_triangles: u64,
+    /// When its blocks were last seen, and which of them pruning took.
+    pub blocks: BlockHistory,
+    /// How far it is off, where it was compared with a reference.
+    pub errors: SurfaceErrorMap,
+    /// The planner's window.
+    pub planning: PlanningWindow,
     /// The objects, by track.
     pub objects: Vec<SceneObject>,
     /// Which frames have pictures.

@@ -1,8 +1,11 @@
 //! A run folder read as a scene.
 
 use super::tables::{FrameColumns, TrackColumns, read_rows};
-use super::{IndexedMesh, OBJECTS_FOLDER, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, Scene, SceneFrame, SceneObject, VertexClustering};
-use crate::formats::{FormatError, PlyMesh, PlyVertex, read_numbered, read_poses, read_text};
+use super::{
+    BlockHistory, IndexedMesh, OBJECTS_FOLDER, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PlanningWindow, Scene, SceneFrame,
+    SceneObject, SurfaceErrorMap, VertexClustering,
+};
+use crate::formats::{FormatError, MeshVertex, PlyMesh, PlyVertex, read_numbered, read_poses, read_text};
 use dynvox_core::geometry::Transform;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -33,6 +36,9 @@ impl Scene {
             truth,
             static_map,
             static_triangles,
+            blocks: BlockHistory::read(folder)?,
+            errors: SurfaceErrorMap::read(folder)?,
+            planning: PlanningWindow::read(folder)?,
             objects,
             pictures: pictures(folder)?,
         })
@@ -47,7 +53,7 @@ fn simplified(path: &Path, static_only: bool, most_triangles: usize) -> Result<(
     let add = |corners: [PlyVertex; 3]| {
         if corners[0].object == 0 || !static_only {
             triangles += 1;
-            clustering.add(corners.map(|corner| (corner.position_m, corner.colour)));
+            clustering.add(corners.map(|PlyVertex { position_m, colour, weight, .. }| MeshVertex { position_m, colour, weight }));
         }
     };
     ply.triangles(add).map_err(FormatError::read(path))?;

@@ -1,8 +1,8 @@
 //! Run folders as `dynvox run` writes them, of any size, without a run.
 
-use dynvox::formats::PlyWriter;
+use dynvox::formats::{MeshVertex, PlyWriter};
 use dynvox_core::geometry::Transform;
-use image::{Rgb, RgbImage};
+use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -40,6 +40,7 @@ impl FakeRun {
         fs::write(folder.join("trajectory_kitti.txt"), &poses).unwrap();
         fs::write(folder.join("trajectory_truth_kitti.txt"), &poses).unwrap();
         fs::write(folder.join("tracks.csv"), tracks).unwrap();
+        self.write_blocks(folder);
         self.write_floor(&folder.join("map.ply"));
         (1..=self.objects).for_each(|id| self.write_object(&folder.join("objects"), id));
         if self.pictures {
@@ -60,13 +61,36 @@ impl FakeRun {
         let mut ply = PlyWriter::begin(path).unwrap();
         let corner = |x: usize, z: usize| {
             let at = [SIDE_M * (x as f32 - 0.5 * self.squares as f32), 1.6, SIDE_M * z as f32];
-            (at, [60 + (x % 4 * 40) as u8, 90, 60 + (z % 4 * 40) as u8])
+            MeshVertex {
+                position_m: at,
+                colour: [60 + (x % 4 * 40) as u8, 90, 60 + (z % 4 * 40) as u8],
+                weight: 1 + (z % 50) as u8,
+            }
         };
         for (x, z) in (0..self.squares * self.squares).map(|at| (at % self.squares, at / self.squares)) {
             ply.triangle([corner(x, z), corner(x, z + 1), corner(x + 1, z)]);
             ply.triangle([corner(x + 1, z), corner(x, z + 1), corner(x + 1, z + 1)]);
         }
         ply.finish().unwrap();
+    }
+
+    /// The blocks of the floor, two more that pruning took, and two places that were compared with a reference, and a planner's window.
+    fn write_blocks(&self, folder: &Path) {
+        fs::write(folder.join("config.toml"), "[volume]\nvoxel_size_m = 0.1\n").unwrap();
+        let mut rows = String::from("x,y,z,last_frame,fate\n");
+        let blocks = (self.squares as f32 * SIDE_M / 0.8).ceil() as i32;
+        for (x, z) in (0..blocks * blocks).map(|at| (at % blocks - blocks / 2 - 1, at / blocks)) {
+            writeln!(rows, "{x},2,{z},{},map", 2 * self.frames as i32 * z / blocks.max(1)).unwrap();
+        }
+        if blocks > 0 {
+            rows.push_str("0,0,3,4,pruned\n1,0,3,4,pruned\n");
+        }
+        fs::write(folder.join("blocks.csv"), rows).unwrap();
+        if blocks > 0 {
+            let errors = "x_m,y_m,z_m,points,error_m\n0.1,1.6,3.1,9,0.1\n0.5,1.6,3.1,2,0.3\n";
+            fs::write(folder.join("surface_errors.csv"), errors).unwrap();
+            write_planning(&folder.join("planning"));
+        }
     }
 
     /// A box of 12 triangles, 1 m wide.
@@ -101,6 +125,21 @@ impl FakeRun {
         let index = serde_json::json!({ "width": 128, "height": 64, "frames": numbers });
         fs::write(folder.join("index.json"), index.to_string()).unwrap();
     }
+}
+
+/// A planner's window of 8 x 8 cells on the floor, obstacles along its left side.
+fn write_planning(folder: &Path) {
+    fs::create_dir(folder).unwrap();
+    let window = serde_json::json!({
+        "cell_m": 0.2, "origin_m": [-0.8, 2.0, -1.8], "height_zero_m": -1.6, "height_unit_m": 0.001,
+        "right_world": [1.0, 0.0, 0.0], "ahead_world": [0.0, 0.0, 1.0], "up_world": [0.0, -1.0, 0.0],
+        "distance_zero": 32768, "distance_unit_m": 0.01,
+    });
+    fs::write(folder.join("window.json"), window.to_string()).unwrap();
+    GrayImage::from_fn(8, 8, |u, _| Luma([if u == 0 { 0 } else { 254 }])).save(folder.join("map.pgm")).unwrap();
+    let numbers = |of: fn(u32) -> u16| ImageBuffer::from_fn(8, 8, |u, _| Luma([of(u)]));
+    numbers(|_| 0).save(folder.join("height.png")).unwrap();
+    numbers(|u| (32_758 + 20 * u) as u16).save(folder.join("distance.png")).unwrap();
 }
 
 fn track_header() -> String {

@@ -65,6 +65,7 @@ fn files(run: &RunRecord) -> Vec<(&'static str, Writer<'_>)> {
     }
     if let Some(reference) = &sections.reference {
         files.push(("lidar.csv", Box::new(|out| report::write_reference(out, &reference.frames))));
+        files.push(("surface_errors.csv", Box::new(|out| report::write_surface_errors(out, &reference.surface_errors))));
     }
     files
 }

@@ -28,6 +28,7 @@ mod outcomes;
 mod pending;
 mod projection;
 mod region;
+mod surface_errors;
 #[cfg(test)]
 mod tests;
 
@@ -38,3 +39,4 @@ pub use outcomes::{PointOutcomes, on_common_points};
 pub use pending::{PendingFrame, PendingFrames, Sample};
 pub use projection::{EPIPOLAR_PX, EXACT_POINTS, Field, ProjectedPoint, ProjectedScan, ScanCount, project_scan, sample_exact_depth};
 pub use region::Region;
+pub use surface_errors::{SurfaceError, SurfaceErrors};

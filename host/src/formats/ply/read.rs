@@ -19,6 +19,8 @@ pub struct PlyVertex {
     pub colour: [u8; 3],
     /// Number of its object; 0 for the static map.
     pub object: u32,
+    /// Observations; 0 where unknown.
+    pub weight: u8,
 }
 
 /// Where a vertex's properties lie.
@@ -28,6 +30,7 @@ struct VertexLayout {
     position: Option<usize>,
     colour: Option<usize>,
     object: Option<usize>,
+    weight: Option<usize>,
     axes: Axes,
 }
 
@@ -38,6 +41,7 @@ impl VertexLayout {
             ("x", "float") => self.position = Some(self.bytes),
             ("red", "uchar") => self.colour = Some(self.bytes),
             ("object", "int") => self.object = Some(self.bytes),
+            ("weight", "uchar") => self.weight = Some(self.bytes),
             _ => {}
         }
         self.bytes += match kind {
@@ -57,8 +61,9 @@ impl VertexLayout {
         let at = self.position?;
         let colour = self.colour.and_then(|at| bytes.get(at..at + 3)?.try_into().ok()).unwrap_or_default();
         let object = self.object.and_then(word).map(u32::from_le_bytes).unwrap_or_default();
+        let weight = self.weight.and_then(|at| bytes.get(at).copied()).unwrap_or_default();
         let position_m = self.axes.to_camera([number(at)?, number(at + 4)?, number(at + 8)?]);
-        Some(PlyVertex { position_m, colour, object })
+        Some(PlyVertex { position_m, colour, object, weight })
     }
 }
 

@@ -1,6 +1,6 @@
 //! The map as a binary PLY, streamed: triangles go to disk as they come, and the header's counts are filled in at the end.
 //!
-//! A vertex has position, normal (the mean over its triangles by area), colour and the number of the object it belongs to. Memory: a window of
+//! A vertex has position, normal (the mean over its triangles by area), colour, weight and the number of the object it belongs to. Memory: a window of
 //! [`WINDOW`] recent vertices, so that triangles share them, and those near them, whose normals grow. The mesh itself is never in memory.
 //! Vertices that fall out of the window are written again when they return, which costs bytes, not correctness.
 
@@ -14,16 +14,30 @@ use std::path::{Path, PathBuf};
 const WINDOW: usize = 1 << 19;
 /// Digits of a count in the header.
 const DIGITS: usize = 10;
-/// Bytes of a vertex: position and normal of three floats, three bytes of colour, the object's number.
-const VERTEX_BYTES: usize = 31;
+/// Bytes of a vertex: position and normal of three floats, three bytes of colour, the weight, the object's number.
+const VERTEX_BYTES: usize = 32;
 /// Where its normal begins.
 const NORMAL: usize = 12;
 const PROPERTIES: &[u8] =
     b"property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n\
-    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int object\n";
+    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar weight\nproperty int object\n";
 
-/// A vertex: position in m and colour.
-pub type Vertex = ([f32; 3], [u8; 3]);
+/// A corner of a triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeshVertex {
+    /// Position, m.
+    pub position_m: [f32; 3],
+    /// Red, green, blue.
+    pub colour: [u8; 3],
+    /// Observations; 0 where unknown.
+    pub weight: u8,
+}
+
+impl From<([f32; 3], [u8; 3])> for MeshVertex {
+    fn from((position_m, colour): ([f32; 3], [u8; 3])) -> Self {
+        Self { position_m, colour, weight: 0 }
+    }
+}
 
 /// What was written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,7 +65,7 @@ pub struct PlyWriter {
     axes: Axes,
     vertex_count_at: u64,
     face_count_at: u64,
-    window: Vec<Option<(Vertex, u32)>>,
+    window: Vec<Option<(MeshVertex, u32)>>,
     /// Number of the object that triangles belong to; 0 for the static map.
     object: u32,
     mesh: Mesh,
@@ -107,14 +121,18 @@ impl PlyWriter {
     }
 
     /// Adds a triangle. [`PlyWriter::finish`] returns a failure, so that callbacks need no error path.
-    pub fn triangle(&mut self, corners: [Vertex; 3]) {
+    pub fn triangle(&mut self, corners: [impl Into<MeshVertex>; 3]) {
         if self.failed.is_none() {
-            self.failed = self.try_triangle(corners.map(|(position_m, colour)| (self.axes.of_camera(position_m), colour))).err();
+            self.failed = self.try_triangle(corners.map(|corner| self.in_axes(corner.into()))).err();
         }
     }
 
-    fn try_triangle(&mut self, corners: [Vertex; 3]) -> io::Result<()> {
-        let normal = area_normal(corners.map(|(position_m, _)| position_m));
+    fn in_axes(&self, vertex: MeshVertex) -> MeshVertex {
+        MeshVertex { position_m: self.axes.of_camera(vertex.position_m), ..vertex }
+    }
+
+    fn try_triangle(&mut self, corners: [MeshVertex; 3]) -> io::Result<()> {
+        let normal = area_normal(corners.map(|corner| corner.position_m));
         let mut face = [3u8; 13];
         for (bytes, corner) in face[1..].chunks_exact_mut(4).zip(corners) {
             let index = self.index_of(corner)?;
@@ -127,21 +145,22 @@ impl PlyWriter {
     }
 
     /// The position of a vertex in the file; it is written if it is not among the recent ones.
-    fn index_of(&mut self, vertex: Vertex) -> io::Result<u32> {
-        let key = vertex.0.iter().fold(0u32, |key, value| (key ^ value.to_bits()).wrapping_mul(0x9E37_79B1).rotate_left(13));
+    fn index_of(&mut self, vertex: MeshVertex) -> io::Result<u32> {
+        let key = vertex.position_m.iter().fold(0u32, |key, value| (key ^ value.to_bits()).wrapping_mul(0x9E37_79B1).rotate_left(13));
         let slot = &mut self.window[key as usize % WINDOW];
         if let Some((_, index)) = slot.filter(|(known, _)| *known == vertex) {
             return Ok(index);
         }
         let index = u32::try_from(self.vertices.len()).map_err(|_| io::Error::other("a PLY holds at most 2^32 vertices"))?;
         *slot = Some((vertex, index));
-        let (position_m, colour) = vertex;
+        let MeshVertex { position_m, colour, weight } = vertex;
         let mut record = [0; VERTEX_BYTES];
         for (bytes, value) in record.chunks_exact_mut(4).zip(position_m) {
             bytes.copy_from_slice(&value.to_le_bytes());
         }
         record[24..27].copy_from_slice(&colour);
-        record[27..].copy_from_slice(&self.object.to_le_bytes());
+        record[27] = weight;
+        record[28..].copy_from_slice(&self.object.to_le_bytes());
         self.vertices.push(&record)?;
         Ok(index)
     }

@@ -1,8 +1,10 @@
 //! Tables of the run folder: rows are structs whose fields name the columns.
 
+mod blocks;
 mod frames;
 mod tracks;
 
+pub use blocks::{BlockFate, block_rows};
 pub use frames::{FrameDigests, frame_row, read_frame_digests};
 pub use tracks::track_rows;
 

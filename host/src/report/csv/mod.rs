@@ -1,9 +1,11 @@
 //! Tables that are written when a run has ended: rows are structs whose fields name the columns.
 
 mod reference;
+mod surface_errors;
 mod tracks;
 
 pub use reference::write_reference;
+pub use surface_errors::write_surface_errors;
 pub use tracks::write_tracks_truth;
 
 use serde::Serialize;

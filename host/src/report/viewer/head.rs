@@ -1,6 +1,8 @@
 //! What the page's script knows of a run besides its meshes and pictures.
 
+use super::clouds::CloudHead;
 use super::tiles::TileHead;
+use super::values::{VALUES, ValueHead};
 use crate::scene::{Scene, SceneFrame, TrackColumns};
 use dynvox_core::geometry::Transform;
 use serde::Serialize;
@@ -33,8 +35,12 @@ pub struct Head<'s> {
     static_triangles: u64,
     /// Heights of the static map below which five of a hundred vertices lie, and above which five of a hundred do: y, m.
     heights_m: [f32; 2],
+    /// Values of the surface; null where no vertex has one.
+    values: [Option<ValueHead>; VALUES],
     /// Meshes, in the order of their elements on the page.
     pub tiles: Vec<TileHead>,
+    /// Layers of points, likewise.
+    pub clouds: Vec<CloudHead>,
 }
 
 /// A value of every frame.
@@ -59,7 +65,7 @@ struct ObjectHead<'s> {
 
 impl<'s> Head<'s> {
     /// All but the tiles.
-    pub fn of(name: &'s str, scene: &'s Scene) -> Self {
+    pub fn of(name: &'s str, scene: &'s Scene, values: [Option<ValueHead>; VALUES]) -> Self {
         let frames = &scene.frames;
         Self {
             name,
@@ -83,7 +89,9 @@ impl<'s> Head<'s> {
             pictures: &scene.pictures.frames,
             static_triangles: scene.static_triangles,
             heights_m: heights_m(scene),
+            values,
             tiles: Vec::new(),
+            clouds: Vec::new(),
         }
     }
 }

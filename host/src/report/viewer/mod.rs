@@ -3,8 +3,11 @@
 //! Meshes and tables are deflated and in base64, in elements that the page's script reads one after the other; pictures are read when they are
 //! shown. Without WebGL 2 or scripts the page shows a picture and says so.
 
+mod clouds;
 mod head;
+mod planes;
 mod tiles;
+mod values;
 
 use crate::formats::FormatError;
 use crate::scene::{OVERVIEW, PICTURES_FOLDER, PictureKind, Scene};
@@ -14,6 +17,7 @@ use head::Head;
 use maud::{Markup, PreEscaped, html};
 use std::io;
 use std::path::Path;
+use values::SurfaceValues;
 
 const STYLE: &str = include_str!("viewer.css");
 /// The script in the order in which its parts rely on each other.
@@ -34,15 +38,20 @@ const SCRIPT: [&str; 8] = [
 /// The encoder's.
 pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, FormatError> {
     let failed = |source| FormatError::Read { path: folder.to_path_buf(), source };
-    let mut tiles = tiles::tiles(&scene.static_map, None).map_err(failed)?;
+    let values = SurfaceValues::of(scene);
+    let mut tiles = tiles::tiles(&scene.static_map, &values.of_static(&scene.static_map), None).map_err(failed)?;
     for (at, object) in scene.objects.iter().enumerate() {
-        tiles.extend(tiles::tiles(&object.mesh, Some(at)).map_err(failed)?);
+        tiles.extend(tiles::tiles(&object.mesh, &values.of_object(object), Some(at)).map_err(failed)?);
     }
-    let mut head = Head::of(name, scene);
+    let mut head = Head::of(name, scene, values.heads());
     let mut elements = Vec::new();
     for (at, tile) in tiles.into_iter().enumerate() {
         elements.push((format!("dynvox-tile-{at}"), STANDARD.encode(&tile.bytes)));
         head.tiles.push(tile.head);
+    }
+    for (at, cloud) in clouds::clouds(scene).map_err(failed)?.into_iter().enumerate() {
+        elements.push((format!("dynvox-cloud-{at}"), STANDARD.encode(&cloud.bytes)));
+        head.clouds.push(cloud.head);
     }
     let head = deflated(&head).map_err(failed)?;
     Ok(html! {
@@ -107,6 +116,7 @@ fn panels(folder: &Path) -> Markup {
                         button.reset type="button" { "reset" }
                     }
                 }
+                div.legend hidden { span.low {} i {} span.high {} }
                 div.note {}
             }
             div.side hidden {

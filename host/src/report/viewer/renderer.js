@@ -16,9 +16,11 @@ class Renderer {
 
   constructor(canvas, gl, software) {
     Object.assign(this, { canvas, gl, software });
-    this.mesh = this.program(MESH_VERTEX, MESH_FRAGMENT, ["a_position", "a_normal", "a_colour"]);
+    this.mesh = this.program(MESH_VERTEX, MESH_FRAGMENT, ["a_position", "a_normal", "a_colour", "a_values"]);
     this.line = this.program(LINE_VERTEX, LINE_FRAGMENT, ["a_from", "a_to"]);
+    this.cloud = this.program(CLOUD_VERTEX, MESH_FRAGMENT, ["a_position", "a_colour"]);
     this.tiles = [];
+    this.clouds = [];
     gl.enable(gl.DEPTH_TEST);
   }
 
@@ -46,7 +48,7 @@ class Renderer {
     gl.bindVertexArray(array);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ARRAY_BUFFER, bytes, gl.STATIC_DRAW);
-    [[3, gl.UNSIGNED_SHORT, 0], [2, gl.BYTE, 6], [3, gl.UNSIGNED_BYTE, 8]].forEach(([size, kind, offset], at) => {
+    [[3, gl.UNSIGNED_SHORT, 0], [2, gl.BYTE, 6], [3, gl.UNSIGNED_BYTE, 8], [3, gl.UNSIGNED_BYTE, VALUE_AT]].forEach(([size, kind, offset], at) => {
       gl.enableVertexAttribArray(at);
       gl.vertexAttribPointer(at, size, kind, true, VERTEX_BYTES, offset);
     });
@@ -58,6 +60,19 @@ class Renderer {
     gl.bindVertexArray(null);
     const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => head.low_m.map((low, axis) => (bits >> axis & 1 ? head.high_m[axis] : low)));
     this.tiles.push({ head, array, whole: [0, indices.length], coarse: [indices.length, coarse.length], corners });
+  }
+
+  addCloud(head, bytes) {
+    const { gl } = this, array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, bytes, gl.STATIC_DRAW);
+    [[gl.UNSIGNED_SHORT, 0], [gl.UNSIGNED_BYTE, POINT_COLOUR_AT]].forEach(([kind, offset], at) => {
+      gl.enableVertexAttribArray(at);
+      gl.vertexAttribPointer(at, 3, kind, true, POINT_BYTES, offset);
+    });
+    gl.bindVertexArray(null);
+    this.clouds.push({ head, array });
   }
 
   // A line through points, or pieces between pairs of them.
@@ -84,7 +99,7 @@ class Renderer {
   }
 
   // Draws at a share of the canvas's own pixels, and with the tiles' coarse triangles where they are asked for and there. `objects` gives pose and tint of each object, or null where it is hidden.
-  draw({ share, isCoarse, clip, colour, heights, background, showStatic, objects, lines }) {
+  draw({ share, isCoarse, clip, colour, heights, background, showStatic, objects, lines, layers }) {
     const { gl, canvas } = this;
     const ratio = Math.min(window.devicePixelRatio || 1, 2) * share;
     const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
@@ -93,6 +108,7 @@ class Renderer {
     gl.clearColor(...background, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const triangles = this.drawTiles({ clip, colour, heights, isCoarse, showStatic, objects });
+    this.drawClouds(clip, layers, height);
     const { program, uniforms } = this.line;
     gl.useProgram(program);
     gl.uniformMatrix4fv(uniforms.u_clip_world, false, clip);
@@ -104,6 +120,20 @@ class Renderer {
       if (line.count) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, line.count);
     }
     return triangles;
+  }
+
+  // The clouds of the layers that are on.
+  drawClouds(clip, layers, heightPx) {
+    const { gl } = this, { program, uniforms } = this.cloud;
+    gl.useProgram(program);
+    gl.uniformMatrix4fv(uniforms.u_clip_world, false, clip);
+    for (const { head, array } of this.clouds.filter((cloud) => layers[cloud.head.layer])) {
+      gl.uniform3fv(uniforms.u_low, head.low_m);
+      gl.uniform1f(uniforms.u_size, head.size_m);
+      gl.uniform1f(uniforms.u_side, head.side_m * heightPx / 2 / Math.tan(VERTICAL_RAD / 2));
+      gl.bindVertexArray(array);
+      gl.drawArrays(gl.POINTS, 0, head.points);
+    }
   }
 
   drawTiles({ clip, colour, heights, isCoarse, showStatic, objects }) {

@@ -8,6 +8,7 @@ uniform int u_colour;
 in vec3 a_position;
 in vec2 a_normal;
 in vec3 a_colour;
+in vec3 a_values;
 out vec3 v_colour;
 vec3 turbo(float x) {
   vec4 p = vec4(1.0, x, x * x, x * x * x); vec2 q = p.zw * p.z;
@@ -30,6 +31,10 @@ void main() {
   if (u_colour == 1) { base = turbo(clamp((u_heights.y - world.y) / (u_heights.y - u_heights.x), 0.0, 1.0)); ambient = 0.5; }
   if (u_colour == 2) { base = 0.5 - 0.5 * n; ambient = 1.0; }
   if (u_colour == 3) { if (tinted) base = u_tint; else base = vec3(0.62, 0.64, 0.66); ambient = 0.3; }
+  if (u_colour > 3) {
+    float value = 255.0 * a_values[u_colour - 4];
+    if (value > 0.5) { base = turbo((value - 1.0) / 254.0); ambient = 0.6; }
+  }
   if (u_colour == 0 && tinted) base = mix(base, u_tint, 0.35);
   v_colour = base * (ambient + (1.1 - ambient) * light);
   gl_Position = u_clip_world * world;
@@ -39,6 +44,18 @@ precision mediump float;
 in vec3 v_colour;
 out vec4 o_colour;
 void main() { o_colour = vec4(v_colour, 1.0); }`;
+// Points as squares whose side is a length in the world.
+const CLOUD_VERTEX = `#version 300 es
+uniform mat4 u_clip_world;
+uniform vec3 u_low;
+uniform float u_size, u_side;
+in vec3 a_position, a_colour;
+out vec3 v_colour;
+void main() {
+  gl_Position = u_clip_world * vec4(u_low + u_size * a_position, 1.0);
+  gl_PointSize = clamp(u_side / max(gl_Position.w, 0.05), 1.5, 96.0);
+  v_colour = a_colour;
+}`;
 // A line as a strip of constant width on the screen: each instance is a piece between two points.
 const LINE_VERTEX = `#version 300 es
 uniform mat4 u_clip_world;

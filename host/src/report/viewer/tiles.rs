@@ -1,10 +1,12 @@
 //! A mesh in tiles: compact pieces with indices of 16 bits, deflated.
 //!
 //! A tile's bytes are planes, one after the other, each a byte of every vertex or corner: positions (x, y, z as 16 bits of the tile's box, low
-//! bytes before high ones), normals (two bytes, octahedral), colours (red, green, blue), corners (16 bits, low bytes before high ones).
-//! Positions and colours are differences from the vertex before. A corner is the number of vertices named so far less its own number, so
+//! bytes before high ones), normals (two bytes, octahedral), colours (red, green, blue), values, corners (16 bits, low bytes before high ones).
+//! Positions, colours and values are differences from the vertex before. A corner is the number of vertices named so far less its own number, so
 //! that a vertex named for the first time is 0. Such planes deflate to about a third.
 
+use super::planes::{longest_side, morton, push_byte_differences, push_word_differences, push_words};
+use super::values::{VALUES, ValueBytes};
 use crate::scene::IndexedMesh;
 use flate2::{Compression, write::ZlibEncoder};
 use serde::Serialize;
@@ -14,8 +16,6 @@ use std::io::{self, Write};
 const TRIANGLES: usize = 16_384;
 /// Steps along the longest side of the largest tile. All tiles of a mesh share one step, so that no crack opens between them.
 const STEPS: f32 = 65_534.0;
-/// Bits of a cell's coordinate in the order of triangles.
-const CELL_BITS: u32 = 10;
 
 /// What a tile is, for the page's script.
 #[derive(Debug, Serialize)]
@@ -42,20 +42,27 @@ pub struct Tile {
     pub bytes: Vec<u8>,
 }
 
-/// Divides a mesh; `object` is the position of its object.
+/// A mesh with what is known of its vertices.
+struct Surface<'m> {
+    mesh: &'m IndexedMesh,
+    normals: Vec<[f32; 3]>,
+    values: &'m [ValueBytes],
+}
+
+/// Divides a mesh; `values` are those of its vertices, `object` is the position of its object.
 ///
 /// # Errors
 /// None in memory: the encoder's.
-pub fn tiles(mesh: &IndexedMesh, object: Option<usize>) -> io::Result<Vec<Tile>> {
+pub fn tiles(mesh: &IndexedMesh, values: &[ValueBytes], object: Option<usize>) -> io::Result<Vec<Tile>> {
     let Some(bounds_m) = mesh.bounds_m() else { return Ok(Vec::new()) };
-    let normals = mesh.normals();
+    let surface = Surface { mesh, normals: mesh.normals(), values };
     let mut order: Vec<(u32, usize)> =
         mesh.triangles.iter().enumerate().map(|(at, [first, ..])| (morton(mesh.positions_m[*first as usize], bounds_m), at)).collect();
     order.sort_unstable();
     let chunks: Vec<Vec<[u32; 3]>> =
         order.chunks(TRIANGLES).map(|chunk| chunk.iter().map(|(_, at)| mesh.triangles[*at]).collect()).collect();
     let longest_m = chunks.iter().map(|chunk| longest_side(box_of(mesh, chunk.iter().flatten()))).fold(1e-3, f32::max);
-    chunks.iter().map(|chunk| tile(mesh, &normals, chunk, (object, longest_m / STEPS))).collect()
+    chunks.iter().map(|chunk| tile(&surface, chunk, (object, longest_m / STEPS))).collect()
 }
 
 /// The box around some vertices, m.
@@ -64,20 +71,9 @@ fn box_of<'c>(mesh: &IndexedMesh, corners: impl Iterator<Item = &'c u32>) -> [[f
     IndexedMesh { positions_m, ..IndexedMesh::default() }.bounds_m().unwrap_or_default()
 }
 
-fn longest_side([low, high]: [[f32; 3]; 2]) -> f32 {
-    (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max)
-}
-
-/// The number of a point's cell along a curve whose neighbours are near each other in space (Morton order).
-fn morton(position_m: [f32; 3], bounds_m: [[f32; 3]; 2]) -> u32 {
-    let side = longest_side(bounds_m).max(1e-6);
-    let cell = |axis: usize| ((position_m[axis] - bounds_m[0][axis]) / side * ((1 << CELL_BITS) - 1) as f32) as u32;
-    let cells = [0, 1, 2].map(cell);
-    (0..CELL_BITS).rev().flat_map(|bit| cells.map(|cell| cell >> bit & 1)).fold(0, |number, bit| number << 1 | bit)
-}
-
 /// Encodes some triangles, positions to multiples of `step_m`.
-fn tile(mesh: &IndexedMesh, normals: &[[f32; 3]], triangles: &[[u32; 3]], (object, step_m): (Option<usize>, f32)) -> io::Result<Tile> {
+fn tile(surface: &Surface<'_>, triangles: &[[u32; 3]], (object, step_m): (Option<usize>, f32)) -> io::Result<Tile> {
+    let Surface { mesh, normals, values } = surface;
     let (mut numbers, mut vertices, mut corners) = (hashbrown::HashMap::new(), Vec::<usize>::new(), Vec::new());
     for &corner in triangles.iter().flatten() {
         let next = vertices.len() as u16;
@@ -91,16 +87,12 @@ fn tile(mesh: &IndexedMesh, normals: &[[f32; 3]], triangles: &[[u32; 3]], (objec
     let lowest = low_m.map(|metres| (f64::from(metres) / f64::from(step_m)).floor());
     let steps = |at: usize, axis: usize| (f64::from(mesh.positions_m[at][axis]) / f64::from(step_m)).round() - lowest[axis];
     let quantised = |axis: usize| vertices.iter().map(move |&at| steps(at, axis) as u16);
-    let mut planes = Vec::with_capacity(11 * vertices.len() + 2 * corners.len());
-    (0..3).for_each(|axis| push_words(&mut planes, &differences(quantised(axis)).collect::<Vec<_>>()));
+    let mut planes = Vec::with_capacity((11 + VALUES) * vertices.len() + 2 * corners.len());
+    (0..3).for_each(|axis| push_word_differences(&mut planes, quantised(axis)));
     let octahedral: Vec<[i8; 2]> = vertices.iter().map(|&at| octahedral(normals[at])).collect();
     (0..2).for_each(|axis| planes.extend(octahedral.iter().map(|normal| normal[axis] as u8)));
-    for channel in 0..3 {
-        let mut before = 0;
-        planes.extend(
-            vertices.iter().map(|&at| mesh.colours[at][channel].wrapping_sub(std::mem::replace(&mut before, mesh.colours[at][channel]))),
-        );
-    }
+    (0..3).for_each(|channel| push_byte_differences(&mut planes, vertices.iter().map(|&at| mesh.colours[at][channel])));
+    (0..VALUES).for_each(|value| push_byte_differences(&mut planes, vertices.iter().map(|&at| values[at][value])));
     push_words(&mut planes, &corners);
     let mut deflated = ZlibEncoder::new(Vec::new(), Compression::default());
     deflated.write_all(&planes)?;
@@ -114,20 +106,6 @@ fn tile(mesh: &IndexedMesh, normals: &[[f32; 3]], triangles: &[[u32; 3]], (objec
         triangles: triangles.len(),
     };
     Ok(Tile { head, bytes: deflated.finish()? })
-}
-
-/// Differences of a value from the one before, small ones of either sign as small numbers.
-fn differences(values: impl Iterator<Item = u16>) -> impl Iterator<Item = u16> {
-    values.scan(0u16, |before, value| {
-        let difference = value.wrapping_sub(std::mem::replace(before, value)) as i16;
-        Some((difference << 1 ^ difference >> 15) as u16)
-    })
-}
-
-/// Appends the low bytes of all words, and then the high ones.
-fn push_words(planes: &mut Vec<u8>, words: &[u16]) {
-    planes.extend(words.iter().map(|word| *word as u8));
-    planes.extend(words.iter().map(|word| (word >> 8) as u8));
 }
 
 /// A direction as a point of the octahedron, unfolded to a square (Cigolle et al., 2014).
@@ -144,29 +122,34 @@ mod tests {
     use super::*;
     use std::io::Read;
 
-    /// Positions, colours and triangles of a tile.
-    type Decoded = (Vec<[f32; 3]>, Vec<[u8; 3]>, Vec<[usize; 3]>);
+    /// Positions, colours with the first value, and triangles of a tile.
+    type Decoded = (Vec<[f32; 3]>, Vec<[u8; 4]>, Vec<[usize; 3]>);
 
     /// What the page's script does.
     fn decoded(tile: &Tile) -> Decoded {
         let mut bytes = Vec::new();
         flate2::read::ZlibDecoder::new(&tile.bytes[..]).read_to_end(&mut bytes).unwrap();
         let (count, corners) = (tile.head.vertices, 3 * tile.head.triangles);
-        assert_eq!(bytes.len(), 11 * count + 2 * corners);
-        let (mut positions, mut colours) = (vec![[0.0; 3]; count], vec![[0u8; 3]; count]);
+        assert_eq!(bytes.len(), (11 + VALUES) * count + 2 * corners);
+        let (mut positions, mut colours) = (vec![[0.0; 3]; count], vec![[0u8; 4]; count]);
         for axis in 0..3 {
-            let (mut at, mut colour) = (0u16, 0u8);
-            for (vertex, (position, tint)) in positions.iter_mut().zip(&mut colours).enumerate() {
+            let mut at = 0u16;
+            for (vertex, position) in positions.iter_mut().enumerate() {
                 let word = u16::from(bytes[2 * axis * count + vertex]) | u16::from(bytes[(2 * axis + 1) * count + vertex]) << 8;
                 at = at.wrapping_add(word >> 1 ^ (word & 1).wrapping_neg());
                 position[axis] = tile.head.low_m[axis] + f32::from(at) / 65_535.0 * tile.head.size_m;
-                colour = colour.wrapping_add(bytes[(8 + axis) * count + vertex]);
-                tint[axis] = colour;
+            }
+        }
+        for channel in 0..4 {
+            let mut colour = 0u8;
+            for (vertex, tint) in colours.iter_mut().enumerate() {
+                colour = colour.wrapping_add(bytes[(8 + channel) * count + vertex]);
+                tint[channel] = colour;
             }
         }
         let (mut named, mut triangles) = (0, vec![[0; 3]; tile.head.triangles]);
         for at in 0..corners {
-            let word = usize::from(bytes[11 * count + at]) | usize::from(bytes[11 * count + corners + at]) << 8;
+            let word = usize::from(bytes[(11 + VALUES) * count + at]) | usize::from(bytes[(11 + VALUES) * count + corners + at]) << 8;
             triangles[at / 3][at % 3] = named - word;
             named += usize::from(word == 0);
         }
@@ -177,19 +160,23 @@ mod tests {
     fn every_triangle_is_in_one_tile_to_a_millimetre() {
         let side = 150u32;
         let at = |x: u32, y: u32| y * (side + 1) + x;
-        let mut mesh = IndexedMesh::default();
+        let (mut mesh, mut values) = (IndexedMesh::default(), Vec::new());
         for (x, y) in (0..(side + 1) * (side + 1)).map(|at| (at % (side + 1), at / (side + 1))) {
             mesh.positions_m.push([0.1 * x as f32, 0.2 * y as f32 - 7.0, (x * y % 7) as f32]);
             mesh.colours.push([x as u8, y as u8, (x ^ y) as u8]);
+            values.push([(x * y) as u8; VALUES]);
         }
         for (x, y) in (0..side * side).map(|at| (at % side, at / side)) {
             mesh.triangles.extend([[at(x, y), at(x + 1, y), at(x, y + 1)], [at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)]]);
         }
-        let tiles = tiles(&mesh, Some(3)).unwrap();
+        let tiles = tiles(&mesh, &values, Some(3)).unwrap();
         assert!(tiles.len() == 3 && tiles.iter().all(|tile| tile.head.object == Some(3)));
         let key =
-            |corners: [([f32; 3], [u8; 3]); 3]| corners.map(|(at, colour)| (at.map(|metres| (1_000.0 * metres).round() as i32), colour));
-        let vertex = |at: u32| (mesh.positions_m[at as usize], mesh.colours[at as usize]);
+            |corners: [([f32; 3], [u8; 4]); 3]| corners.map(|(at, colour)| (at.map(|metres| (1_000.0 * metres).round() as i32), colour));
+        let vertex = |at: u32| {
+            let [red, green, blue] = mesh.colours[at as usize];
+            (mesh.positions_m[at as usize], [red, green, blue, values[at as usize][0]])
+        };
         let mut given: Vec<_> = mesh.triangles.iter().map(|triangle| key(triangle.map(vertex))).collect();
         let mut found = Vec::new();
         for tile in &tiles {
@@ -199,7 +186,7 @@ mod tests {
         given.sort();
         found.sort();
         assert!(given == found);
-        assert!(super::tiles(&IndexedMesh::default(), None).unwrap().is_empty());
+        assert!(super::tiles(&IndexedMesh::default(), &[], None).unwrap().is_empty());
     }
 
     #[test]

@@ -6,6 +6,8 @@ const LINES = { camera: "#2f6fde", truth: "#e5484d", now: "#f5b301" };
 // Where the edges of the camera's picture lie at a depth of 1, and how far its pyramid is drawn, m.
 const PYRAMID = [[-0.85, -0.27], [0.85, -0.27], [0.85, 0.27], [-0.85, 0.27]];
 const PYRAMID_M = 1.6;
+// Number of the first colour that stands for a value of the surface.
+const FIRST_VALUE = 4;
 // Boxes along an object's trajectory, at most, and the edges of one between its corners.
 const SWEPT_BOXES = 24;
 const BOX_EDGES = [0, 1, 2].flatMap((bit) => [0, 1, 2, 3, 4, 5, 6, 7].filter((corner) => !(corner >> bit & 1)).map((corner) => [corner, corner | 1 << bit]));
@@ -22,6 +24,7 @@ class Viewer {
     this.charts = new Charts(find(".charts"), head, (at) => this.go(at));
     this.states = this.statesOfObjects();
     this.layers = this.buildLayers();
+    this.buildColours();
     this.readAddress();
     this.buildTime();
     if (renderer) this.buildView();
@@ -55,6 +58,7 @@ class Viewer {
       ["later", "objects where last seen", objects],
       ["tracks", "tracks", objects || head.tracks.some((tracks) => tracks.length)],
       ["swept", "swept volumes", objects, false],
+      ...head.clouds.map(({ layer, name }) => [layer, name, true, false]),
       ["masks", "masks", head.pictures.length > 0 && head.tracks.some((tracks) => tracks.length)],
       ["camera", "camera path", head.poses.length > 0], ["truth", "ground truth", head.truth.length > 0],
     ];
@@ -71,13 +75,37 @@ class Viewer {
     return layers;
   }
 
-  // #frame=12&hide=map,tracks&colour=1&view=follow
+  // Colours by the values that this run's surface has.
+  buildColours() {
+    this.head.values.forEach((value, at) => {
+      if (value) find(".colour").append(new Option(value.name, String(FIRST_VALUE + at)));
+    });
+  }
+
+  // Between which heights colours differ: y, m.
+  heights() {
+    const [highest, lowest] = this.head.heights_m;
+    return [highest, Math.max(lowest, highest + 0.1)];
+  }
+
+  // What the colours mean, where they stand for a value.
+  legend(colour) {
+    const [highest, lowest] = this.heights(), { values } = this.head, legend = find(".legend");
+    const height = colour === 1 && { low: `${(-lowest).toFixed(1)} m`, high: `${(-highest).toFixed(1)} m` };
+    const shown = values[colour - FIRST_VALUE] || height;
+    legend.hidden = !shown;
+    for (const end of ["low", "high"]) legend.querySelector(`.${end}`).textContent = shown ? shown[end] : "";
+  }
+
+  // #frame=12&hide=map,tracks&show=pruned&colour=1&view=follow
   readAddress() {
     const given = new URLSearchParams(location.hash.slice(1));
     if (given.has("frame")) this.at = Math.max(0, this.head.frames.findIndex((frame) => frame >= Number(given.get("frame"))));
-    for (const key of (given.get("hide") || "").split(",")) {
-      const box = find(`.layers input[value="${CSS.escape(key)}"]`);
-      if (box) box.checked = this.layers[key] = false;
+    for (const [name, checked] of [["hide", false], ["show", true]]) {
+      for (const key of (given.get(name) || "").split(",")) {
+        const box = find(`.layers input[value="${CSS.escape(key)}"]`);
+        if (box) box.checked = this.layers[key] = checked;
+      }
     }
     for (const name of ["colour", "view"]) {
       const select = find(name === "view" ? ".mode" : ".colour");
@@ -174,6 +202,8 @@ class Viewer {
 
   draw3d() {
     const { head, renderer, camera, layers } = this, canvas = find(".view canvas"), began = performance.now();
+    const colour = Number(find(".colour").value);
+    this.legend(colour);
     const objects = this.posedObjects();
     const lines = Object.entries(this.lines).filter(([key]) => key === "pyramid" ? layers.camera : layers[key]).map(([, line]) => line);
     for (const { id, line } of [...(layers.tracks ? this.tracks : []), ...(layers.swept ? this.swept : [])]) {
@@ -183,9 +213,9 @@ class Viewer {
     renderer.setLine(this.lines.pyramid, this.pyramid());
     const dark = matchMedia("(prefers-color-scheme: dark)").matches;
     this.triangles = renderer.draw({
-      share: this.share, isCoarse: this.isCoarse, clip: camera.clip(canvas.clientWidth / Math.max(canvas.clientHeight, 1)), colour: Number(find(".colour").value),
-      heights: [head.heights_m[0], Math.max(head.heights_m[1], head.heights_m[0] + 0.1)],
-      background: dark ? [0.07, 0.08, 0.09] : [0.90, 0.92, 0.94], showStatic: layers.map, objects, lines,
+      share: this.share, isCoarse: this.isCoarse, clip: camera.clip(canvas.clientWidth / Math.max(canvas.clientHeight, 1)), colour,
+      heights: this.heights(),
+      background: dark ? [0.07, 0.08, 0.09] : [0.90, 0.92, 0.94], showStatic: layers.map, objects, lines, layers,
     });
     renderer.gl.readPixels(0, 0, 1, 1, renderer.gl.RGBA, renderer.gl.UNSIGNED_BYTE, new Uint8Array(4));
     this.adapt(performance.now() - began);
@@ -251,7 +281,7 @@ async function load() {
     bar.hidden = false;
     let bits = null;
     const decoded = (tile, planes) => {
-      const mesh = decodeTile(planes, tile);
+      const mesh = decodeTile(planes, tile, head.values.length);
       // All tiles of the static map have steps of one size; objects are small.
       if (tile.object === null) bits = bits ?? coarseBits(mesh);
       const coarse = tile.object === null && triangles > COARSE_OVER ? coarseTriangles(mesh, bits) : new Uint16Array(0);
@@ -270,6 +300,7 @@ async function load() {
         await breathe();
       }
     }
+    for (const [at, cloud] of head.clouds.entries()) renderer.addCloud(cloud, decodeCloud(await inflate(`dynvox-cloud-${at}`), cloud));
     bar.hidden = true;
     clearTimeout(viewer.settling);
     viewer.refine();

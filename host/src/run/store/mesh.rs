@@ -1,9 +1,11 @@
 //! A map on disk as triangles, cube by cube: in memory at once are a cube of 8 blocks a side and the layer behind it.
 
 use super::BlockFile;
+use crate::formats::MeshVertex;
+use crate::observe::weighed_triangles;
 use dynvox_core::Capacity;
 use dynvox_core::memory::{Carver, SlabError};
-use dynvox_core::view::{MeshConfig, Triangle};
+use dynvox_core::view::MeshConfig;
 use dynvox_core::volume::{BlockCoord, NoStore, Volume, VolumeConfig};
 use hashbrown::HashSet;
 use std::io::{Read, Seek, Write};
@@ -37,7 +39,7 @@ pub fn triangles<F: Read + Write + Seek>(
     (volume, mesh): (&VolumeConfig, &MeshConfig),
     (slab, colour): (&mut [u8], bool),
     without: &HashSet<BlockCoord>,
-    sink: &mut impl FnMut(Triangle),
+    sink: &mut impl FnMut([MeshVertex; 3]),
 ) -> Result<u64, SlabError> {
     let capacity = cube_capacity(colour);
     let mut carver = Carver::new(slab, Volume::bytes(&capacity))?;
@@ -56,7 +58,7 @@ pub fn triangles<F: Read + Write + Seek>(
             for coord in behind(cube) {
                 volume.load(coord, store);
             }
-            count += volume.triangles_of(mesh, |coord| cube_of(&coord) == cube && !without.contains(&coord), sink);
+            count += weighed_triangles(&volume, mesh, |coord| cube_of(&coord) == cube && !without.contains(&coord), sink);
             // Empties the volume: its blocks are still in the store.
             volume.stream_out(&mut NoStore);
         }

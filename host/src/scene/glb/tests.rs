@@ -17,6 +17,7 @@ fn triangle() -> IndexedMesh {
     IndexedMesh {
         positions_m: vec![[1.0, 2.0, 3.0], [5.0, 2.0, 3.0], [1.0, 4.0, 3.0]],
         colours: vec![[255, 0, 0]; 3],
+        weights: vec![0; 3],
         triangles: vec![[0, 1, 2]],
     }
 }

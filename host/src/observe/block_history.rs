@@ -1,0 +1,103 @@
+//! When each block of the static map was last visible, and which of them pruning took: `blocks.csv`.
+//!
+//! Memory: 12 bytes a slot of the pool. A row is written when a block leaves the pool, and for those that are left at the end.
+
+use super::tables::{BlockFate, block_rows};
+use super::{EndContext, Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
+use dynvox_core::volume::{BlockCoord, Volume};
+use serde::{Deserialize, Serialize};
+use std::io;
+
+/// The file.
+const BLOCKS_TABLE: &str = "blocks.csv";
+
+/// A block, and the number of the frame it was last visible in.
+type Sighting = ([i16; 3], u32);
+
+/// Watches which blocks the pool holds.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct BlockHistoryObserver {
+    /// By slot.
+    sightings: Vec<Option<Sighting>>,
+    file: GrowingFile,
+}
+
+impl Default for BlockHistoryObserver {
+    fn default() -> Self {
+        Self { sightings: Vec::new(), file: GrowingFile::new(BLOCKS_TABLE) }
+    }
+}
+
+impl Observer for BlockHistoryObserver {
+    type Section = ();
+
+    fn files(&mut self) -> Vec<&mut GrowingFile> {
+        vec![&mut self.file]
+    }
+
+    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+        let volume = frame.view.mapper().background();
+        let mut left = self.note_visible(volume, frame.row.frame as u32);
+        let report = &frame.row.report;
+        let eviction = &report.allocation.eviction;
+        if report.prune.blocks_freed + eviction.kept + eviction.lost + eviction.empty > 0 {
+            left.extend(self.take_absent(volume));
+        }
+        let fate = |coord: &[i16; 3]| if frame.evicted.contains(&key_of(*coord)) { BlockFate::Evicted } else { BlockFate::Pruned };
+        self.write(setup, left.into_iter().map(|(coord, last)| (coord, last, fate(&coord))))
+    }
+
+    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+        let pruned = self.take_absent(end.view.mapper().background());
+        let kept = std::mem::take(&mut self.sightings).into_iter().flatten();
+        let rows = pruned.into_iter().map(|(coord, last)| (coord, last, BlockFate::Pruned));
+        self.write(setup, rows.chain(kept.map(|(coord, last)| (coord, last, BlockFate::Map))))
+    }
+
+    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<(), ObserveError> {
+        Ok(())
+    }
+}
+
+impl BlockHistoryObserver {
+    /// Enters the blocks visible in a frame. Returns those whose slot has another one now.
+    fn note_visible(&mut self, volume: &Volume<'_>, frame: u32) -> Vec<Sighting> {
+        let mut left = Vec::new();
+        for &slot in volume.visible().slots() {
+            let Some(coord) = volume.blocks().coord(slot).map(key) else { continue };
+            if self.sightings.len() <= slot.index() {
+                self.sightings.resize(slot.index() + 1, None);
+            }
+            let before = self.sightings[slot.index()].replace((coord, frame));
+            left.extend(before.filter(|(known, _)| *known != coord));
+        }
+        left
+    }
+
+    /// Takes out the blocks whose slot is free now.
+    fn take_absent(&mut self, volume: &Volume<'_>) -> Vec<Sighting> {
+        let mut live = volume.pool().live().map(|slot| slot.index()).peekable();
+        let mut left = Vec::new();
+        for (slot, sighting) in self.sightings.iter_mut().enumerate() {
+            while live.next_if(|&at| at < slot).is_some() {}
+            if live.peek() != Some(&slot) {
+                left.extend(sighting.take());
+            }
+        }
+        left
+    }
+
+    fn write(&mut self, setup: &Setup<'_>, rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>) -> Result<(), ObserveError> {
+        let failed = |source: io::Error| ObserveError::Write { path: setup.folder.join(BLOCKS_TABLE), source };
+        self.file.append(&block_rows(rows, self.file.is_empty()).map_err(failed)?);
+        Ok(())
+    }
+}
+
+fn key(coord: BlockCoord) -> [i16; 3] {
+    [coord.x, coord.y, coord.z]
+}
+
+fn key_of([x, y, z]: [i16; 3]) -> BlockCoord {
+    BlockCoord { x, y, z }
+}
