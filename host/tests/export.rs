@@ -7,6 +7,7 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use binary::{dynvox, names, output_text, rig};
 use dynvox::formats::{PlyMesh, read_numbered, read_poses};
 use dynvox::run::stereo_frame;
+use dynvox_core::geometry::Transform;
 use dynvox_core::{Mapper, Serial, StereoFrame};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -91,8 +92,50 @@ fn cell(position_m: [f64; 3]) -> [i64; 3] {
     position_m.map(|metres| (metres / CELL_M).floor() as i64)
 }
 
+/// Cells with a vertex, by object.
+type ObjectCells = BTreeMap<u32, BTreeSet<[i64; 3]>>;
+
+fn ply_objects(path: &Path) -> ObjectCells {
+    let mut cells = ObjectCells::new();
+    let add = |corners: [dynvox::formats::PlyVertex; 3]| {
+        for corner in corners.iter().filter(|corner| corner.object > 0) {
+            cells.entry(corner.object).or_default().insert(cell(corner.position_m.map(f64::from)));
+        }
+    };
+    PlyMesh::open(path).unwrap().triangles(add).unwrap();
+    cells
+}
+
+/// Objects as their nodes stand without the animation, in the axes of the root's children: those of the first camera.
+fn glb_objects(path: &Path) -> ObjectCells {
+    let file = fs::read(path).unwrap();
+    let json_end = 20 + u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+    let (json, bytes): (serde_json::Value, &[u8]) = (serde_json::from_slice(&file[20..json_end]).unwrap(), &file[json_end + 8..]);
+    let at = |value: &serde_json::Value| value.as_u64().unwrap() as usize;
+    let numbers = |value: &serde_json::Value| value.as_array().unwrap().iter().map(|one| one.as_f64().unwrap()).collect::<Vec<_>>();
+    let mut cells = ObjectCells::new();
+    for node in json["nodes"].as_array().unwrap() {
+        let Some(name) = node["name"].as_str().unwrap().strip_prefix("object ").filter(|name| !name.ends_with("mesh")) else { continue };
+        let pose = Transform {
+            translation_m: numbers(&node["translation"]).try_into().unwrap(),
+            rotation: numbers(&node["rotation"]).try_into().unwrap(),
+        };
+        let mesh = &json["nodes"][at(&node["children"][0])];
+        let (low_m, size_m) = (numbers(&mesh["translation"]), numbers(&mesh["scale"])[0]);
+        let accessor = &json["accessors"][at(&json["meshes"][at(&mesh["mesh"])]["primitives"][0]["attributes"]["POSITION"])];
+        let view = &json["bufferViews"][at(&accessor["bufferView"])];
+        let vertices = bytes[at(&view["byteOffset"])..].chunks_exact(at(&view["byteStride"])).take(at(&accessor["count"]));
+        let object = cells.entry(name.split('-').next().unwrap().parse().unwrap()).or_default();
+        for vertex in vertices {
+            let steps = |axis: usize| f64::from(u16::from_le_bytes([vertex[2 * axis], vertex[2 * axis + 1]])) / 65_535.0;
+            object.insert(cell(pose.transform_point([0, 1, 2].map(|axis| low_m[axis] + size_m * steps(axis)))));
+        }
+    }
+    cells
+}
+
 #[test]
-fn cars_stand_in_the_map_where_the_raycast_of_the_last_frame_shows_them() {
+fn cars_stand_in_both_maps_where_the_raycast_of_the_last_frame_shows_them() {
     let root = TempDir::new().unwrap();
     run(root.path(), &[&STREET[..], &["--out", "result"]].concat());
     // The same run once more, up to a look through the last camera.
@@ -113,15 +156,12 @@ fn cars_stand_in_the_map_where_the_raycast_of_the_last_frame_shows_them() {
     let ids: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
     let seen = mapper.raycast_composed(&pose, &Serial).unwrap();
     let (depth_m, layer) = (seen.depth_m().unwrap(), seen.layer().unwrap());
-    let mut vertices = BTreeMap::<u32, BTreeSet<[i64; 3]>>::new();
-    let map = PlyMesh::open(&root.path().join("result/map.ply")).unwrap();
-    map.triangles(|corners| {
-        for corner in corners.iter().filter(|corner| corner.object > 0) {
-            vertices.entry(corner.object).or_default().insert(cell(corner.position_m.map(f64::from)));
-        }
-    })
-    .unwrap();
-    let mut shown = BTreeMap::<u32, [usize; 2]>::new();
+    let maps = [("map.ply", ply_objects as fn(&Path) -> ObjectCells), ("map.glb", glb_objects)].map(|(name, read)| {
+        let cells = read(&root.path().join("result").join(name));
+        (name, cells)
+    });
+    // Pixels of each object, and how many of them show a point that each of the maps has.
+    let mut shown = BTreeMap::<u32, [usize; 3]>::new();
     for (u, v) in (0..depth_m.height()).flat_map(|v| (0..depth_m.width()).map(move |u| (u, v))) {
         let Some(id) = layer.get(u, v).and_then(|layer| ids.get(usize::from(layer).checked_sub(1)?)) else { continue };
         let z = f64::from(depth_m.get(u, v).unwrap());
@@ -130,13 +170,17 @@ fn cars_stand_in_the_map_where_the_raycast_of_the_last_frame_shows_them() {
         let near = |of: &BTreeSet<[i64; 3]>| {
             (0..27).any(|code| of.contains(&[at[0] + code % 3 - 1, at[1] + code / 3 % 3 - 1, at[2] + code / 9 - 1]))
         };
-        let [pixels, found] = shown.entry(*id).or_default();
+        let [pixels, found @ ..] = shown.entry(*id).or_default();
         *pixels += 1;
-        *found += usize::from(vertices.get(id).is_some_and(near));
+        for (found, (_, cells)) in found.iter_mut().zip(&maps) {
+            *found += usize::from(cells.get(id).is_some_and(near));
+        }
     }
-    assert!(shown.values().any(|[pixels, _]| *pixels > 100), "a car is in sight: {shown:?}");
-    for (id, [pixels, found]) in &shown {
-        assert!(found * 100 >= pixels * 95, "object {id}: {found} of {pixels} pixels show a point of the map's object");
+    assert!(shown.values().any(|[pixels, ..]| *pixels > 100), "a car is in sight: {shown:?}");
+    for (id, [pixels, found @ ..]) in &shown {
+        for (found, (name, _)) in found.iter().zip(&maps) {
+            assert!(found * 100 >= pixels * 95, "object {id}: {found} of {pixels} pixels show a point of its mesh in {name}");
+        }
     }
 }
 
