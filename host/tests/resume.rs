@@ -192,7 +192,8 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
             continue;
         }
         let sentence = format!("{table} is not as the run left it");
-        assert_refused_with(&root, &format!("out/it/{table}"), &known[..known.len() / 2], &sentence);
+        // Of rows that came after the snapshot nothing is known: less than the header is too short for any.
+        assert_refused_with(&root, &format!("out/it/{table}"), &known[..9], &sentence);
         assert_refused_with(&root, &format!("out/it/{table}"), &[b"#", &known[1..]].concat(), &sentence);
     }
     assert_resumes(&root);

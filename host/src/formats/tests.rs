@@ -44,7 +44,7 @@ fn a_mesh_shares_recent_vertices_and_its_header_counts_are_true() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("map.ply");
     let mut ply = PlyWriter::begin(&path).unwrap();
-    let corner = |x: f32, y: f32| ([x, y, 2.0], [10u8, 20, 30]);
+    let corner = |x: f32, y: f32| MeshVertex { position_m: [x, y, 2.0], colour: [10, 20, 30], weight: 40 + x as u8 };
     ply.triangle([corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)]);
     ply.triangle([corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
     assert_eq!(ply.finish().unwrap(), Mesh { vertices: 4, triangles: 2, object_triangles: 0 });
@@ -53,13 +53,14 @@ fn a_mesh_shares_recent_vertices_and_its_header_counts_are_true() {
     let header = std::str::from_utf8(&bytes[..end]).unwrap();
     assert!(header.contains("element vertex 0000000004\n") && header.contains("element face 0000000002\n"), "{header}");
     let body = &bytes[end..];
-    assert_eq!(body.len(), 4 * 31 + 2 * 13);
+    assert_eq!(body.len(), 4 * 32 + 2 * 13);
     let face = |at: usize| {
-        let face = &body[4 * 31 + 13 * at..][..13];
+        let face = &body[4 * 32 + 13 * at..][..13];
         (face[0], [1, 5, 9].map(|from| u32::from_le_bytes(face[from..from + 4].try_into().unwrap())))
     };
     assert_eq!((face(0), face(1)), ((3, [0, 1, 2]), (3, [1, 3, 2])));
     let number = |at: usize| f32::from_le_bytes(body[at..at + 4].try_into().unwrap());
-    assert_eq!([31, 12, 16, 20].map(number), [1.0, 0.0, 0.0, 1.0], "the second vertex and the first one's normal");
+    assert_eq!([32, 12, 16, 20].map(number), [1.0, 0.0, 0.0, 1.0], "the second vertex and the first one's normal");
+    assert_eq!((&body[24..28], &body[56..60]), (&[10, 20, 30, 40][..], &[10, 20, 30, 41][..]), "colours and weights");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the file of faces is gone");
 }

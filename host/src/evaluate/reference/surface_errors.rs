@@ -51,7 +51,9 @@ mod tests {
     #[test]
     fn points_of_one_cell_are_averaged() {
         let mut errors = SurfaceErrors::default();
-        [([0.05, 0.0, 0.1], 0.1), ([-0.05, 0.0, 0.1], 0.5), ([0.15, 0.19, 0.0], 0.3)].map(|(at, distance_m)| errors.add(at, distance_m));
+        for (at, distance_m) in [([0.05, 0.0, 0.1], 0.1), ([-0.05, 0.0, 0.1], 0.5), ([0.15, 0.19, 0.0], 0.3)] {
+            errors.add(at, distance_m);
+        }
         let cells: Vec<SurfaceError> = errors.cells().collect();
         assert_eq!(cells.len(), 2);
         assert_eq!((cells[0].points, cells[0].mean_m), (1, 0.5));
