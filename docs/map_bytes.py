@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Where the bytes of a run's `map.ply` go, and what would make it smaller.
 
-docs/map_bytes.py RUN_FOLDER      (needs numpy)
+docs/map_bytes.py RUN_FOLDER      (needs numpy, scipy)
 
 Prints the bytes of vertices and faces; the share of vertices that are there twice; the share of triangles in components of fewer than so many; and
 the size left if vertices close to a lattice point moved there and the triangles that collapse were dropped.
@@ -9,6 +9,8 @@ the size left if vertices close to a lattice point moved there and the triangles
 import pathlib, sys, tomllib
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 folder = pathlib.Path(sys.argv[1])
 voxel_m = tomllib.load(open(folder / "config.toml", "rb"))["volume"]["voxel_size_m"]
@@ -37,15 +39,9 @@ def welded(positions):
 print(f"{len(vertices)} vertices of {vertex.itemsize} bytes, {len(faces)} faces of 13: {megabytes(len(vertices), len(faces)):.1f} MB")
 numbers, places = welded(positions)
 print(f"there twice: {100 * (1 - places / len(vertices)):.1f} % of the vertices")
-corners, label = numbers[faces], np.arange(places)
-while True:
-    least, before = label[corners].min(1), label.copy()
-    for corner in corners.T:
-        np.minimum.at(label, corner, least)
-    label = label[label]
-    if (label == before).all():
-        break
-sizes = np.bincount(label[corners[:, 0]])
+a, b, c = numbers[faces].T
+edges = coo_array((np.ones(2 * len(a), bool), (np.concatenate([a, a]), np.concatenate([b, c]))), (places, places))
+sizes = np.bincount(connected_components(edges, directed=False)[1][a])
 sizes = sizes[sizes > 0]
 for most in (10, 50, 200):
     few = sizes < most
