@@ -186,14 +186,13 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
     assert_refused(&root, "map.blocks is missing");
     fs::rename(path("blocks"), &blocks).unwrap();
     assert_refused_with(&root, "out/it/map.blocks", b"dynvox", "map.blocks is not as the run left it");
-    for table in ["blocks.csv", "frames.csv", "tracks.csv", "trajectory_tum.txt"] {
+    for table in ["frames.csv", "tracks.csv", "trajectory_tum.txt"] {
         let known = fs::read(path(&format!("out/it/{table}"))).unwrap();
         if known.is_empty() {
             continue;
         }
         let sentence = format!("{table} is not as the run left it");
-        // Of rows that came after the snapshot nothing is known: less than the header is too short for any.
-        assert_refused_with(&root, &format!("out/it/{table}"), &known[..9], &sentence);
+        assert_refused_with(&root, &format!("out/it/{table}"), &known[..known.len() / 2], &sentence);
         assert_refused_with(&root, &format!("out/it/{table}"), &[b"#", &known[1..]].concat(), &sentence);
     }
     assert_resumes(&root);
