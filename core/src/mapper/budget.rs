@@ -13,6 +13,10 @@ use core::fmt;
 
 /// Largest image side, px: positions of features are 16-bit.
 pub const MAX_SIDE: usize = 8_192;
+/// Most of anything that a mapper counts, so that the sum of bytes fits 64 bits.
+const MAX_COUNT: usize = 1 << 28;
+/// Most frames of a visible history, each of which has a bit for every block.
+const MAX_HISTORY_FRAMES: usize = 1 << 16;
 /// Largest side of an image that is rectified, px.
 const MAX_RAW_SIDE: usize = 4_096;
 /// Most pixels of an image.
@@ -141,16 +145,26 @@ impl Capacity {
     /// The first bound that is not.
     pub fn validate(&self) -> Result<(), CapacityProblem> {
         let above_0 = "must be above 0";
+        let countable = "must be at most 268,435,456";
         let rules = [
             (self.image_width >= MIN_WIDTH, "image_width", "must be at least 64 px"),
             (self.image_height >= MIN_HEIGHT, "image_height", "must be at least 32 px"),
             (self.image_width.max(self.image_height) <= MAX_SIDE, "image_width", "and image_height must be at most 8,192 px"),
+            (self.raw_width.max(self.raw_height) <= MAX_RAW_SIDE, "raw_width", "and raw_height must be at most 4,096 px"),
             (self.features > 0, "features", above_0),
             (self.matches > 0, "matches", above_0),
             (self.blocks > 0, "blocks", above_0),
             (self.visible_blocks > 0, "visible_blocks", above_0),
             (self.visible_blocks <= self.blocks, "visible_blocks", "must be at most `blocks`"),
             (self.history_frames > 0, "history_frames", above_0),
+            (self.history_frames <= MAX_HISTORY_FRAMES, "history_frames", "must be at most 65,536"),
+            (self.features <= MAX_COUNT, "features", countable),
+            (self.matches <= MAX_COUNT, "matches", countable),
+            (self.blocks <= MAX_COUNT, "blocks", countable),
+            (self.mask_words <= MAX_COUNT, "mask_words", countable),
+            (self.tracks <= MAX_COUNT, "tracks", countable),
+            (self.object_blocks <= MAX_COUNT, "object_blocks", countable),
+            (self.crop_pixels <= MAX_COUNT, "crop_pixels", countable),
             (self.detections <= MAX_DETECTIONS, "detections", "must be at most 64"),
             (self.objects <= MAX_OBJECTS, "objects", "must be at most 16"),
             (
@@ -265,12 +279,13 @@ impl<'o> Question<'o> {
         self.filled(with_objects(step, crop_pixels))
     }
 
-    /// With as many blocks as fit.
+    /// With as many blocks as fit, and as can be counted.
     fn filled(&self, capacity: Capacity) -> Capacity {
         let fits = |blocks: usize| self.with_blocks(&capacity, blocks).bytes() <= self.bytes;
         // A block has at least 512 voxels of 3 bytes.
         let block_bytes = 512 * if capacity.colour { 6 } else { 3 };
-        let (mut fitting, mut too_many) = (0, self.bytes.saturating_sub(capacity.bytes()) / block_bytes + 1);
+        let most = self.bytes.saturating_sub(capacity.bytes()) / block_bytes;
+        let (mut fitting, mut too_many) = (0, if most < MAX_COUNT { most + 1 } else { MAX_COUNT + 1 });
         while fitting + 1 < too_many {
             let middle = fitting + (too_many - fitting) / 2;
             if fits(middle) {

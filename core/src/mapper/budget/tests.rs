@@ -102,5 +102,49 @@ fn the_profiles_are_valid_and_what_cannot_be_is_named() {
     assert_eq!(solve(MIB, (640, 480), &BudgetOptions { objects: Some(99), ..plain }), Err(BudgetError::Objects));
     assert_eq!(solve(MIB, (640, 480), &BudgetOptions { voxel_size_m: Some(f32::NAN), ..plain }), Err(BudgetError::VoxelSize));
     assert!(matches!(solve(0, (640, 480), &plain), Err(BudgetError::TooSmall { .. })));
-    assert!(solve(usize::MAX, (640, 480), &plain).is_ok_and(|capacity| capacity.bytes() <= isize::MAX as usize));
+    assert!(solve(usize::MAX, (640, 480), &plain).is_ok_and(|capacity| capacity.validate().is_ok()));
+}
+
+#[test]
+fn the_bytes_of_every_valid_capacity_can_be_summed_up() {
+    let profile = Capacity {
+        raw_width: 4_096,
+        raw_height: 4_096,
+        planning_width: 1_024,
+        planning_length: 1_024,
+        planning_height: 1_024,
+        ..Capacity::DESKTOP
+    };
+    let setters: [(&str, fn(&mut Capacity) -> &mut usize); 11] = [
+        ("raw_width", |of| &mut of.raw_width),
+        ("features", |of| &mut of.features),
+        ("matches", |of| &mut of.matches),
+        ("blocks", |of| &mut of.blocks),
+        ("visible_blocks", |of| &mut of.visible_blocks),
+        ("history_frames", |of| &mut of.history_frames),
+        ("mask_words", |of| &mut of.mask_words),
+        ("tracks", |of| &mut of.tracks),
+        ("objects", |of| &mut of.objects),
+        ("object_blocks", |of| &mut of.object_blocks),
+        ("crop_pixels", |of| &mut of.crop_pixels),
+    ];
+    let mut largest = Capacity { planning_distance_3d: true, ..profile };
+    for (name, field) in setters {
+        for shift in 0..64 {
+            let mut capacity = largest;
+            *field(&mut capacity) = 1 << shift;
+            match capacity.validate() {
+                Ok(()) => assert!(capacity.bytes() <= isize::MAX as usize, "{name} 2^{shift}"),
+                Err(problem) => assert!([name, "visible_blocks"].contains(&problem.bound), "{name} 2^{shift}: {problem:?}"),
+            }
+        }
+        // The next field beside the largest of this one.
+        let most = (0..64).map(|shift| 1usize << shift).filter(|value| {
+            let mut capacity = largest;
+            *field(&mut capacity) = *value;
+            capacity.validate().is_ok()
+        });
+        *field(&mut largest) = most.max().unwrap();
+    }
+    assert_eq!((largest.blocks, largest.history_frames), (1 << 28, 1 << 16));
 }
