@@ -65,12 +65,8 @@ fn view_writes_one_file_that_fetches_nothing_and_refuses_what_is_no_run() {
     assert!(!refused.status.success() && output_text(&refused).contains("is not a run folder"), "{}", output_text(&refused));
 }
 
-#[dynvox_needs::browser]
-#[test]
-fn the_viewer_draws_scrubs_and_toggles() {
-    let root = TempDir::new().unwrap();
-    FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());
-    let script = r#"
+/// Scrubs through the frames, switches layers and colours, turns the view, and tells what each changes.
+const TOGGLES: &str = r#"
 const all = shown(), result = { share: all.share, triangles: Number(data.triangles), error: data.error };
 await scrub(0);
 result.first = data.frame;
@@ -114,7 +110,13 @@ await drawn(() => turn("pointermove", 320));
 result.turned = shown().red !== before;
 report(result);
 "#;
-    let of = visit(&viewer(root.path()), "", script);
+
+#[dynvox_needs::browser]
+#[test]
+fn the_viewer_draws_scrubs_and_toggles() {
+    let root = TempDir::new().unwrap();
+    FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());
+    let of = visit(&viewer(root.path()), "", TOGGLES);
     assert!(of["share"].as_f64().unwrap() > 0.1, "the map is drawn: {of}");
     assert_eq!((&of["first"], &of["last"]), (&"0".into(), &"22".into()), "{of}");
     assert!(of["caption"].as_str().unwrap().ends_with("frame 0") && of["lastCaption"].as_str().unwrap().ends_with("frame 22"), "{of}");

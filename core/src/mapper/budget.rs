@@ -15,7 +15,7 @@ use core::fmt;
 pub const MAX_SIDE: usize = 8_192;
 /// Most of anything that a mapper counts, so that the sum of bytes fits 64 bits.
 const MAX_COUNT: usize = 1 << 28;
-/// Most frames of a visible history, each of which has a bit for every block.
+/// Most frames of a visible history, where a frame has a bit for every block.
 const MAX_HISTORY_FRAMES: usize = 1 << 16;
 /// Largest side of an image that is rectified, px.
 const MAX_RAW_SIDE: usize = 4_096;

@@ -122,9 +122,6 @@ impl Mapper<'_> {
         // (F) Noise last observed a fixed lag ago is removed.
         let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
         let prune = PruneReport { voxels_erased, ..prune };
-        if self.camera.since_reference() > 0 {
-            self.scene_flow.keep_previous();
-        }
         self.finish_frame(Outcome { stereo, scene_flow, located, tracking, fused, allocation, prune })
     }
 
@@ -139,6 +136,9 @@ impl Mapper<'_> {
             allocation,
             prune,
         } = outcome;
+        if self.camera.since_reference() > 0 {
+            self.scene_flow.keep_previous();
+        }
         if fused {
             self.observe_free_space(&camera.t_world_camera);
         }

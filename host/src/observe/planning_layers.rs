@@ -3,12 +3,10 @@
 use dynvox_core::geometry::Transform;
 use dynvox_core::planning::{CellState, Planning};
 
-/// What [`PlanningLayers::occupancy`] holds, as in `nav_msgs/OccupancyGrid`.
-pub const FREE: i8 = 0;
-/// An obstacle.
-pub const OCCUPIED: i8 = 100;
-/// Never seen.
-pub const UNKNOWN: i8 = -1;
+/// Values of `nav_msgs/OccupancyGrid`.
+const FREE: i8 = 0;
+const OCCUPIED: i8 = 100;
+const UNKNOWN: i8 = -1;
 
 /// The window from above, after [`dynvox_core::Mapper::plan`]: rows from the nearest to the farthest ahead, columns from left to right.
 #[derive(Clone, Debug)]
@@ -19,7 +17,7 @@ pub struct PlanningLayers {
     pub cell_m: f64,
     /// The corner of the first cell at the height of the lowest ground, in the world; its axes are right, ahead and up.
     pub t_world_corner: Transform,
-    /// [`FREE`], [`OCCUPIED`] or [`UNKNOWN`], between the limits of the slice.
+    /// 0 free, 100 occupied, -1 never seen, between the limits of the slice: as in `nav_msgs/OccupancyGrid`.
     pub occupancy: Vec<i8>,
     /// To the nearest obstacle of the slice, m; negative within one, NaN without any.
     pub distance_m: Vec<f32>,

@@ -105,6 +105,9 @@ fn the_profiles_are_valid_and_what_cannot_be_is_named() {
     assert!(solve(usize::MAX, (640, 480), &plain).is_ok_and(|capacity| capacity.validate().is_ok()));
 }
 
+/// A bound of a capacity.
+type Field = fn(&mut Capacity) -> &mut usize;
+
 #[test]
 fn the_bytes_of_every_valid_capacity_can_be_summed_up() {
     let profile = Capacity {
@@ -115,7 +118,7 @@ fn the_bytes_of_every_valid_capacity_can_be_summed_up() {
         planning_height: 1_024,
         ..Capacity::DESKTOP
     };
-    let setters: [(&str, fn(&mut Capacity) -> &mut usize); 11] = [
+    let fields: [(&str, Field); 11] = [
         ("raw_width", |of| &mut of.raw_width),
         ("features", |of| &mut of.features),
         ("matches", |of| &mut of.matches),
@@ -129,7 +132,7 @@ fn the_bytes_of_every_valid_capacity_can_be_summed_up() {
         ("crop_pixels", |of| &mut of.crop_pixels),
     ];
     let mut largest = Capacity { planning_distance_3d: true, ..profile };
-    for (name, field) in setters {
+    for (name, field) in fields {
         for shift in 0..64 {
             let mut capacity = largest;
             *field(&mut capacity) = 1 << shift;
