@@ -1,5 +1,6 @@
 //! What a mapper hands out: new arrays.
 
+use dynvox::formats::MeshVertex;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
 use dynvox_core::view::{Raycaster, Triangle};
@@ -31,9 +32,13 @@ pub struct Triangles {
 
 impl Triangles {
     pub fn add(&mut self, triangle: Triangle) {
-        for vertex in triangle.vertices {
-            self.positions_m.push(vertex.position_m);
-            self.colours.push(vertex.colour);
+        self.add_corners(triangle.vertices.map(|vertex| (vertex.position_m, vertex.colour).into()));
+    }
+
+    pub fn add_corners(&mut self, corners: [MeshVertex; 3]) {
+        for MeshVertex { position_m, colour, weight: _ } in corners {
+            self.positions_m.push(position_m);
+            self.colours.push(colour);
         }
     }
 

@@ -225,7 +225,7 @@ fn map_triangles(running: &mut Running) -> PyResult<Triangles> {
         let (config, colour) = (&running.plan.config, running.plan.capacity.colour);
         let mut slab = HostSlab::map(MESH_BYTES).ok_or_else(|| refuse("there is no memory for the triangles. Free some"))?;
         let how = (&config.volume, &config.mesh);
-        store::mesh::triangles(file, how, (slab.bytes_mut(), colour), &in_memory, &mut |triangle| triangles.add(triangle))
+        store::mesh::triangles(file, how, (slab.bytes_mut(), colour), &in_memory, &mut |corners| triangles.add_corners(corners))
             .map_err(|error| raise(anyhow::anyhow!("{error}")))?;
     }
     Ok(triangles)
