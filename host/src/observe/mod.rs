@@ -38,7 +38,7 @@ pub use health::{HealthObserver, HealthSection};
 pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
-pub use planning::{BoxDescription, PLANNING_FOLDER, PlanningObserver, write_folder as write_planning};
+pub use planning::{BoxDescription, PlanningObserver, write_folder as write_planning};
 pub use planning_layers::PlanningLayers;
 pub use recording::{RECORDING_FILE, RecordingObserver};
 pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, ReferenceSection};

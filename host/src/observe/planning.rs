@@ -1,17 +1,13 @@
 //! The planner's window after the last frame, as files: a map for Nav2, heights, distances, a picture of them.
 
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup};
+use crate::scene::{FREE_GREY, OCCUPIED_GREY, PLANNING_FOLDER, WindowScales};
 use dynvox_core::planning::{Cell, CellState, MovingBox, Planning, PlanningReport};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Folder of the window in the run folder.
-pub const PLANNING_FOLDER: &str = "planning";
-
-/// Nav2's grey levels of a map in trinary mode.
-const FREE_GREY: u8 = 254;
-const OCCUPIED_GREY: u8 = 0;
+/// Nav2's grey level of what is unknown, in trinary mode.
 const UNKNOWN_GREY: u8 = 205;
 /// What stands for a distance of 0 in `distance.png`, whose values are centimetres.
 const DISTANCE_ZERO: f32 = 32_768.0;
@@ -28,20 +24,10 @@ struct Description {
     /// Number of the frame, and its camera's place in the window's axes: m to the right, ahead, upwards.
     frame: usize,
     camera_m: [f64; 3],
-    /// Cells along each side, their side, and where the first one begins.
+    /// Cells along each side.
     cells: [usize; 3],
-    cell_m: f64,
-    origin_m: [f64; 3],
-    /// The world's coordinates of the window's axes' origin and of a metre along each of them.
-    right_world: [f64; 3],
-    ahead_world: [f64; 3],
-    up_world: [f64; 3],
-    /// Height of the value 0 of `height.png`, m, and its unit; 65,535 is no ground.
-    height_zero_m: f64,
-    height_unit_m: f64,
-    /// The value of `distance.png` that is a distance of 0, and its unit; 0 is no distance.
-    distance_zero: u16,
-    distance_unit_m: f64,
+    #[serde(flatten)]
+    scales: WindowScales,
     report: PlanningReport,
     boxes: Vec<BoxDescription>,
 }
@@ -146,15 +132,17 @@ fn describe(columns: &Columns<'_, '_>, frame: usize, camera_world: [f64; 3], rep
         frame,
         camera_m: grid.of_world(camera_world).map(|c| c * cell_m),
         cells: planning.size(),
-        cell_m,
-        origin_m: planning.origin().map(|c| f64::from(c) * cell_m),
-        right_world: axis([1.0, 0.0, 0.0]),
-        ahead_world: axis([0.0, 1.0, 0.0]),
-        up_world: axis([0.0, 0.0, 1.0]),
-        height_zero_m: if lowest.is_finite() { lowest } else { 0.0 },
-        height_unit_m: 0.001,
-        distance_zero: DISTANCE_ZERO as u16,
-        distance_unit_m: 0.01,
+        scales: WindowScales {
+            cell_m,
+            origin_m: planning.origin().map(|c| f64::from(c) * cell_m),
+            right_world: axis([1.0, 0.0, 0.0]),
+            ahead_world: axis([0.0, 1.0, 0.0]),
+            up_world: axis([0.0, 0.0, 1.0]),
+            height_zero_m: if lowest.is_finite() { lowest } else { 0.0 },
+            height_unit_m: 0.001,
+            distance_zero: DISTANCE_ZERO as u16,
+            distance_unit_m: 0.01,
+        },
         report,
         boxes: planning.boxes().iter().map(BoxDescription::from).collect(),
     }
@@ -208,7 +196,7 @@ impl Columns<'_, '_> {
         let (width, length) = self.size();
         ImageBuffer::from_fn(width, length, |u, v| {
             let height_m = self.planning.column(self.at(u, v)).and_then(|column| column.ground_m()).map(f64::from);
-            let value = height_m.map(|height_m| (height_m - description.height_zero_m) / description.height_unit_m);
+            let value = height_m.map(|height_m| (height_m - description.scales.height_zero_m) / description.scales.height_unit_m);
             Luma([value.map_or(u16::MAX, |value| (value + 0.5).min(65_534.0) as u16)])
         })
     }
@@ -225,8 +213,8 @@ impl Columns<'_, '_> {
     /// For people: free ground by height, steps in orange, obstacles black, moving objects red, unknown grey, the camera blue.
     fn picture(&self, description: &Description) -> RgbImage {
         let (width, length) = self.size();
-        let [camera_x, camera_y, _] = description.camera_m.map(|c| (c / description.cell_m).floor() as i32);
-        let boxes = |cell: Cell| self.planning.boxes().iter().any(|moving| covers(moving, cell, description.cell_m as f32));
+        let [camera_x, camera_y, _] = description.camera_m.map(|c| (c / description.scales.cell_m).floor() as i32);
+        let boxes = |cell: Cell| self.planning.boxes().iter().any(|moving| covers(moving, cell, description.scales.cell_m as f32));
         RgbImage::from_fn(width, length, |u, v| {
             let cell = self.at(u, v);
             let column = self.planning.column(cell).unwrap_or_default();
@@ -242,7 +230,7 @@ impl Columns<'_, '_> {
                 CellState::Free => match column.ground_m() {
                     _ if column.step_m > 0.06 => Rgb([255, 160, 40]),
                     Some(height_m) => {
-                        let above = ((f64::from(height_m) - description.height_zero_m) * 128.0).clamp(0.0, 155.0) as u8;
+                        let above = ((f64::from(height_m) - description.scales.height_zero_m) * 128.0).clamp(0.0, 155.0) as u8;
                         Rgb([100 + above, 230, 100])
                     }
                     None => Rgb([235, 235, 235]),

@@ -1,6 +1,6 @@
 //! `blocks.csv` as a viewer shows it: when each place was last seen, and which blocks pruning took.
 
-use super::tables::read_rows;
+use super::{neighbourhood, tables::read_rows};
 use crate::formats::{FormatError, read_text};
 use hashbrown::HashMap;
 use serde::Deserialize;
@@ -75,9 +75,8 @@ impl BlockHistory {
     /// that of a block beside them.
     pub fn last_frame(&self, position_m: [f32; 3]) -> Option<usize> {
         let at = position_m.map(|metres| (metres / self.side_m).floor() as i32);
-        let beside = || (0..27).map(|code| [at[0] + code % 3 - 1, at[1] + code / 3 % 3 - 1, at[2] + code / 9 - 1]);
         let of = |coord: [i32; 3]| self.last_seen.get(&coord).copied();
-        of(at).or_else(|| beside().filter_map(of).max())
+        of(at).or_else(|| neighbourhood(at).filter_map(of).max())
     }
 
     /// Whether no block is known.

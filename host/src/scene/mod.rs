@@ -14,7 +14,7 @@ pub use block_history::BlockHistory;
 pub use cluster::VertexClustering;
 pub use mesh::IndexedMesh;
 pub use pictures::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
-pub use planning::{PlanningCell, PlanningWindow};
+pub use planning::{FREE_GREY, OCCUPIED_GREY, PLANNING_FOLDER, PlanningCell, PlanningWindow, WindowScales};
 pub use read::object_files;
 pub use surface_errors::SurfaceErrorMap;
 pub use tables::{FrameColumns, TrackColumns};
@@ -25,6 +25,11 @@ use dynvox_core::geometry::Transform;
 pub const OBJECTS_FOLDER: &str = "objects";
 /// Triangles of all meshes together, unless something else is asked for.
 pub const MOST_TRIANGLES: usize = 500_000;
+
+/// A cell and those around it.
+fn neighbourhood([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
+    (0..27).map(move |code| [x + code % 3 - 1, y + code / 3 % 3 - 1, z + code / 9 - 1])
+}
 
 /// A frame.
 #[derive(Clone, Debug)]

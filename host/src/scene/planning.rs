@@ -1,27 +1,37 @@
 //! The planner's window as a viewer shows it: what is free and occupied, on the ground.
 
 use crate::formats::{FormatError, Picture, read_picture, read_png_deep, read_text};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Name of the folder of the window in the run folder.
-const PLANNING_FOLDER: &str = "planning";
-/// Grey levels of `map.pgm`, as Nav2's map server has them.
-const FREE_GREY: u8 = 254;
-const OCCUPIED_GREY: u8 = 0;
+pub const PLANNING_FOLDER: &str = "planning";
+/// Grey level of what is free in `map.pgm`, as Nav2's map server has it in trinary mode.
+pub const FREE_GREY: u8 = 254;
+/// Of an obstacle.
+pub const OCCUPIED_GREY: u8 = 0;
 
 /// What `window.json` says of the other files.
-#[derive(Debug, Deserialize)]
-struct Description {
-    cell_m: f64,
-    origin_m: [f64; 3],
-    right_world: [f64; 3],
-    ahead_world: [f64; 3],
-    up_world: [f64; 3],
-    height_zero_m: f64,
-    height_unit_m: f64,
-    distance_zero: u16,
-    distance_unit_m: f64,
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct WindowScales {
+    /// Side of a cell, and where the first one begins, m.
+    pub cell_m: f64,
+    /// See `cell_m`.
+    pub origin_m: [f64; 3],
+    /// A metre along each of the window's axes, in the world's coordinates.
+    pub right_world: [f64; 3],
+    /// See `right_world`.
+    pub ahead_world: [f64; 3],
+    /// See `right_world`.
+    pub up_world: [f64; 3],
+    /// Height of the value 0 of `height.png`, m, and its unit; 65,535 is no ground.
+    pub height_zero_m: f64,
+    /// See `height_zero_m`.
+    pub height_unit_m: f64,
+    /// The value of `distance.png` that is a distance of 0, and its unit; 0 is no distance.
+    pub distance_zero: u16,
+    /// See `distance_zero`.
+    pub distance_unit_m: f64,
 }
 
 /// A column of the window that is known.
@@ -58,7 +68,7 @@ impl PlanningWindow {
             return Ok(Self::default());
         }
         let damaged = |reason: String| FormatError::content(&path, reason, "Make the run again");
-        let of: Description = serde_json::from_str(&read_text(&path)?).map_err(|error| damaged(error.to_string()))?;
+        let of: WindowScales = serde_json::from_str(&read_text(&path)?).map_err(|error| damaged(error.to_string()))?;
         let Picture::Grey(map) = read_picture(&folder.join("map.pgm"))? else {
             return Err(damaged("map.pgm has no grey levels".to_owned()));
         };

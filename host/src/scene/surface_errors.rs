@@ -1,6 +1,6 @@
 //! `surface_errors.csv` as a viewer shows it: how far the static map is off, where it was compared.
 
-use super::tables::read_rows;
+use super::{neighbourhood, tables::read_rows};
 use crate::formats::FormatError;
 use hashbrown::HashMap;
 use serde::Deserialize;
@@ -43,8 +43,7 @@ impl SurfaceErrorMap {
 
     /// The error of the comparison nearest to a place; `None` where none is within a cell's side.
     pub fn error_m(&self, position_m: [f32; 3]) -> Option<f32> {
-        let [x, y, z] = cell(position_m);
-        let near = (0..27).filter_map(|code| self.cells.get(&[x + code % 3 - 1, y + code / 3 % 3 - 1, z + code / 9 - 1])).flatten();
+        let near = neighbourhood(cell(position_m)).filter_map(|cell| self.cells.get(&cell)).flatten();
         let square = |at: &[f32; 3]| (0..3).map(|axis| (at[axis] - position_m[axis]).powi(2)).sum::<f32>();
         let nearest = near.map(|(at, error_m)| (square(at), *error_m)).min_by(|a, b| a.0.total_cmp(&b.0));
         nearest.filter(|(square, _)| *square <= CELL_M * CELL_M).map(|(_, error_m)| error_m)
