@@ -345,6 +345,8 @@ typedef struct {
   DynvoxPose t_world_camera;
   // Whether the frame went into the map.
   bool fused;
+  // Number of the map's segment, from 0: another one begins, 100 m above, where the camera was lost and not found again.
+  uint32_t segment;
   // Pixels with a disparity.
   uint32_t disparities;
   // Matches the camera's motion rests on.

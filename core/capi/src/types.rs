@@ -111,6 +111,8 @@ pub struct DynvoxReport {
     pub t_world_camera: DynvoxPose,
     /// Whether the frame went into the map.
     pub fused: bool,
+    /// Number of the map's segment, from 0: another one begins, 100 m above, where the camera was lost and not found again.
+    pub segment: u32,
     /// Pixels with a disparity.
     pub disparities: u32,
     /// Matches the camera's motion rests on.
@@ -147,6 +149,7 @@ impl From<&Report> for DynvoxReport {
             },
             t_world_camera: (&report.t_world_camera).into(),
             fused: report.fused,
+            segment: report.segment,
             disparities: report.stereo.valid,
             inliers: report.egomotion.map_or(0, |egomotion| egomotion.inliers),
             blocks: report.blocks.used,

@@ -40,7 +40,7 @@ mod track;
 pub use config::EgomotionConfig;
 pub use estimate::{Estimator, MotionEstimate, MotionStatus};
 pub use synchrony::RightAhead;
-pub use track::{Egomotion, REFERENCE_FRAMES_MAX};
+pub use track::{Egomotion, REFERENCE_FRAMES_MAX, SEGMENT_GAP_M};
 
 #[cfg(test)]
 mod tests;

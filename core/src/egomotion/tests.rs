@@ -1,6 +1,6 @@
 mod clip;
 
-use super::{Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus, REFERENCE_FRAMES_MAX};
+use super::{Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus, REFERENCE_FRAMES_MAX, SEGMENT_GAP_M};
 use crate::{
     geometry::{StereoRig, Transform},
     image::View,
@@ -284,15 +284,24 @@ fn a_camera_stands_at_once_where_it_could_brake() {
 }
 
 #[test]
-fn a_camera_lost_for_long_goes_on_from_a_guess_and_says_so() {
+fn a_camera_lost_for_long_is_matched_with_its_last_frame_and_begins_a_segment_above_its_guess() {
     let mut camera = Egomotion::default();
     camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));
     for frame in 1..=REFERENCE_FRAMES_MAX {
-        assert_eq!((camera.segment(), camera.since_reference()), (0, frame - 1));
+        assert_eq!((camera.is_lost(), camera.since_reference()), (false, frame - 1));
         camera.hold(0.1);
     }
-    assert_eq!((camera.segment(), camera.since_reference()), (1, 0));
-    assert!((camera.t_world_camera().distance_m() - 1.0 - f64::from(REFERENCE_FRAMES_MAX)).abs() < 1e-9);
+    for frame in 0..20 {
+        assert_eq!((camera.is_lost(), camera.segment(), camera.since_reference()), (true, 0, 0));
+        assert!((camera.t_world_camera().translation_m[2] - 1.0 - f64::from(REFERENCE_FRAMES_MAX + frame)).abs() < 1e-9);
+        camera.hold(0.1);
+    }
+    let guess = camera.t_world_camera().translation_m;
+    camera.begin_segment();
+    assert_eq!((camera.t_world_camera().translation_m, camera.segment()), ([guess[0], guess[1] - SEGMENT_GAP_M, guess[2]], 1));
+    let pose = Transform::from_translation([3.0, 0.0, 2.0]);
+    camera.relocalize(&pose);
+    assert_eq!((*camera.t_world_camera(), camera.segment()), (pose, 1));
 }
 
 #[test]

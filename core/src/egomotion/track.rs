@@ -17,8 +17,12 @@ const FEWER_INLIERS_MAX: u32 = 4;
 /// Distance by which the estimate of one frame's motion may be wrong, m.
 const NOISE_M: f64 = 0.1;
 
-/// Frames without an estimate after which matches are sought with the last frame, although its pose is a guess.
+/// Frames without an estimate after which the camera is lost: matches are sought with the last frame, although its pose is a guess.
 pub const REFERENCE_FRAMES_MAX: u32 = 8;
+
+/// Height by which a segment of the map stands above where its first pose was guessed, m: farther than any frame is fused, so that no block of it
+/// is one of another segment.
+pub const SEGMENT_GAP_M: f64 = 100.0;
 
 /// Where the camera is and how it last moved.
 #[derive(Clone, Debug)]
@@ -36,7 +40,7 @@ pub struct Egomotion {
     /// Matches that motion explained.
     inliers: u32,
     held: u32,
-    /// How often the reference had to be given up.
+    /// How many segments of the map were begun after the first.
     segment: u32,
     random: Random,
 }
@@ -113,10 +117,27 @@ impl Egomotion {
         self.held = self.held.saturating_add(1);
         self.since_reference += 1;
         self.extrapolate();
-        if self.since_reference >= REFERENCE_FRAMES_MAX {
+        if self.is_lost() {
             self.refer_to_last();
-            self.segment = self.segment.saturating_add(1);
         }
+    }
+
+    /// Whether the camera has not been located for so long that its pose says nothing any more.
+    pub fn is_lost(&self) -> bool {
+        self.held >= REFERENCE_FRAMES_MAX
+    }
+
+    /// Sets the pose at which a camera that was lost is found; its motion stays.
+    pub fn relocalize(&mut self, t_world_camera: &Transform) {
+        self.t_world_camera = t_world_camera.normalized();
+        self.refer_to_last();
+    }
+
+    /// Begins another segment of the map, [`SEGMENT_GAP_M`] above the guessed pose: y points down.
+    pub fn begin_segment(&mut self) {
+        self.segment = self.segment.saturating_add(1);
+        self.t_world_camera.translation_m[1] -= SEGMENT_GAP_M;
+        self.refer_to_last();
     }
 
     /// The motion to the next frame from the reference, if the camera moves on as before.
@@ -171,7 +192,7 @@ impl Egomotion {
         self.since_reference
     }
 
-    /// How often the reference had to be given up, so that the way from poses before to poses after rests on a guess.
+    /// Number of the map's segment, from 0: the way from the poses of one to those of another is not known.
     pub fn segment(&self) -> u32 {
         self.segment
     }

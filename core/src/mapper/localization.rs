@@ -4,7 +4,7 @@ use super::{Config, MotionSource, PoseOrigin, StereoFrame};
 use crate::{
     egomotion::{
         Egomotion, Estimator, MotionEstimate,
-        icp::{self, IcpReport, IcpStatus, MapPicture},
+        icp::{self, IcpConfig, IcpReport, IcpStatus, MapPicture},
     },
     geometry::{StereoObservation, StereoRig, Transform},
     image::View,
@@ -86,11 +86,11 @@ impl Localization<'_, '_> {
             match status {
                 FlowStatus::Frozen => self.hold(),
                 FlowStatus::Repeated if !self.camera.may_stand(&self.config.egomotion, self.interval_s) => self.hold(),
-                FlowStatus::Matched | FlowStatus::Repeated => self.estimate_from_matches(mask),
+                FlowStatus::Matched | FlowStatus::Repeated => self.estimate_from_matches(frame, mask, executor),
                 FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
         };
-        let is_measured = matches!(found.origin, PoseOrigin::Estimated | PoseOrigin::Given);
+        let is_measured = matches!(found.origin, PoseOrigin::Estimated | PoseOrigin::Relocalized | PoseOrigin::Given);
         // After a guess the motion from the guessed pose, so that motions lead from pose to pose.
         let last_motion = || if over_several { self.camera.t_world_camera().inverse() * before } else { *self.camera.t_current_previous() };
         let t_current_previous: Option<Transform> = is_measured.then(last_motion);
@@ -114,44 +114,58 @@ impl Localization<'_, '_> {
     }
 
     /// Estimates the motion from the matches the mask includes.
-    fn estimate_from_matches(&mut self, mask: &EgomotionMask<'_, '_>) -> Found {
+    fn estimate_from_matches<E: Executor>(&mut self, frame: &StereoFrame<'_>, mask: &EgomotionMask<'_, '_>, executor: &E) -> Found {
         let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
         // Masks are of the frame before; matches over several frames are left to RANSAC.
         let over_several = self.camera.since_reference() > 0;
         let included = selection.iter().filter(|&&index| over_several || mask.includes(index));
         let excluded = selection.len() - included.clone().count();
         let matches = included.filter_map(|&index| refined.get(index as usize));
-        let rig = self.config.scaled_rig();
+        let (rig, was_lost) = (self.config.scaled_rig(), self.camera.is_lost());
         let estimate = self.camera.step(&self.config.egomotion, &rig, self.interval_s, matches.clone(), self.estimator);
         // A motion few matches agree with says nothing about the rig.
         if let Some(motion) = estimate.t_current_previous.filter(|_| 2 * estimate.inliers >= estimate.matches) {
             self.self_calibration.update(&rig, matches.filter_map(|m| observations(&rig, m)), &motion);
         }
+        let ends_loss = was_lost && !self.camera.is_lost();
+        let is_found = ends_loss && self.end_loss(frame, executor);
         Found {
             egomotion: Some(estimate),
             matches_excluded: excluded as u32,
-            ..Found::new(self.origin(true))
+            ..Found::new(if is_found { PoseOrigin::Relocalized } else { self.origin(true) })
         }
     }
 
     /// Registers the depth with the map as it appears from the last pose. All of the picture counts, what moves as well: the baseline knows
     /// no objects.
-    fn register_depth<E: Executor>(&mut self, [width, height]: [usize; 2], executor: &E) -> IcpReport {
-        let (rig, limits_m) = (self.config.scaled_rig(), [self.config.volume.near_m, self.config.volume.far_m]);
-        let view = Viewpoint { rig, width, height, t_world_camera: *self.camera.t_world_camera() };
-        let cast = self.raycaster.cast(self.background, &view, executor);
-        let picture = match (cast, self.raycaster.depth_m(), self.raycaster.normal()) {
-            (Ok(_), Some(depth_m), Some(normal)) => Some(MapPicture { depth_m, normal }),
-            _ => None,
-        };
-        let mut report = picture.map_or(IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() }, |picture| {
-            icp::track(&self.config.icp, &rig, limits_m, self.disparity_q8, &picture, self.depth_m)
-        });
+    fn register_depth<E: Executor>(&mut self, size: [usize; 2], executor: &E) -> IcpReport {
+        let config = &self.config.icp;
+        let t_world_camera = *self.camera.t_world_camera();
+        let is_cast = self.cast(&t_world_camera, size, executor);
+        let mut report = if is_cast { self.register(config) } else { IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() } };
         let refined = self.scene_flow.refined();
         let matches = self.scene_flow.selection().iter().filter_map(|&index| refined.get(index as usize));
-        report.matches = self.estimator.count_inliers(&rig, matches, &report.t_current_previous, self.config.icp.explained_px);
-        report.check_matches(&self.config.icp);
+        let rig = self.config.scaled_rig();
+        report.matches = self.estimator.count_inliers(&rig, matches, &report.t_current_previous, config.explained_px);
+        report.check_matches(config);
         self.camera.advance(report.motion());
         report
+    }
+
+    /// Looks at the map from a pose; whether that could be done.
+    pub(super) fn cast<E: Executor>(&mut self, t_world_camera: &Transform, [width, height]: [usize; 2], executor: &E) -> bool {
+        let view = Viewpoint { rig: self.config.scaled_rig(), width, height, t_world_camera: *t_world_camera };
+        self.raycaster.cast(self.background, &view, executor).is_ok()
+    }
+
+    /// Registers the depth with the map as it was cast last.
+    pub(super) fn register(&mut self, config: &IcpConfig) -> IcpReport {
+        let (rig, limits_m) = (self.config.scaled_rig(), [self.config.volume.near_m, self.config.volume.far_m]);
+        match (self.raycaster.depth_m(), self.raycaster.normal()) {
+            (Some(depth_m), Some(normal)) => {
+                icp::track(config, &rig, limits_m, self.disparity_q8, &MapPicture { depth_m, normal }, self.depth_m)
+            }
+            _ => IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() },
+        }
     }
 }

@@ -9,6 +9,7 @@ mod frame;
 mod localization;
 mod plan;
 mod raycast;
+mod relocalization;
 mod report;
 mod set;
 mod settings;

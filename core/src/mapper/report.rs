@@ -59,6 +59,8 @@ pub enum PoseOrigin {
     Held,
     /// Given with the frame.
     Given,
+    /// Found in the map after the camera was lost: the map looks from here like the image.
+    Relocalized,
 }
 
 /// The state of a block pool after a step.
@@ -95,8 +97,9 @@ pub struct Report {
     pub scene_flow: FlowReport,
     /// How the pose came about.
     pub pose: PoseOrigin,
-    /// How often the camera was lost for so long ([`crate::egomotion::REFERENCE_FRAMES_MAX`] frames) that it went on from a guessed pose: since
-    /// then this pose and all that is mapped from it stand beside what was mapped before.
+    /// Number of the map's segment, from 0. A camera lost for [`crate::egomotion::REFERENCE_FRAMES_MAX`] frames that is not found in the map
+    /// begins another one, [`crate::egomotion::SEGMENT_GAP_M`] above its guessed pose. Poses and map of a segment are right among themselves;
+    /// where one stands beside another is not known.
     pub segment: u32,
     /// The camera's motion from matches; none was looked for in the first frame, nor where the pose was given.
     pub egomotion: Option<MotionEstimate>,
@@ -132,7 +135,10 @@ impl Report {
         let refused = blocks + self.instances.refused() + self.internal_faults;
         if self.pose == PoseOrigin::Held || self.segment > 0 || refused > 0 || self.self_calibration.is_uncorrected() {
             Severity::MapAffected
-        } else if self.dropped_features() + self.prune.early > 0 || self.self_calibration.state() > CalibrationState::Sound {
+        } else if self.pose == PoseOrigin::Relocalized
+            || self.dropped_features() + self.prune.early > 0
+            || self.self_calibration.state() > CalibrationState::Sound
+        {
             Severity::Recovered
         } else {
             Severity::Info

@@ -23,6 +23,8 @@ pub struct EvaluatedFrame {
     pub severity: Severity,
     /// Whether it was fused.
     pub fused: bool,
+    /// Segment of the map.
+    pub segment: u32,
 }
 
 /// What a fault came to.
@@ -46,11 +48,14 @@ pub struct FaultOutcome {
 
 impl FaultOutcome {
     /// Of frames; `first` is the first that a fault may have touched. Poses are compared from the frame before it on, so that
-    /// drift until then does not count.
+    /// drift until then does not count, and within a segment of the map from its first frame on.
     pub fn of(frames: &[EvaluatedFrame], first: usize) -> Self {
-        let Some(before) = frames.get(first.saturating_sub(1)) else { return Self::default() };
+        let Some(mut before) = frames.get(first.saturating_sub(1)) else { return Self::default() };
         let mut outcome = Self { recovered_after: Some(0), ..Self::default() };
         for (since, frame) in frames.iter().skip(first).enumerate() {
+            if frame.segment != before.segment {
+                before = frame;
+            }
             let moved = before.t_world_camera.inverse() * frame.t_world_camera;
             let truly = before.true_t_world_camera.inverse() * frame.true_t_world_camera;
             let error = truly.inverse() * moved;
@@ -86,6 +91,7 @@ mod tests {
             pose: PoseOrigin::Estimated,
             severity,
             fused: true,
+            segment: 0,
         };
         frames.iter().enumerate().map(frame).collect()
     }
@@ -99,6 +105,16 @@ mod tests {
         assert_eq!(outcome.recovered_after, Some(3));
         assert_eq!(FaultOutcome::of(&run_with(&[(0.0, info), (0.0, info)]), 1).recovered_after, Some(0));
         assert_eq!(FaultOutcome::of(&run_with(&[(0.0, info), (9.0, info)]), 1).recovered_after, None);
+    }
+
+    #[test]
+    fn a_segment_is_compared_with_its_first_pose() {
+        let mut frames = run_with(&[(0.0, Severity::Info), (100.0, Severity::MapAffected), (100.1, Severity::MapAffected)]);
+        assert_eq!(FaultOutcome::of(&frames, 1).wrong_fused, 2);
+        frames[1..].iter_mut().for_each(|frame| frame.segment = 1);
+        assert_eq!(FaultOutcome::of(&frames, 1).wrong_fused, 0);
+        frames[2].t_world_camera = Transform::IDENTITY;
+        assert_eq!(FaultOutcome::of(&frames, 1).wrong_fused, 1);
     }
 
     #[test]

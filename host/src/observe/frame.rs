@@ -69,6 +69,7 @@ impl FrameRow {
             None if self.report.pose == PoseOrigin::Given => "given",
             None if self.report.pose == PoseOrigin::Held => "frozen_image",
             None => "first",
+            Some(_) if self.report.pose == PoseOrigin::Relocalized => "relocalized",
             Some(MotionStatus::Estimated) => "estimated",
             Some(MotionStatus::TooFewMatches) => "too_few_matches",
             Some(MotionStatus::TooFewInliers) => "too_few_inliers",
@@ -111,7 +112,8 @@ impl FrameRow {
     pub fn cause(&self) -> String {
         let (allocation, motion, masks) = (&self.report.allocation, self.motion(), &self.mask_refusals);
         let instances = &self.report.instances;
-        let lost = (self.report.segment > 0).then(|| "the pose rests on a guess: the camera was lost before".to_owned());
+        let lost = (self.report.segment > 0)
+            .then(|| format!("segment {} of the map, apart from the others: the camera was lost before", self.report.segment));
         let guessed = self.held().then(|| format!("no motion estimate ({}), the frame was not fused", motion.replace('_', " ")));
         let counts = [
             (allocation.refused, "block requests refused, the pool is full"),

@@ -31,10 +31,12 @@ pub struct TrajectorySection {
     pub path: ThinnedPath,
     /// True poses of the frames, the first at the origin, where they are known.
     pub truth: Option<Vec<Transform>>,
-    /// Errors against them.
+    /// Errors against them, of the map's first segment: where another one stands is not known.
     pub errors: Option<TrajectoryErrors>,
     /// Frames whose pose was extrapolated at constant velocity.
     pub held_frames: usize,
+    /// Segments of the map: 1 where the camera was never lost.
+    pub segments: u32,
     /// Frames the depth tracker lost, where it is used.
     pub failures: Option<TrackingFailures>,
 }
@@ -85,6 +87,7 @@ pub struct TrajectoryObserver {
     /// Number and pose of each frame, where true poses are known.
     compared: Vec<(usize, Transform)>,
     held_frames: usize,
+    segments: u32,
     /// Frames the depth tracker lost, and number and cause of the first.
     lost_frames: usize,
     first_lost: Option<(usize, IcpStatus)>,
@@ -98,6 +101,7 @@ impl Default for TrajectoryObserver {
             path: ThinnedPath::default(),
             compared: Vec::new(),
             held_frames: 0,
+            segments: 1,
             lost_frames: 0,
             first_lost: None,
         }
@@ -117,10 +121,11 @@ impl Observer for TrajectoryObserver {
         let time_ns = row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64);
         self.tum.append(tum_line(time_ns, &pose).as_bytes());
         self.path.add(pose.translation_m);
-        if setup.dataset.truth().is_some() {
+        if setup.dataset.truth().is_some() && row.report.segment == 0 {
             self.compared.push((row.frame, pose));
         }
         self.held_frames += usize::from(row.held());
+        self.segments = row.report.segment + 1;
         if let Some(status) = row.report.icp.map(|icp| icp.status).filter(|status| *status != IcpStatus::Tracked) {
             self.lost_frames += 1;
             self.first_lost.get_or_insert((row.frame, status));
@@ -137,6 +142,7 @@ impl Observer for TrajectoryObserver {
             errors: truth.as_ref().and_then(|truth| errors(truth, &poses)),
             truth,
             held_frames: self.held_frames,
+            segments: self.segments,
             failures: self.first_lost.map(|(first, status)| TrackingFailures { frames: self.lost_frames, first, cause: status.name() }),
         })
     }

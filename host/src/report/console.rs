@@ -113,7 +113,9 @@ fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
             ("", "their poses are extrapolated, and they are not in the map. --egomotion stereo follows fast motion".to_owned()),
         ],
         None if trajectory.held_frames > 0 => {
-            vec![("poses extrapolated", format!("in {} frames: too few matches", trajectory.held_frames))]
+            let extrapolated = ("poses extrapolated", format!("in {} frames: too few matches", trajectory.held_frames));
+            let apart = format!("{}: the camera was lost, and each stands 100 m above the one before", trajectory.segments);
+            [extrapolated].into_iter().chain((trajectory.segments > 1).then_some(("segments of the map", apart))).collect()
         }
         None => Vec::new(),
     }

@@ -81,6 +81,7 @@ struct EgomotionSummary {
     #[serde(skip_serializing_if = "Option::is_none")]
     ate_m: Option<f64>,
     held_frames: usize,
+    segments: u32,
     /// `stereo`, `icp` or `file`.
     source: &'static str,
     /// `ok`, or `tracking failure` where the depth tracker lost a frame.
@@ -247,6 +248,7 @@ impl EgomotionSummary {
             rpe_r_deg: errors.map(|errors| errors.rpe_r_deg),
             ate_m: errors.map(|errors| errors.ate_m),
             held_frames: trajectory.held_frames,
+            segments: trajectory.segments,
             source: trajectory.source,
             status: if failures.is_some() { "tracking failure" } else { "ok" },
             tracking_failures: failures.map_or(0, |failures| failures.frames),

@@ -147,6 +147,7 @@ fn evaluated(plan: &Plan) -> anyhow::Result<Vec<EvaluatedFrame>> {
             pose: report.pose,
             severity: report.severity(),
             fused: report.fused,
+            segment: report.segment,
         });
     }
     Ok(frames)

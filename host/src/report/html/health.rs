@@ -66,6 +66,7 @@ fn counters(run: &RunRecord) -> Vec<Vec<String>> {
         ("detections refused", u64::from(health.detections.refused())),
         ("tracks and object volumes refused", health.tracks_refused),
         ("poses extrapolated", trajectory.held_frames as u64),
+        ("segments of the map", u64::from(trajectory.segments)),
     ];
     rows.iter().map(|(name, value)| vec![(*name).to_owned(), grouped(*value)]).collect()
 }
