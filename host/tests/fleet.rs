@@ -58,8 +58,12 @@ fn jobs_done_in_shares_are_merged_in_any_order_to_one_map() {
     assert!(rest.contains("first is done") && rest.contains("third is done") && !rest.contains("second"), "{rest}");
     assert_eq!(done(root, &["fleet", "run", "jobs"]), "", "all is done");
 
+    let unplaced = dynvox(root, &["fleet", "merge", "jobs", "--out", "whole"]);
+    assert!(output_text(&unplaced).contains("Carry them there with: dynvox fleet resample jobs"), "{}", output_text(&unplaced));
+    done(root, &["fleet", "resample", "jobs", "--shard", "0/2"]);
+    assert!(done(root, &["fleet", "resample", "jobs"]).starts_with("second: "), "the others are there");
     let whole = done(root, &["fleet", "merge", "jobs", "--out", "whole"]);
-    let maps: Vec<String> = names(&root.join("jobs/submaps")).iter().map(|id| format!("jobs/submaps/{id}")).collect();
+    let maps: Vec<String> = names(&root.join("jobs/sums")).iter().map(|id| format!("jobs/sums/{id}")).collect();
     done(root, &["fleet", "merge", &maps[2], &maps[0], "--out", "two"]);
     let tree = done(root, &["fleet", "merge", &maps[1], "two", "--out", "tree"]);
     assert_eq!(digest(&whole), digest(&tree));
@@ -79,13 +83,14 @@ fn the_sums_of_one_map_show_its_own_surface() {
     fs::write(root.join("recordings.toml"), first).unwrap();
     done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
     done(root, &["fleet", "run", "jobs"]);
+    done(root, &["fleet", "resample", "jobs"]);
     done(root, &["fleet", "merge", "jobs", "--out", "map"]);
     let meshed = done(root, &["fleet", "mesh", "map", "--out", "map.ply"]);
     let run = root.join("jobs/runs").join(&names(&root.join("jobs/runs"))[0]);
     let summary: serde_json::Value = serde_json::from_slice(&fs::read(run.join("summary.json")).unwrap()).unwrap();
     let triangles: u64 = meshed.split(": ").nth(1).unwrap().split(' ').next().unwrap().replace(',', "").parse().unwrap();
     assert_eq!(Some(triangles), summary["map"]["triangles"].as_u64());
-    assert!(!run.join("map.blocks").exists(), "the sums are kept in its stead");
+    assert!(!run.join("map.blocks").exists(), "the map is kept in its stead");
 }
 
 #[test]
@@ -115,4 +120,43 @@ fn what_fails_is_named_and_can_be_repeated_alone() {
         "{}",
         output_text(&refused)
     );
+}
+
+#[test]
+fn recordings_are_aligned_carried_into_the_world_and_reported() {
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    let parts = ["0", "4"].map(|start| {
+        format!("[[recording]]\nname = \"from-{start}\"\nepoch = {start}\narguments = [\"--start\", \"{start}\", \"--frames\", \"6\"]\n")
+    });
+    let shared =
+        RECORDINGS.split("[[recording]]").next().unwrap().replace("\"--profile\"", "\"--set\", \"street.frames=12\", \"--profile\"");
+    fs::write(root.join("recordings.toml"), shared + &parts.concat()).unwrap();
+    done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
+    let early = dynvox(root, &["fleet", "align", "jobs"]);
+    assert!(output_text(&early).contains("from-0, from-4 of jobs are not done"), "{}", output_text(&early));
+    done(root, &["fleet", "run", "jobs"]);
+    done(root, &["fleet", "resample", "jobs"]);
+    let table = done(root, &["fleet", "align", "jobs"]);
+    assert!(table.contains("from-4, from-0"), "{table}");
+    let file = root.join("jobs/alignment.json");
+    let first = fs::read(&file).unwrap();
+    done(root, &["fleet", "align", "jobs"]);
+    assert_eq!(fs::read(&file).unwrap(), first, "the same bits");
+    let alignment: serde_json::Value = serde_json::from_slice(&first).unwrap();
+    let along = |at: usize| alignment["recordings"][at]["t_world_camera"][11].as_f64().unwrap();
+    assert!(along(0).abs() < 1e-9 && alignment["pairs"][0]["refused"].is_null(), "{alignment}");
+    // Four frames of 0.8 m lie between the two; nothing was given, so the limit of what poses may be off does not let it find more.
+    let resampled = done(root, &["fleet", "resample", "jobs"]);
+    assert!(resampled.contains("from-4: "), "it lies elsewhere now: {resampled}");
+    done(root, &["fleet", "merge", "jobs", "--out", "map"]);
+    let report = done(root, &["fleet", "report", "jobs", "map", "--out", "report"]);
+    assert!(report.contains("blocks seen by 2 recordings") && report.contains("between epochs"), "{report}");
+    assert_eq!(names(&root.join("report")), ["changes.csv", "map.png", "report.json"]);
+    let figures: serde_json::Value = serde_json::from_slice(&fs::read(root.join("report/report.json")).unwrap()).unwrap();
+    assert_eq!(figures["recordings"][1]["frames"], 6);
+    assert!(image::open(root.join("report/map.png")).unwrap().width() > 100);
+    fs::write(&file, String::from_utf8(first).unwrap().replace("\"id\": \"", "\"id\": \"0")).unwrap();
+    let other = dynvox(root, &["fleet", "resample", "jobs"]);
+    assert!(output_text(&other).contains("is not of these jobs. Align again"), "{}", output_text(&other));
 }

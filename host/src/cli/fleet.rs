@@ -1,16 +1,12 @@
 //! `dynvox fleet`.
 
-use super::run::plan_of;
-use crate::fleet::{self, Identity, Job, JobState, Lattice, Manifest, Recordings};
+mod jobs;
+mod world;
+
+use crate::fleet::Uncertainty;
 use crate::formats::Axes;
-use crate::report::text::grouped;
-use crate::run::store::BlockFile;
-use crate::run::{BLOCKS_FILE, Plan, RunManifest, stereo_frame};
-use anyhow::{Context, bail};
-use dynvox_core::digest::Digest;
 use dynvox_core::view::MeshConfig;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct FleetArgs {
@@ -36,6 +32,25 @@ enum Action {
         #[arg(long, value_name = "I/N")]
         shard: Option<Shard>,
     },
+    /// Register the maps of jobs that are all done with one another, and correct where they lie in the world
+    Align {
+        /// Folder of the jobs
+        folder: PathBuf,
+        /// How far given positions may be off, one standard deviation
+        #[arg(long, default_value_t = 0.3, value_name = "M")]
+        uncertainty_m: f64,
+        /// How far given rotations may be off, one standard deviation
+        #[arg(long, default_value_t = 1.5, value_name = "DEGREES")]
+        uncertainty_deg: f64,
+    },
+    /// Carry a share of the maps into the world, as aligned or as given: sums in the world's lattice
+    Resample {
+        /// Folder of the jobs
+        folder: PathBuf,
+        /// The share, as of `fleet run`
+        #[arg(long, value_name = "I/N")]
+        shard: Option<Shard>,
+    },
     /// Say which jobs are done
     Status {
         /// Folder of the jobs
@@ -44,7 +59,7 @@ enum Action {
         #[arg(long)]
         json: bool,
     },
-    /// Add maps: folders of sums, or folders of jobs that are all done
+    /// Add maps: folders of sums, or folders of jobs whose maps are all resampled
     Merge {
         /// What to add, in any order
         #[arg(required = true)]
@@ -66,6 +81,19 @@ enum Action {
         /// Axes: those of the camera, or east, north, up
         #[arg(long, value_enum, default_value_t)]
         axes: Axes,
+    },
+    /// Write what recordings saw, where they went and what has changed between epochs: report.json, changes.csv, map.png
+    Report {
+        /// Folder of the jobs
+        folder: PathBuf,
+        /// Their merged map
+        map: PathBuf,
+        /// Folder to write
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Least volume of a change
+        #[arg(long, default_value_t = 0.05, value_name = "M3")]
+        least_change_m3: f64,
     },
 }
 
@@ -99,153 +127,22 @@ impl Shard {
 }
 
 pub fn run(args: &FleetArgs) -> anyhow::Result<()> {
+    let share = |shard: Option<Shard>| {
+        let variable = |name: &str| std::env::var(name).ok()?.parse().ok();
+        shard.unwrap_or_else(|| Shard::of_scheduler(variable))
+    };
     match &args.action {
-        Action::Plan { recordings, out } => plan(recordings, out),
-        Action::Run { folder, shard } => {
-            let variable = |name: &str| std::env::var(name).ok()?.parse().ok();
-            work(folder, shard.unwrap_or_else(|| Shard::of_scheduler(variable)))
+        Action::Plan { recordings, out } => jobs::plan(recordings, out),
+        Action::Run { folder, shard } => jobs::run(folder, share(*shard)),
+        Action::Align { folder, uncertainty_m, uncertainty_deg } => {
+            world::align(folder, &Uncertainty { position_m: *uncertainty_m, rotation_rad: uncertainty_deg.to_radians() })
         }
-        Action::Status { folder, json } => status(folder, *json),
-        Action::Merge { maps, out } => merge(maps, out),
-        Action::Mesh { map, out, min_weight, axes } => {
-            let meshed = fleet::write_mesh(map, out, *min_weight, *axes)?;
-            let (triangles, blocks) = (grouped(meshed.mesh.triangles), grouped(meshed.blocks));
-            outln!("{}: {triangles} triangles of {blocks} blocks", out.display());
-            if meshed.overflowed > 0 {
-                eprintln!("warning: {} voxels were seen too often for their sums and are left out", grouped(meshed.overflowed));
-            }
-            Ok(())
-        }
+        Action::Resample { folder, shard } => world::resample(folder, share(*shard)),
+        Action::Status { folder, json } => jobs::status(folder, *json),
+        Action::Merge { maps, out } => world::merge(maps, out),
+        Action::Mesh { map, out, min_weight, axes } => world::mesh(map, out, *min_weight, *axes),
+        Action::Report { folder, map, out, least_change_m3 } => world::report((folder, map), out, *least_change_m3),
     }
-}
-
-/// The plan of a run's arguments.
-fn planned(arguments: &[String]) -> anyhow::Result<Plan> {
-    let line: Vec<String> = ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(arguments.iter().cloned()).collect();
-    plan_of(&line)
-}
-
-/// What identifies a run: its settings, what is known of its data set, its first and its last image.
-fn identify(plan: &Plan) -> anyhow::Result<Identity> {
-    let mut digest = Digest::default();
-    for (key, value) in RunManifest::of(plan, std::iter::empty(), Path::new(""))?.fingerprint() {
-        digest.bytes(key.as_bytes());
-        digest.bytes(value.as_bytes());
-    }
-    let frames = plan.frames.listed();
-    for &index in [frames.first(), frames.last()].into_iter().flatten() {
-        let images = plan.dataset.frame(index)?;
-        digest.u64(stereo_frame(&images, &[]).map_or(0, |frame| frame.digest()));
-    }
-    Ok(Identity { digest: digest.finish(), bytes: plan.rss_limit_bytes })
-}
-
-fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
-    let of = |arguments: &[String]| identify(&planned(arguments)?);
-    let manifest = Manifest::plan(recordings, &Recordings::read(recordings)?, of)?;
-    manifest.write(out)?;
-    outln!("{} jobs in {}. Do them with: dynvox fleet run {}", manifest.jobs.len(), out.display(), out.display());
-    Ok(())
-}
-
-fn work(folder: &Path, shard: Shard) -> anyhow::Result<()> {
-    let manifest = Manifest::read(folder)?;
-    let mut failed = Vec::new();
-    for job in manifest.shard(shard.index, shard.of) {
-        if job.state(folder) == JobState::Done {
-            continue;
-        }
-        match map(folder, job) {
-            Ok(()) => outln!("{} is done", job.name),
-            Err(error) => {
-                eprintln!("error: {}: {}", job.name, super::sentence(&error));
-                failed.push(job.name.as_str());
-            }
-        }
-    }
-    if failed.is_empty() {
-        return Ok(());
-    }
-    bail!("{} failed. The others are done; repeat the command for what is left", failed.join(", "))
-}
-
-/// Runs one job in a process of its own, and keeps the sums of its map.
-fn map(folder: &Path, job: &Job) -> anyhow::Result<()> {
-    let is_same = |plan: &Plan| anyhow::Ok(job.is_of(identify(plan)?.digest));
-    let plan = planned(&job.arguments)?;
-    if !is_same(&plan)? {
-        bail!("its settings or images are not those of the plan. Plan again");
-    }
-    let run_folder = job.run_folder(folder);
-    let run = Command::new(std::env::current_exe()?)
-        .arg("run")
-        .args(&job.arguments)
-        .args(["--quiet", "--keep-blocks", "--overwrite", "--out"])
-        .arg(&run_folder)
-        .output()
-        .context("the run cannot be started")?;
-    if !run.status.success() {
-        bail!("{}", String::from_utf8_lossy(&run.stderr).trim().trim_start_matches("error: "));
-    }
-    if !is_same(&planned(&job.arguments)?)? {
-        bail!("its images have changed while it ran. Plan again");
-    }
-    let volume = &plan.config.volume;
-    let lattice = Lattice {
-        voxel_size_m: volume.voxel_size_m,
-        truncation_m: volume.truncation_m,
-        colour: plan.capacity.colour,
-    };
-    let blocks = run_folder.join(BLOCKS_FILE);
-    let (mut store, _) = BlockFile::open(&blocks, lattice.voxel_size_m, lattice.truncation_m)?;
-    let t_world_map = job.t_world_camera().context("its place in the world is no rigid motion")?;
-    let out = job.submap(folder);
-    std::fs::create_dir_all(folder.join("submaps"))?;
-    let submap = fleet::submap(&mut store, &lattice, &t_world_map, &out)?;
-    if submap.beyond > 0 {
-        eprintln!("warning: {} blocks of {} are beyond the world's coordinates", submap.beyond, job.name);
-    }
-    // The sums are all that is needed of them.
-    std::fs::remove_file(&blocks)?;
-    Ok(())
-}
-
-fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
-    let manifest = Manifest::read(folder)?;
-    let word = |job: &Job| match job.state(folder) {
-        JobState::Done => "done",
-        JobState::Started => "started",
-        JobState::Open => "open",
-    };
-    if json {
-        let rows =
-            manifest.jobs.iter().map(|job| serde_json::json!({ "name": job.name, "id": job.id, "bytes": job.bytes, "state": word(job) }));
-        outln!("{}", serde_json::to_string_pretty(&rows.collect::<Vec<_>>())?);
-        return Ok(());
-    }
-    outln!("{:<24}{:<20}{:>14}  state", "recording", "id", "memory, MiB");
-    manifest.jobs.iter().for_each(|job| outln!("{:<24}{:<20}{:>14}  {}", job.name, job.id, job.bytes >> 20, word(job)));
-    Ok(())
-}
-
-fn merge(maps: &[PathBuf], out: &Path) -> anyhow::Result<()> {
-    let mut inputs = Vec::new();
-    for map in maps {
-        if !map.join(fleet::MANIFEST_FILE).is_file() {
-            inputs.push(map.clone());
-            continue;
-        }
-        let manifest = Manifest::read(map)?;
-        let open: Vec<&str> = manifest.jobs.iter().filter(|job| job.state(map) != JobState::Done).map(|job| job.name.as_str()).collect();
-        if !open.is_empty() {
-            bail!("{} of {} are not done. Do them with: dynvox fleet run {}", open.join(", "), map.display(), map.display());
-        }
-        inputs.extend(manifest.jobs.iter().map(|job| job.submap(map)));
-    }
-    let merged = fleet::merge(&inputs, out)?;
-    let digest = fleet::digest(out)?;
-    outln!("{}: {} blocks in {} tiles, digest {digest:016x}", out.display(), grouped(merged.blocks), merged.tiles);
-    Ok(())
 }
 
 #[cfg(test)]

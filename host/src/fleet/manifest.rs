@@ -23,6 +23,7 @@ arguments = [\"recordings/monday\", \"--instances\", \"none\"]
 name = \"tuesday\"
 arguments = [\"recordings/tuesday\"]
 t_world_camera = [1, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]   # its first camera in the world, a row of KITTI
+epoch = 1   # where it contradicts recordings of epoch 0, a rule decides
 ";
 
 /// The recordings to map.
@@ -48,6 +49,9 @@ pub struct Recording {
     /// Its first camera in the world, camera to world; the world's origin where it is absent.
     #[serde(default)]
     pub t_world_camera: Option<[f64; 12]>,
+    /// The epoch it belongs to, such as 20261122: maps of different epochs are not averaged where they contradict one another.
+    #[serde(default)]
+    pub epoch: u32,
 }
 
 /// One run to do.
@@ -55,12 +59,14 @@ pub struct Recording {
 pub struct Job {
     /// The recording's name.
     pub name: String,
-    /// Hash of the arguments, the settings, the images and the place in the world.
+    /// Hash of the arguments, the settings and the images.
     pub id: String,
     /// Arguments of `dynvox run`.
     pub arguments: Vec<String>,
     /// First camera in the world, camera to world: the rows of a 3 x 4 matrix.
     pub t_world_camera: [f64; 12],
+    /// The epoch it belongs to.
+    pub epoch: u32,
     /// Most memory of the run, bytes.
     pub bytes: u64,
 }
@@ -116,19 +122,24 @@ impl Manifest {
         recordings: &Recordings,
         identify: impl Fn(&[String]) -> Result<Identity, E>,
     ) -> Result<Self, E> {
-        let mut jobs = Vec::new();
-        for Recording { name, arguments, t_world_camera } in &recordings.recordings {
+        let mut jobs: Vec<Job> = Vec::new();
+        for Recording { name, arguments, t_world_camera, epoch } in &recordings.recordings {
             let t_world_camera = t_world_camera.unwrap_or([1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
             if transform(&t_world_camera).is_none() {
                 return Err(FleetError::content(path, format!("has no rigid motion as t_world_camera of {name}")).into());
             }
             let arguments: Vec<String> = arguments.iter().chain(&recordings.arguments).cloned().collect();
             let identity = identify(&arguments)?;
+            let id = id(&arguments, identity.digest);
+            if let Some(same) = jobs.iter().find(|job| job.id == id) {
+                return Err(FleetError::content(path, format!("has one recording twice: {} is {name}. Remove one", same.name)).into());
+            }
             jobs.push(Job {
                 name: name.clone(),
-                id: id(&arguments, &t_world_camera, identity.digest),
+                id,
                 arguments,
                 t_world_camera,
+                epoch: *epoch,
                 bytes: identity.bytes,
             });
         }
@@ -166,7 +177,7 @@ impl Manifest {
 impl Job {
     /// Whether settings and images are those it was planned with.
     pub fn is_of(&self, digest: u64) -> bool {
-        self.id == id(&self.arguments, &self.t_world_camera, digest)
+        self.id == id(&self.arguments, digest)
     }
 
     /// First camera in the world.
@@ -174,7 +185,16 @@ impl Job {
         transform(&self.t_world_camera)
     }
 
-    /// Where its map is, below the folder of the jobs.
+    /// Where its map is in the world's lattice, when it lies at a pose: the name is a hash of both.
+    pub fn sums(&self, folder: &Path, t_world_map: &Transform) -> PathBuf {
+        let mut digest = Digest::default();
+        digest.bytes(self.id.as_bytes());
+        digest.u64(self.epoch.into());
+        rows_of(t_world_map).iter().for_each(|&number| digest.f64(number));
+        folder.join("sums").join(format!("{:016x}", digest.finish()))
+    }
+
+    /// Where its map is in its own lattice, below the folder of the jobs.
     pub fn submap(&self, folder: &Path) -> PathBuf {
         folder.join("submaps").join(&self.id)
     }
@@ -196,18 +216,24 @@ impl Job {
     }
 }
 
-fn id(arguments: &[String], t_world_camera: &[f64; 12], of_input: u64) -> String {
+fn id(arguments: &[String], of_input: u64) -> String {
     let mut digest = Digest::default();
     arguments.iter().for_each(|argument| {
         digest.u64(argument.len() as u64);
         digest.bytes(argument.as_bytes());
     });
-    t_world_camera.iter().for_each(|&number| digest.f64(number));
     digest.u64(of_input);
     format!("{:016x}", digest.finish())
 }
 
-fn transform(rows: &[f64; 12]) -> Option<Transform> {
+/// A motion as the rows of a 3 x 4 matrix.
+pub(super) fn rows_of(transform: &Transform) -> [f64; 12] {
+    let rows = transform.matrix_3x4();
+    std::array::from_fn(|at| rows[at / 4][at % 4])
+}
+
+/// A motion from the rows of a 3 x 4 matrix; `None` where they are no rigid motion.
+pub(super) fn transform(rows: &[f64; 12]) -> Option<Transform> {
     let row = |at: usize| [rows[4 * at], rows[4 * at + 1], rows[4 * at + 2]];
     let matrix = [row(0), row(1), row(2)];
     let is_rotation = (0..3).all(|a| {

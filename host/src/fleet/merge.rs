@@ -21,7 +21,7 @@ pub struct Merged {
     pub lattice: Option<Lattice>,
 }
 
-/// Adds the maps in the folders `inputs` into a new folder. The result does not depend on the order of the inputs, nor on how they were merged
+/// Adds the maps in the folders `inputs` into a new folder, each epoch by itself. The result does not depend on the order of the inputs, nor on how they were merged
 /// before. In memory at once is one block of each input.
 ///
 /// # Errors
@@ -47,14 +47,14 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
 }
 
 /// A reader and the block it stands at.
-struct Head {
+pub(super) struct Head {
     reader: TileReader,
-    block: Option<(BlockCoord, BlockSums)>,
+    pub(super) block: Option<(BlockCoord, BlockSums)>,
 }
 
 impl Head {
     /// Opens a tile of the lattice of those before it.
-    fn open(path: &Path, lattice: &mut Option<Lattice>) -> Result<Self, FleetError> {
+    pub(super) fn open(path: &Path, lattice: &mut Option<Lattice>) -> Result<Self, FleetError> {
         let mut reader = TileReader::open(path)?;
         let (found, expected) = (reader.lattice(), *lattice.get_or_insert(reader.lattice()));
         if found != expected {
@@ -63,14 +63,27 @@ impl Head {
         let block = reader.next()?;
         Ok(Self { reader, block })
     }
+
+    /// Takes the block it stands at, if its coordinates are `coord`, and goes on to the next.
+    pub(super) fn take(&mut self, coord: BlockCoord) -> Result<Option<BlockSums>, FleetError> {
+        if self.block.as_ref().is_none_or(|(at, _)| *at != coord) {
+            return Ok(None);
+        }
+        Ok(std::mem::replace(&mut self.block, self.reader.next()?).map(|(_, sums)| sums))
+    }
+}
+
+/// The least coordinates at which one of the readers stands.
+pub(super) fn least(heads: &[Head]) -> Option<BlockCoord> {
+    heads.iter().filter_map(|head| Some(head.block.as_ref()?.0)).min()
 }
 
 /// The sum of all blocks at the least coordinates.
 fn next(heads: &mut [Head]) -> Result<Option<(BlockCoord, BlockSums)>, FleetError> {
-    let Some(coord) = heads.iter().filter_map(|head| Some(head.block.as_ref()?.0)).min() else { return Ok(None) };
+    let Some(coord) = least(heads) else { return Ok(None) };
     let mut sum: Option<BlockSums> = None;
-    for head in heads.iter_mut().filter(|head| head.block.as_ref().is_some_and(|(at, _)| *at == coord)) {
-        if let Some((_, block)) = std::mem::replace(&mut head.block, head.reader.next()?) {
+    for head in heads {
+        if let Some(block) = head.take(coord)? {
             match &mut sum {
                 Some(sum) => sum.add(&block),
                 None => sum = Some(block),
@@ -86,8 +99,9 @@ fn next(heads: &mut [Head]) -> Result<Option<(BlockCoord, BlockSums)>, FleetErro
 /// A tile is damaged, or cannot be read.
 pub fn digest(folder: &Path) -> Result<u64, FleetError> {
     let (mut digest, mut bytes) = (Digest::default(), Vec::new());
-    for path in tiles(folder)?.values() {
+    for (tile, path) in &tiles(folder)? {
         let mut reader = TileReader::open(path)?;
+        digest.u64(tile.epoch.into());
         while let Some((coord, sums)) = reader.next()? {
             digest.i16s(&[coord.x, coord.y, coord.z]);
             sums.write(&mut bytes);
@@ -116,7 +130,7 @@ mod tests {
                 let mixed = random.next_u32();
                 sums.observe((mixed % 512) as usize, (mixed >> 16) as i16, (mixed >> 8) as u8, [1, 2, mixed as u8]);
             }
-            blocks.insert((WorldTile::of(coord, lattice), coord), sums);
+            blocks.insert((WorldTile::of(coord, lattice, (coord.x & 1) as u32), coord), sums);
         }
         std::fs::create_dir_all(folder).unwrap();
         for tile in blocks.keys().map(|(tile, _)| *tile).collect::<BTreeSet<_>>() {

@@ -2,24 +2,45 @@
 //!
 //! A voxel's running average cannot be added to another's without its rounding. Its sums can: weight times distance, and weight, as integers.
 //! Integer addition is associative and commutative, so maps of many recordings, merged by any number of workers in any order, give the same
-//! bits. Data flows: a run's blocks -> [`submap`] (sums in the world's lattice) -> [`merge`] -> [`write_mesh`]; [`Manifest`] says which runs
-//! there are to do, and no more than one folder each is what they leave.
+//! bits. Data flows: a run's blocks -> [`keep`] (its map in its own lattice) -> [`Alignment`] (where it lies in the world) -> [`resample`] (sums
+//! in the world's lattice) -> [`merge`] -> [`Averages`] (one map of all epochs) -> [`write_mesh`]. [`Manifest`] says which runs there are to do,
+//! and no more than two folders each is what they leave.
 //!
-//! **Memory.** A merge holds one block of each input; a submap a cache of blocks and a list of block coordinates; a mesh a cube of blocks.
+//! **Memory.** A merge holds one block of each input; resampling a cache of blocks and a list of block coordinates; alignment the distances of two
+//! maps; averages one block of each epoch; a mesh a cube of blocks.
 
+mod align;
+mod averages;
 mod block_sums;
+mod changes;
+mod coverage;
+mod distance_field;
 mod error;
+mod free_space;
 mod manifest;
 mod merge;
 mod mesh;
+mod pose_graph;
+mod register;
+mod report;
 mod resample;
+mod resolve;
+mod submap;
 mod tile_file;
 mod tile_folder;
 
+pub use align::{ALIGNMENT_FILE, AlignedPair, AlignedRecording, Alignment, poses};
+pub use averages::Averages;
 pub use block_sums::{BlockSums, WEIGHT_MAX};
+pub use changes::{Change, ChangeKind, changes};
+pub use coverage::{Coverage, TileCoverage};
 pub use error::FleetError;
+pub use free_space::Camera;
 pub use manifest::{Identity, Job, JobState, MANIFEST_FILE, Manifest, RECORDINGS_EXAMPLE, Recording, Recordings};
 pub use merge::{Merged, digest, merge};
-pub use mesh::{MeshedMap, write_mesh};
-pub use resample::{Submap, submap};
+pub use mesh::write_mesh;
+pub use register::Uncertainty;
+pub use report::{RecordingPath, Report};
+pub use resample::{Resampled, resample};
+pub use submap::{Submap, keep};
 pub use tile_file::Lattice;

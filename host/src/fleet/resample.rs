@@ -1,4 +1,4 @@
-//! A run's blocks as sums in the world's lattice.
+//! A run's map as sums in the world's lattice.
 //!
 //! Each lattice point of the world is carried into the run's map, where distance, weight and colour are interpolated between the eight lattice
 //! points around it. All of them that count must have been seen. Where the lattices coincide the values are taken over as they are; elsewhere
@@ -6,12 +6,13 @@
 
 use super::FleetError;
 use super::block_sums::BlockSums;
+use super::submap::{Source, Submap};
 use super::tile_file::{self, Lattice};
 use super::tile_folder::WorldTile;
 use crate::formats::DraftFolder;
 use crate::run::store::BlockFile;
 use dynvox_core::geometry::Transform;
-use dynvox_core::volume::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, BlockStore, LoadedBlock};
+use dynvox_core::volume::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord};
 use std::collections::{HashMap, VecDeque};
 use std::fs::File;
 use std::path::Path;
@@ -23,7 +24,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// What became of a run's map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Submap {
+pub struct Resampled {
     /// Tiles written.
     pub tiles: usize,
     /// Blocks written.
@@ -32,35 +33,42 @@ pub struct Submap {
     pub beyond: u64,
 }
 
-/// Writes the blocks of a run as sums in the world's lattice into a new folder; `t_world_map` carries the run's map into the world.
+/// Writes a map as sums of an epoch in the world's lattice into a new folder; `t_world_map` carries the map into the world.
 ///
 /// # Errors
 /// The folder exists, a block cannot be read, or the disk refuses. Nothing half-written stays behind.
-pub fn submap(store: &mut BlockFile<File>, lattice: &Lattice, t_world_map: &Transform, out: &Path) -> Result<Submap, FleetError> {
+pub fn resample(map: &mut Submap, epoch: u32, t_world_map: &Transform, out: &Path) -> Result<Resampled, FleetError> {
     if out.exists() {
         return Err(FleetError::Exists { path: out.to_path_buf() });
     }
-    let mut map = SourceMap::new(store, lattice.colour);
+    let lattice = &map.lattice;
+    let mut source = SourceMap::new(&mut map.store, lattice.colour);
     let way = LatticeWay::new(t_world_map, lattice);
-    let (targets, beyond) = targets(map.store, &way, lattice);
+    let (targets, beyond) = targets(source.store, &way, lattice, epoch);
     let draft = DraftFolder::of(out);
     std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
-    let mut submap = Submap { tiles: 0, blocks: 0, beyond };
+    let mut resampled = Resampled { tiles: 0, blocks: 0, beyond };
     for of_tile in targets.chunk_by(|a, b| a.0 == b.0) {
         let path = draft.path().join(of_tile[0].0.file_name());
         let mut coords = of_tile.iter().map(|(_, coord)| *coord);
-        let blocks = tile_file::write(&path, lattice, || Ok(coords.next().map(|coord| (coord, map.sums_at(coord, &way, lattice.colour)))))?;
+        let blocks =
+            tile_file::write(&path, lattice, || Ok(coords.next().map(|coord| (coord, source.sums_at(coord, &way, lattice.colour)))))?;
         if blocks == 0 {
             std::fs::remove_file(&path).map_err(FleetError::io(&path))?;
             continue;
         }
-        submap = Submap { tiles: submap.tiles + 1, blocks: submap.blocks + u64::from(blocks), ..submap };
+        resampled = Resampled {
+            tiles: resampled.tiles + 1,
+            blocks: resampled.blocks + u64::from(blocks),
+            ..resampled
+        };
     }
-    if store.unreadable() > 0 {
-        return Err(FleetError::content(out, format!("is not made: {} blocks of the run cannot be read", store.unreadable())));
+    let unreadable = source.store.unreadable();
+    if unreadable > 0 {
+        return Err(FleetError::content(out, format!("is not made: {unreadable} blocks of the run cannot be read")));
     }
     draft.rename(out).map_err(FleetError::io(out))?;
-    Ok(submap)
+    Ok(resampled)
 }
 
 /// The way from the world's lattice to the run's and back, in voxels.
@@ -102,7 +110,7 @@ impl LatticeWay {
 }
 
 /// The blocks of the world that blocks of the run reach into, by tile; and how many lie beyond the world's coordinates.
-fn targets(store: &mut BlockFile<File>, way: &LatticeWay, lattice: &Lattice) -> (Vec<(WorldTile, BlockCoord)>, u64) {
+fn targets(store: &mut BlockFile<File>, way: &LatticeWay, lattice: &Lattice, epoch: u32) -> (Vec<(WorldTile, BlockCoord)>, u64) {
     let (mut targets, mut beyond) = (Vec::new(), 0);
     for tile in store.tiles() {
         for source in store.blocks_of(tile) {
@@ -111,7 +119,7 @@ fn targets(store: &mut BlockFile<File>, way: &LatticeWay, lattice: &Lattice) -> 
                 for y in low[1]..=high[1] {
                     for z in low[2]..=high[2] {
                         match BlockCoord::new(x, y, z) {
-                            Some(coord) => targets.push((WorldTile::of(coord, lattice), coord)),
+                            Some(coord) => targets.push((WorldTile::of(coord, lattice, epoch), coord)),
                             None => beyond += 1,
                         }
                     }
@@ -142,13 +150,6 @@ fn reach(source: BlockCoord, way: &LatticeWay) -> [[i32; 3]; 2] {
     [low.map(|value| block((value + ROUNDING).ceil())), high.map(|value| block((value - ROUNDING).floor()))]
 }
 
-/// One block of the run.
-struct Source {
-    sdf: [i16; BLOCK_VOXELS],
-    weight: [u8; BLOCK_VOXELS],
-    colour: Option<Box<[[u8; BLOCK_VOXELS]; 3]>>,
-}
-
 /// The run's blocks, the last ones read in memory.
 struct SourceMap<'s> {
     store: &'s mut BlockFile<File>,
@@ -169,19 +170,8 @@ impl<'s> SourceMap<'s> {
             {
                 self.blocks.remove(&oldest);
             }
-            let mut source = Box::new(Source {
-                sdf: [0; BLOCK_VOXELS],
-                weight: [0; BLOCK_VOXELS],
-                colour: self.colour.then(|| Box::new([[0; BLOCK_VOXELS]; 3])),
-            });
-            let into = LoadedBlock {
-                coord,
-                sdf: &mut source.sdf,
-                weight: &mut source.weight,
-                colour: source.colour.as_deref_mut(),
-            };
-            let known = self.store.holds(coord) && self.store.load(into);
-            self.blocks.insert(coord, known.then_some(source));
+            let source = Source::load(self.store, coord, self.colour);
+            self.blocks.insert(coord, source);
             self.order.push_back(coord);
         }
         self.blocks.get(&coord)?.as_deref()
@@ -239,7 +229,7 @@ mod tests {
     use super::*;
     use crate::fleet::tile_file::TileReader;
     use crate::fleet::tile_folder::tiles;
-    use dynvox_core::volume::EvictedBlock;
+    use dynvox_core::volume::{BlockStore, EvictedBlock, LoadedBlock};
 
     const LATTICE: Lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: true };
     /// Units of distance in a voxel.
@@ -251,7 +241,7 @@ mod tests {
     }
 
     /// A map of the plane in six by six blocks, seen within four voxels.
-    fn store(folder: &Path) -> BlockFile<File> {
+    fn map(folder: &Path) -> Submap {
         let (mut store, _) = BlockFile::open(&folder.join("map.blocks"), LATTICE.voxel_size_m, LATTICE.truncation_m).unwrap();
         for block in 0..216 {
             let coord = BlockCoord { x: block % 6 - 3, y: block / 6 % 6 - 3, z: block / 36 - 3 };
@@ -265,7 +255,7 @@ mod tests {
             }
             assert!(store.store(EvictedBlock { coord, sdf: &sdf, weight: &weight, colour: Some(&[[50; BLOCK_VOXELS]; 3]) }));
         }
-        store
+        Submap { lattice: LATTICE, store }
     }
 
     fn all_sums(folder: &Path) -> Vec<(BlockCoord, BlockSums)> {
@@ -282,17 +272,17 @@ mod tests {
     #[test]
     fn lattices_that_coincide_keep_every_value() {
         let root = tempfile::TempDir::new().unwrap();
-        let mut store = store(root.path());
+        let mut map = map(root.path());
         let shifted = Transform::from_translation([1.6 * f64::from(0.1f32) / 0.1, 0.0, -0.8 * f64::from(0.1f32) / 0.1]);
         for (name, t_world_map, blocks) in [("same", Transform::IDENTITY, [0, 0, 0]), ("shifted", shifted, [2, 0, -1])] {
             let out = root.path().join(name);
-            submap(&mut store, &LATTICE, &t_world_map, &out).unwrap();
+            resample(&mut map, 0, &t_world_map, &out).unwrap();
             let all = all_sums(&out);
             assert!(all.len() > 60, "{}", all.len());
             for (coord, sums) in &all {
                 let source = BlockCoord { x: coord.x - blocks[0], y: coord.y - blocks[1], z: coord.z - blocks[2] };
                 let (mut sdf, mut weight, mut colour) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS], [[0; BLOCK_VOXELS]; 3]);
-                assert!(store.load(LoadedBlock { coord: source, sdf: &mut sdf, weight: &mut weight, colour: Some(&mut colour) }));
+                assert!(map.store.load(LoadedBlock { coord: source, sdf: &mut sdf, weight: &mut weight, colour: Some(&mut colour) }));
                 let average = sums.average();
                 assert!(
                     *average.weight == weight && weight.iter().zip(&*average.sdf).zip(&sdf).all(|((w, a), b)| *w == 0 || a == b),
@@ -300,16 +290,16 @@ mod tests {
                 );
             }
         }
-        assert!(matches!(submap(&mut store, &LATTICE, &shifted, root.path()), Err(FleetError::Exists { .. })));
+        assert!(matches!(resample(&mut map, 0, &shifted, root.path()), Err(FleetError::Exists { .. })));
     }
 
     #[test]
     fn a_turned_map_shows_the_same_surface() {
         let root = tempfile::TempDir::new().unwrap();
-        let mut store = store(root.path());
+        let mut map = map(root.path());
         let t_world_map = Transform::new([0.1, -0.4, 0.2], [3.03, -1.21, 0.57]);
         let out = root.path().join("turned");
-        submap(&mut store, &LATTICE, &t_world_map, &out).unwrap();
+        resample(&mut map, 0, &t_world_map, &out).unwrap();
         let to_map = LatticeWay::new(&t_world_map, &LATTICE).to_map;
         let (mut seen, mut worst) = (0, 0.0f64);
         for (coord, sums) in all_sums(&out) {

@@ -1,0 +1,124 @@
+//! Jobs: made, done, listed.
+
+use super::Shard;
+use crate::cli::run::plan_of;
+use crate::cli::sentence;
+use crate::fleet::{self, Camera, Identity, Job, JobState, Lattice, Manifest, Recordings};
+use crate::formats::read_poses;
+use crate::run::store::BlockFile;
+use crate::run::{BLOCKS_FILE, Plan, RunManifest, stereo_frame};
+use anyhow::{Context, bail};
+use dynvox_core::digest::Digest;
+use std::path::Path;
+use std::process::Command;
+
+/// The camera's path in a run folder.
+const TRAJECTORY_FILE: &str = "trajectory_kitti.txt";
+
+/// The plan of a run's arguments.
+fn planned(arguments: &[String]) -> anyhow::Result<Plan> {
+    let line: Vec<String> = ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(arguments.iter().cloned()).collect();
+    plan_of(&line)
+}
+
+/// What identifies a run: its settings, what is known of its data set, its first and its last image.
+fn identify(plan: &Plan) -> anyhow::Result<Identity> {
+    let mut digest = Digest::default();
+    for (key, value) in RunManifest::of(plan, std::iter::empty(), Path::new(""))?.fingerprint() {
+        digest.bytes(key.as_bytes());
+        digest.bytes(value.as_bytes());
+    }
+    let frames = plan.frames.listed();
+    for &index in [frames.first(), frames.last()].into_iter().flatten() {
+        let images = plan.dataset.frame(index)?;
+        digest.u64(stereo_frame(&images, &[]).map_or(0, |frame| frame.digest()));
+    }
+    Ok(Identity { digest: digest.finish(), bytes: plan.rss_limit_bytes })
+}
+
+pub fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
+    let of = |arguments: &[String]| identify(&planned(arguments)?);
+    let manifest = Manifest::plan(recordings, &Recordings::read(recordings)?, of)?;
+    manifest.write(out)?;
+    outln!("{} jobs in {}. Do them with: dynvox fleet run {}", manifest.jobs.len(), out.display(), out.display());
+    Ok(())
+}
+
+pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
+    let manifest = Manifest::read(folder)?;
+    let mut failed = Vec::new();
+    for job in manifest.shard(shard.index, shard.of) {
+        if job.state(folder) == JobState::Done {
+            continue;
+        }
+        match map(folder, job) {
+            Ok(()) => outln!("{} is done", job.name),
+            Err(error) => {
+                eprintln!("error: {}: {}", job.name, sentence(&error));
+                failed.push(job.name.as_str());
+            }
+        }
+    }
+    if failed.is_empty() {
+        return Ok(());
+    }
+    bail!("{} failed. The others are done; repeat the command for what is left", failed.join(", "))
+}
+
+/// Runs one job in a process of its own, and keeps its map.
+fn map(folder: &Path, job: &Job) -> anyhow::Result<()> {
+    let is_same = |plan: &Plan| anyhow::Ok(job.is_of(identify(plan)?.digest));
+    let plan = planned(&job.arguments)?;
+    if !is_same(&plan)? {
+        bail!("its settings or images are not those of the plan. Plan again");
+    }
+    let run_folder = job.run_folder(folder);
+    let run = Command::new(std::env::current_exe()?)
+        .arg("run")
+        .args(&job.arguments)
+        .args(["--quiet", "--keep-blocks", "--overwrite", "--out"])
+        .arg(&run_folder)
+        .output()
+        .context("the run cannot be started")?;
+    if !run.status.success() {
+        bail!("{}", String::from_utf8_lossy(&run.stderr).trim().trim_start_matches("error: "));
+    }
+    if !is_same(&planned(&job.arguments)?)? {
+        bail!("its images have changed while it ran. Plan again");
+    }
+    let volume = &plan.config.volume;
+    let lattice = Lattice {
+        voxel_size_m: volume.voxel_size_m,
+        truncation_m: volume.truncation_m,
+        colour: plan.capacity.colour,
+    };
+    let blocks = run_folder.join(BLOCKS_FILE);
+    let (mut store, _) = BlockFile::open(&blocks, lattice.voxel_size_m, lattice.truncation_m)?;
+    let camera = Camera {
+        rig: plan.config.rig,
+        size: plan.dataset.size(),
+        poses: read_poses(&run_folder.join(TRAJECTORY_FILE))?.poses,
+    };
+    std::fs::create_dir_all(folder.join("submaps"))?;
+    fleet::keep(&mut store, &lattice, &camera, &job.submap(folder))?;
+    std::fs::remove_file(&blocks)?;
+    Ok(())
+}
+
+pub fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
+    let manifest = Manifest::read(folder)?;
+    let word = |job: &Job| match job.state(folder) {
+        JobState::Done => "done",
+        JobState::Started => "started",
+        JobState::Open => "open",
+    };
+    if json {
+        let rows =
+            manifest.jobs.iter().map(|job| serde_json::json!({ "name": job.name, "id": job.id, "bytes": job.bytes, "state": word(job) }));
+        outln!("{}", serde_json::to_string_pretty(&rows.collect::<Vec<_>>())?);
+        return Ok(());
+    }
+    outln!("{:<24}{:<20}{:>14}  state", "recording", "id", "memory, MiB");
+    manifest.jobs.iter().for_each(|job| outln!("{:<24}{:<20}{:>14}  {}", job.name, job.id, job.bytes >> 20, word(job)));
+    Ok(())
+}

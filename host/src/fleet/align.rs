@@ -1,0 +1,322 @@
+//! Where recordings lie in the world: maps that overlap are registered with one another, and a pose graph gives each map its place.
+//!
+//! **Memory.** The distances of two maps, and 200,000 surface points of each recording, 48 bytes each.
+
+use super::distance_field::{DistanceField, SurfacePoint};
+use super::manifest::{rows_of, transform};
+use super::pose_graph::{Edge, Node, solve};
+use super::register::{RegisteredMap, Registration, Uncertainty, register};
+use super::submap::Submap;
+use super::{FleetError, Job, Manifest};
+use crate::run::write_whole;
+use dynvox_core::geometry::Transform;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::Path;
+
+/// Name of what alignment found.
+pub const ALIGNMENT_FILE: &str = "alignment.json";
+/// Surface points of a recording.
+const POINTS_MAX: usize = 200_000;
+/// Weight of a voxel that takes part.
+const MIN_WEIGHT: u8 = 3;
+/// Registrations of all pairs, each from the poses that the last one gave.
+const ROUNDS: usize = 3;
+
+/// Where recordings lie.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Alignment {
+    /// In the order of the jobs.
+    pub recordings: Vec<AlignedRecording>,
+    /// Recordings that overlap.
+    pub pairs: Vec<AlignedPair>,
+}
+
+/// Where a recording lies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AlignedRecording {
+    /// Its name.
+    pub name: String,
+    /// Its job.
+    pub id: String,
+    /// As it was given: the rows of a 3 x 4 matrix.
+    pub given: [f64; 12],
+    /// As it is.
+    pub t_world_camera: [f64; 12],
+    /// How far the map's centre was moved, m.
+    pub moved_m: f64,
+    /// How far the map was turned, degrees.
+    pub turned_deg: f64,
+}
+
+/// How two recordings fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AlignedPair {
+    /// Names of the recordings.
+    pub recordings: [String; 2],
+    /// Surface points where the other map was seen.
+    pub points: usize,
+    /// Share of them that is near.
+    pub inlier_share: f64,
+    /// Root mean square of their distances as given, m.
+    pub rms_before_m: f64,
+    /// And of those that are near, aligned, m.
+    pub rms_m: f64,
+    /// Share of the weakest degree of freedom in the strongest.
+    pub min_eigen_share: f64,
+    /// Why the registration was not believed.
+    pub refused: Option<String>,
+}
+
+/// What is kept of a recording while others are registered.
+struct Sampled {
+    points: Vec<SurfacePoint>,
+    centre_m: [f64; 3],
+    radius_m: f64,
+}
+
+impl Alignment {
+    /// Aligns the maps of jobs that are all done.
+    ///
+    /// # Errors
+    /// A map is damaged or missing.
+    pub fn find(manifest: &Manifest, folder: &Path, uncertainty: &Uncertainty) -> Result<Self, FleetError> {
+        let given: Vec<Transform> = manifest.jobs.iter().map(|job| job.t_world_camera().unwrap_or_default()).collect();
+        let sampled = manifest.jobs.iter().map(|job| Sampled::of(job, folder)).collect::<Result<Vec<_>, _>>()?;
+        let nodes: Vec<Node> = given.iter().zip(&sampled).map(|(&given, of)| Node { given, centre_m: of.centre_m }).collect();
+        let mut poses = given.clone();
+        let mut pairs: Vec<([usize; 2], AlignedPair)> = Vec::new();
+        for _ in 0..ROUNDS {
+            let found = register_all(manifest, folder, (&sampled, &given, &poses, uncertainty))?;
+            let edges: Vec<Edge> = found.iter().filter(|(_, of)| of.refused.is_none()).map(|(nodes, of)| edge(*nodes, of)).collect();
+            poses = solve(&nodes, &edges, uncertainty, &poses);
+            pairs = found.iter().map(|(nodes, of)| (*nodes, pair(manifest, *nodes, of, &pairs))).collect();
+        }
+        let recordings = manifest.jobs.iter().zip(&poses).zip(&nodes).map(|((job, pose), node)| recording(job, pose, node));
+        Ok(Self {
+            recordings: recordings.collect(),
+            pairs: pairs.into_iter().map(|(_, pair)| pair).collect(),
+        })
+    }
+
+    /// Writes it into the folder of the jobs.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    pub fn write(&self, folder: &Path) -> Result<(), FleetError> {
+        let path = folder.join(ALIGNMENT_FILE);
+        let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
+        write_whole(&path, |file| file.write_all(text.as_bytes())).map_err(|error| FleetError::content(&path, error.to_string()))
+    }
+}
+
+/// Where the maps of jobs lie in the world: as aligned, or as given where nothing was aligned.
+///
+/// # Errors
+/// The alignment is not of these jobs.
+pub fn poses(manifest: &Manifest, folder: &Path) -> Result<Vec<Transform>, FleetError> {
+    let path = folder.join(ALIGNMENT_FILE);
+    if !path.is_file() {
+        return Ok(manifest.jobs.iter().map(|job| job.t_world_camera().unwrap_or_default()).collect());
+    }
+    let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
+    let other = || FleetError::content(&path, "is not of these jobs. Align again with `dynvox fleet align`, or remove it");
+    let alignment: Alignment = serde_json::from_str(&text).map_err(|_| other())?;
+    // Numbers read from JSON may differ in their last bit.
+    let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs());
+    let is_same = |(job, of): (&Job, &AlignedRecording)| job.id == of.id && job.t_world_camera.iter().zip(&of.given).all(is_near);
+    if alignment.recordings.len() != manifest.jobs.len() || !manifest.jobs.iter().zip(&alignment.recordings).all(is_same) {
+        return Err(other());
+    }
+    alignment.recordings.iter().map(|of| transform(&of.t_world_camera).ok_or_else(other)).collect()
+}
+
+impl Sampled {
+    fn of(job: &Job, folder: &Path) -> Result<Self, FleetError> {
+        let points = field(job, folder)?.surface(POINTS_MAX);
+        let mut centre_m = [0.0; 3];
+        points.iter().for_each(|point| (0..3).for_each(|axis| centre_m[axis] += point.at_m[axis] / points.len() as f64));
+        let from_centre = |point: &SurfacePoint| (0..3).map(|axis| (point.at_m[axis] - centre_m[axis]).powi(2)).sum::<f64>().sqrt();
+        let radius_m = points.iter().map(from_centre).fold(0.0, f64::max);
+        Ok(Self { points, centre_m, radius_m })
+    }
+}
+
+/// The distances of a recording's map.
+fn field(job: &Job, folder: &Path) -> Result<DistanceField, FleetError> {
+    let mut map = Submap::open(&job.submap(folder))?;
+    Ok(DistanceField::of(&mut map.store, &map.lattice, MIN_WEIGHT))
+}
+
+type Known<'k> = (&'k [Sampled], &'k [Transform], &'k [Transform], &'k Uncertainty);
+
+/// All pairs that may overlap, in the order of the jobs.
+fn register_all(
+    manifest: &Manifest,
+    folder: &Path,
+    (sampled, given, poses, uncertainty): Known<'_>,
+) -> Result<Vec<([usize; 2], Registration)>, FleetError> {
+    let load = |at: usize| -> Result<RegisteredMap, FleetError> {
+        Ok(RegisteredMap { field: field(&manifest.jobs[at], folder)?, points: sampled[at].points.clone() })
+    };
+    let mut found = Vec::new();
+    for b in 0..sampled.len() {
+        let mut map_b = None;
+        for a in b + 1..sampled.len() {
+            let t_b_a = poses[b].inverse() * poses[a];
+            let to_a = t_b_a.transform_point(sampled[a].centre_m);
+            let apart_m = (0..3).map(|axis| (to_a[axis] - sampled[b].centre_m[axis]).powi(2)).sum::<f64>().sqrt();
+            if apart_m > sampled[a].radius_m + sampled[b].radius_m {
+                continue;
+            }
+            if map_b.is_none() {
+                map_b = Some(load(b)?);
+            }
+            let Some(map_b) = &map_b else { continue };
+            let registration = register((&load(a)?, map_b), (&(given[b].inverse() * given[a]), &t_b_a), uncertainty);
+            found.extend(registration.map(|registration| ([a, b], registration)));
+        }
+    }
+    Ok(found)
+}
+
+fn edge(nodes: [usize; 2], of: &Registration) -> Edge {
+    Edge { nodes, t_b_a: of.t_b_a, information: of.information, centre_m: of.centre_m }
+}
+
+fn pair(manifest: &Manifest, [a, b]: [usize; 2], of: &Registration, before: &[([usize; 2], AlignedPair)]) -> AlignedPair {
+    let first = before.iter().find(|(nodes, _)| *nodes == [a, b]);
+    AlignedPair {
+        recordings: [a, b].map(|at| manifest.jobs[at].name.clone()),
+        points: of.points,
+        inlier_share: of.inlier_share,
+        rms_before_m: first.map_or(of.rms_before_m, |(_, pair)| pair.rms_before_m),
+        rms_m: of.rms_m,
+        min_eigen_share: of.min_eigen_share,
+        refused: of.refused.clone(),
+    }
+}
+
+fn recording(job: &Job, pose: &Transform, node: &Node) -> AlignedRecording {
+    let motion = *pose * node.given.inverse();
+    let (from, to) = (node.given.transform_point(node.centre_m), pose.transform_point(node.centre_m));
+    AlignedRecording {
+        name: job.name.clone(),
+        id: job.id.clone(),
+        given: job.t_world_camera,
+        t_world_camera: rows_of(pose),
+        moved_m: (0..3).map(|axis| (to[axis] - from[axis]).powi(2)).sum::<f64>().sqrt(),
+        turned_deg: motion.angle_rad().to_degrees(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fleet::tile_file::Lattice;
+    use crate::fleet::{Camera, keep};
+    use crate::run::store::BlockFile;
+    use dynvox_core::geometry::StereoRig;
+    use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock};
+
+    const LATTICE: Lattice = Lattice { voxel_size_m: 0.2, truncation_m: 0.8, colour: false };
+    const UNCERTAINTY: Uncertainty = Uncertainty { position_m: 0.3, rotation_rad: 0.026 };
+
+    /// Distance from a street: ground below, walls to both sides, and pillars of several sizes before them.
+    fn street([x, y, z]: [f64; 3]) -> f64 {
+        let pillar = |nth: i32| {
+            let (side, along) = (if nth % 2 == 0 { 4.5 } else { -4.0 }, 3.7 * f64::from(nth));
+            let half = 0.4 + 0.15 * f64::from(nth.rem_euclid(4));
+            ((x - side).abs() - half).max((z - along).abs() - half)
+        };
+        let walls = (6.0 - x).min(6.5 + x);
+        (-8..25).map(pillar).fold((1.6 - y).min(walls), f64::min)
+    }
+
+    /// What a recording at a pose sees 20 m ahead of it.
+    fn record(job: &Job, folder: &Path, t_world_camera: &Transform) {
+        let path = folder.join(format!("{}.blocks", job.id));
+        let (mut store, _) = BlockFile::open(&path, LATTICE.voxel_size_m, LATTICE.truncation_m).unwrap();
+        for block in 0..10 * 4 * 16 {
+            let coord = BlockCoord { x: block % 10 - 5, y: block / 10 % 4 - 2, z: block / 40 - 2 };
+            let (mut sdf, mut weight) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS]);
+            for voxel in 0..BLOCK_VOXELS {
+                let offset = [voxel % 8, voxel / 8 % 8, voxel / 64].map(|side| side as f64);
+                let at = std::array::from_fn(|axis| (f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis]) * 0.2);
+                let share = street(t_world_camera.transform_point(at)) / 0.8;
+                if share > -1.0 {
+                    (sdf[voxel], weight[voxel]) = ((share.min(1.0) * 32_767.0) as i16, 9);
+                }
+            }
+            assert!(store.store(EvictedBlock { coord, sdf: &sdf, weight: &weight, colour: None }));
+        }
+        let rig = StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
+        keep(&mut store, &LATTICE, &Camera { rig, size: (100, 40), poses: Vec::new() }, &job.submap(folder)).unwrap();
+    }
+
+    fn job(nth: usize, given: &Transform) -> Job {
+        Job {
+            name: format!("part {nth}"),
+            id: format!("{nth:016x}"),
+            arguments: Vec::new(),
+            t_world_camera: rows_of(given),
+            epoch: 0,
+            bytes: 0,
+        }
+    }
+
+    #[test]
+    fn recordings_two_tenths_of_a_metre_and_a_degree_off_are_aligned() {
+        let root = tempfile::TempDir::new().unwrap();
+        std::fs::create_dir_all(root.path().join("submaps")).unwrap();
+        let truth = [
+            Transform::IDENTITY,
+            Transform::new([0.0, 0.05, 0.0], [0.3, 0.0, 12.0]),
+            Transform::new([0.0, -0.08, 0.01], [-0.4, 0.1, 24.0]),
+            Transform::from_translation([400.0, 0.0, 5.0]),
+        ];
+        let off = |at: usize, turn: [f64; 3], shift: [f64; 3]| {
+            let moved = std::array::from_fn(|axis| truth[at].translation_m[axis] + shift[axis]);
+            let turned = Transform::new(turn, [0.0; 3]) * Transform { translation_m: [0.0; 3], ..truth[at] };
+            Transform { translation_m: moved, ..turned }
+        };
+        let degree = 1f64.to_radians();
+        let given = [
+            truth[0],
+            off(1, [0.0, degree, 0.0], [0.12, -0.1, 0.12]),
+            off(2, [0.6 * degree, -0.8 * degree, 0.0], [-0.15, 0.05, -0.12]),
+            off(3, [0.0, degree, 0.0], [0.2, 0.0, 0.0]),
+        ];
+        let manifest = Manifest { jobs: given.iter().enumerate().map(|(nth, given)| job(nth, given)).collect() };
+        manifest.jobs.iter().zip(&truth).for_each(|(job, truth)| record(job, root.path(), truth));
+        let alignment = Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap();
+        alignment.write(root.path()).unwrap();
+        let found = poses(&manifest, root.path()).unwrap();
+        for at in 0..3 {
+            let error = truth[at].inverse() * found[at];
+            assert!(error.distance_m() < 0.03, "{at}: {} m, {alignment:?}", error.distance_m());
+            assert!(error.angle_rad().to_degrees() < 0.1, "{at}: {} degrees", error.angle_rad().to_degrees());
+        }
+        assert!((found[3].inverse() * given[3]).distance_m() < 1e-9, "without overlap it stays");
+        assert!(alignment.pairs.iter().all(|pair| pair.refused.is_none() && pair.rms_m < pair.rms_before_m), "{alignment:?}");
+        assert_eq!(alignment, Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap());
+        let mut others = manifest;
+        others.jobs[1].t_world_camera[3] += 0.1;
+        assert!(poses(&others, root.path()).unwrap_err().to_string().contains("is not of these jobs"));
+    }
+
+    #[test]
+    fn a_pose_farther_off_than_it_may_be_is_refused_by_name() {
+        let root = tempfile::TempDir::new().unwrap();
+        std::fs::create_dir_all(root.path().join("submaps")).unwrap();
+        let given = [Transform::IDENTITY, Transform::from_translation([0.4, 0.0, 12.0])];
+        let manifest = Manifest { jobs: given.iter().enumerate().map(|(nth, given)| job(nth, given)).collect() };
+        record(&manifest.jobs[0], root.path(), &given[0]);
+        record(&manifest.jobs[1], root.path(), &Transform::from_translation([0.0, 0.0, 12.0]));
+        let sure = Uncertainty { position_m: 0.05, rotation_rad: 0.001 };
+        let alignment = Alignment::find(&manifest, root.path(), &sure).unwrap();
+        let why = alignment.pairs[0].refused.clone().unwrap();
+        assert!(why.contains("more than the given poses may be off"), "{why}");
+        assert!(alignment.recordings.iter().all(|of| of.moved_m < 1e-6), "{alignment:?}");
+    }
+}

@@ -1,0 +1,165 @@
+//! Poses of recordings from what was given and how their maps lie to one another: weighted least squares.
+//!
+//! Each recording's map is rigid. Given poses are weak observations, registrations strong ones; the first recording stays where it is. A
+//! recording without a registration stays where it was given.
+//!
+//! **Memory.** A matrix of 36 x 36 numbers for each two recordings.
+
+use super::register::{Uncertainty, motion_about, step_about};
+use dynvox_core::geometry::Transform;
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+
+const ITERATIONS_MAX: usize = 20;
+/// A step that changes no pose by more ends them, m and rad.
+const STEP_MIN: f64 = 1e-10;
+/// How much surer the first recording is than the others.
+const FIRST_SHARE: f64 = 1e-4;
+
+/// A recording.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// Its map in the world, as given.
+    pub given: Transform,
+    /// The map's centre, in the map: what is not known about its rotation is about it.
+    pub centre_m: [f64; 3],
+}
+
+/// How two maps lie to one another.
+#[derive(Clone, Debug)]
+pub struct Edge {
+    /// First and second recording.
+    pub nodes: [usize; 2],
+    /// The first map in the second.
+    pub t_b_a: Transform,
+    /// Information about the centre, in the second map's axes.
+    pub information: Matrix6<f64>,
+    /// The centre, in the second map.
+    pub centre_m: [f64; 3],
+}
+
+/// Where the maps lie in the world, from `start` on.
+pub fn solve(nodes: &[Node], edges: &[Edge], uncertainty: &Uncertainty, start: &[Transform]) -> Vec<Transform> {
+    let mut poses = start.to_vec();
+    for _ in 0..ITERATIONS_MAX {
+        let mut matrix = DMatrix::zeros(6 * nodes.len(), 6 * nodes.len());
+        let mut vector = DVector::zeros(6 * nodes.len());
+        for (at, node) in nodes.iter().enumerate() {
+            let share = if at == 0 { FIRST_SHARE } else { 1.0 };
+            let centre_m = Vector3::from(poses[at].transform_point(node.centre_m));
+            let to_centre = about(&centre_m);
+            let information = to_centre.transpose() * prior(uncertainty, share);
+            add(&mut matrix, at, at, &(information * to_centre));
+            add_vector(&mut vector, at, &(information * step_about(&centre_m, &(node.given * poses[at].inverse()))));
+        }
+        for edge in edges {
+            let [a, b] = edge.nodes;
+            let centre_m = Vector3::from(poses[b].transform_point(edge.centre_m));
+            let to_centre = about(&centre_m);
+            let wanted = poses[b] * edge.t_b_a;
+            let weighted = to_centre.transpose() * turned(&edge.information, &poses[b]);
+            let (own, shared) = (weighted * to_centre, weighted * step_about(&centre_m, &(wanted * poses[a].inverse())));
+            [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)]
+                .into_iter()
+                .for_each(|(i, j, sign)| add(&mut matrix, i, j, &(sign * own)));
+            add_vector(&mut vector, a, &shared);
+            add_vector(&mut vector, b, &-shared);
+        }
+        let Some(solver) = matrix.cholesky() else { break };
+        let step = solver.solve(&vector);
+        for (at, pose) in poses.iter_mut().enumerate() {
+            // The step is about the world's origin.
+            let own = Vector6::from(step.fixed_rows::<6>(6 * at));
+            *pose = (motion_about(&Vector3::zeros(), &own) * *pose).normalized();
+        }
+        if step.amax() < STEP_MIN {
+            break;
+        }
+    }
+    poses
+}
+
+fn add(matrix: &mut DMatrix<f64>, row: usize, column: usize, part: &Matrix6<f64>) {
+    let mut view = matrix.fixed_view_mut::<6, 6>(6 * row, 6 * column);
+    view += part;
+}
+
+fn add_vector(vector: &mut DVector<f64>, row: usize, part: &Vector6<f64>) {
+    let mut view = vector.fixed_rows_mut::<6>(6 * row);
+    view += part;
+}
+
+/// Takes a step about the world's origin to one about a centre: the translation is that of the centre.
+fn about(centre_m: &Vector3<f64>) -> Matrix6<f64> {
+    let mut matrix = Matrix6::identity();
+    matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&-centre_m.cross_matrix());
+    matrix
+}
+
+fn prior(uncertainty: &Uncertainty, share: f64) -> Matrix6<f64> {
+    let (turn, shift) = ((share * uncertainty.rotation_rad).powi(-2), (share * uncertainty.position_m).powi(-2));
+    Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift))
+}
+
+/// Information in the world's axes.
+fn turned(information: &Matrix6<f64>, t_world_b: &Transform) -> Matrix6<f64> {
+    let rotation = nalgebra::Matrix3::from(t_world_b.rotation_matrix()).transpose();
+    let mut both = Matrix6::zeros();
+    both.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    both.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
+    both * information * both.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNCERTAINTY: Uncertainty = Uncertainty { position_m: 0.3, rotation_rad: 0.02 };
+
+    fn apart(a: &Transform, b: &Transform, at_m: [f64; 3]) -> f64 {
+        (Vector3::from(a.transform_point(at_m)) - Vector3::from(b.transform_point(at_m))).norm()
+    }
+
+    #[test]
+    fn registered_recordings_are_moved_and_one_without_overlap_stays() {
+        let truth = [
+            Transform::new([0.0, 0.3, 0.0], [500.0, 1.0, -300.0]),
+            Transform::new([0.0, 0.9, 0.1], [520.0, 1.0, -280.0]),
+            Transform::new([0.1, -2.0, 0.0], [540.0, 0.0, -290.0]),
+            Transform::from_translation([-900.0, 0.0, 10.0]),
+        ];
+        let centre_m = [3.0, 0.0, 14.0];
+        let off = |pose: &Transform, at: f64| {
+            let centre = Vector3::from(pose.transform_point(centre_m));
+            motion_about(&centre, &Vector6::new(0.0, 0.017 * at, 0.0, 0.15, -0.05 * at, 0.1)) * *pose
+        };
+        let given = [truth[0], off(&truth[1], 1.0), off(&truth[2], -1.0), off(&truth[3], 1.0)];
+        let nodes: Vec<Node> = given.iter().map(|&given| Node { given, centre_m }).collect();
+        let edge = |a: usize, b: usize| Edge {
+            nodes: [a, b],
+            t_b_a: truth[b].inverse() * truth[a],
+            information: Matrix6::identity() * 1e6,
+            centre_m: [1.0, 2.0, 30.0],
+        };
+        let solved = solve(&nodes, &[edge(0, 1), edge(1, 2)], &UNCERTAINTY, &given);
+        for at in 0..3 {
+            assert!(apart(&solved[at], &truth[at], centre_m) < 1e-3, "{at}: {}", apart(&solved[at], &truth[at], centre_m));
+            assert!((solved[at].inverse() * truth[at]).angle_rad() < 1e-4);
+        }
+        assert!(apart(&solved[3], &given[3], centre_m) < 1e-9);
+        assert_eq!(solved, solve(&nodes, &[edge(0, 1), edge(1, 2)], &UNCERTAINTY, &given));
+    }
+
+    #[test]
+    fn of_two_registrations_that_contradict_the_surer_one_counts() {
+        let nodes = [0.0, 0.0].map(|x| Node { given: Transform::from_translation([x, 0.0, 0.0]), centre_m: [0.0; 3] });
+        let edge = |x: f64, sure: f64| Edge {
+            nodes: [1, 0],
+            t_b_a: Transform::from_translation([x, 0.0, 0.0]),
+            information: Matrix6::identity() * sure,
+            centre_m: [0.0; 3],
+        };
+        let start = nodes.each_ref().map(|node| node.given);
+        let solved = solve(&nodes, &[edge(0.1, 9e6), edge(0.2, 1e6)], &UNCERTAINTY, &start);
+        assert!((solved[1].translation_m[0] - 0.11).abs() < 1e-4, "{:?}", solved[1]);
+    }
+}

@@ -1,0 +1,153 @@
+//! One map of several epochs: what agrees is averaged, and where epochs contradict one another a rule decides.
+//!
+//! Sums alone would blur a parked car that has left with the empty road of the day after. So each epoch's sums are kept apart until here. In a
+//! voxel one epoch has a *surface* and another *free space* when the first is at most 0.4 truncations behind its surface and the second at least
+//! half a truncation in front of its own: a thin wall seen from both sides is no contradiction. A block with at least [`CONTRADICTIONS_MIN`] such
+//! voxels has changed. Of the epochs that contradict one another there, the latest that saw those voxels with a mean weight of at least
+//! [`SEEN_OFTEN`] is believed, else the one with the largest weight; the others lose the voxels in which they contradict it.
+//!
+//! **Memory.** One block of each epoch, and what has changed.
+
+use super::FleetError;
+use super::block_sums::{BlockAverage, BlockSums, WEIGHT_MAX};
+use super::merge::{Head, least};
+use super::tile_file::Lattice;
+use super::tile_folder::{WorldTile, tiles};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord};
+use std::path::{Path, PathBuf};
+
+/// Voxels in a block that contradict, from which on the block has changed.
+pub const CONTRADICTIONS_MIN: u32 = 16;
+/// Mean weight in these voxels from which on an epoch has seen them often enough.
+pub const SEEN_OFTEN: u64 = 4;
+/// Farthest behind a surface, as a share of the truncation, that still speaks of it.
+const BEHIND_MAX: f64 = 0.4;
+/// Nearest in front of a surface that is free space.
+const FREE_MIN: f64 = 0.5;
+/// The value of a truncation.
+const TRUNCATION: f64 = 32_767.0;
+
+/// How a block has changed between two epochs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BlockChange {
+    /// The block.
+    pub coord: BlockCoord,
+    /// The epoch with a surface.
+    pub surface: u32,
+    /// The epoch with free space.
+    pub free: u32,
+    /// The epoch that is believed.
+    pub believed: u32,
+    /// Voxels that contradict.
+    pub voxels: u32,
+}
+
+/// One block of the map that all epochs make.
+pub struct ResolvedBlock {
+    /// The block.
+    pub coord: BlockCoord,
+    /// Averages over the epochs that are believed.
+    pub average: BlockAverage,
+    /// Whether a voxel lies on or near a surface: the others are known to be free.
+    pub has_surface: bool,
+}
+
+/// What one epoch says of a voxel.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Says {
+    Nothing,
+    Free,
+    Surface,
+    Behind,
+}
+
+/// Reads all blocks of a map, tile by tile, and hands each with what changed in it to `sink`. Returns the voxels' lattice.
+///
+/// # Errors
+/// The folder has no tile, a tile is damaged or of other voxels, or an error of `sink`.
+pub fn resolve(
+    folder: &Path,
+    mut sink: impl FnMut(ResolvedBlock, &[BlockChange]) -> Result<(), FleetError>,
+) -> Result<Lattice, FleetError> {
+    let files: Vec<(WorldTile, PathBuf)> = tiles(folder)?.into_iter().collect();
+    let mut lattice = None;
+    for of_tile in files.chunk_by(|a, b| a.0.sides == b.0.sides) {
+        let mut heads = of_tile.iter().map(|(_, path)| Head::open(path, &mut lattice)).collect::<Result<Vec<_>, _>>()?;
+        while let Some(coord) = least(&heads) {
+            let mut blocks = Vec::new();
+            for ((tile, _), head) in of_tile.iter().zip(&mut heads) {
+                blocks.extend(head.take(coord)?.map(|sums| (tile.epoch, sums)));
+            }
+            let (block, changes) = resolve_block(coord, blocks);
+            sink(block, &changes)?;
+        }
+    }
+    lattice.ok_or_else(|| FleetError::content(folder, "has no tile: nothing was mapped"))
+}
+
+/// One block of some epochs, ascending.
+fn resolve_block(coord: BlockCoord, mut blocks: Vec<(u32, BlockSums)>) -> (ResolvedBlock, Vec<BlockChange>) {
+    let changes = if blocks.len() > 1 { decide(coord, &mut blocks) } else { Vec::new() };
+    let mut blocks = blocks.into_iter().map(|(_, sums)| sums);
+    let mut sum = blocks.next().unwrap_or_else(|| BlockSums::zero(false));
+    blocks.for_each(|other| sum.add(&other));
+    let average = sum.average();
+    let is_near = |(sdf, weight): (&i16, &u8)| *weight > 0 && f64::from(*sdf) < 0.999 * TRUNCATION;
+    let has_surface = average.sdf.iter().zip(&*average.weight).any(is_near);
+    (ResolvedBlock { coord, average, has_surface }, changes)
+}
+
+/// Takes from the epochs what contradicts those that are believed.
+fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange> {
+    let says: Vec<Vec<Says>> = blocks.iter().map(|(_, sums)| (0..BLOCK_VOXELS).map(|voxel| says(sums, voxel)).collect()).collect();
+    let mut changes = Vec::new();
+    // The latest pair first: what is taken from an epoch there contradicts nothing any more.
+    for later in (1..blocks.len()).rev() {
+        for earlier in (0..later).rev() {
+            for (surface, free) in [(earlier, later), (later, earlier)] {
+                let differs = |voxel: &usize| says[surface][*voxel] == Says::Surface && says[free][*voxel] == Says::Free;
+                let seen = |of: usize, voxel: usize| blocks[of].1.weight[voxel] > 0;
+                let voxels: Vec<usize> = (0..BLOCK_VOXELS).filter(differs).filter(|&v| seen(surface, v) && seen(free, v)).collect();
+                if (voxels.len() as u32) < CONTRADICTIONS_MIN {
+                    continue;
+                }
+                let weight = |of: usize| voxels.iter().map(|&voxel| u64::from(blocks[of].1.weight[voxel])).sum::<u64>();
+                let is_later = weight(later) >= SEEN_OFTEN * voxels.len() as u64 || weight(later) >= weight(earlier);
+                let (believed, other) = if is_later { (later, earlier) } else { (earlier, later) };
+                let change = BlockChange {
+                    coord,
+                    surface: blocks[surface].0,
+                    free: blocks[free].0,
+                    believed: blocks[believed].0,
+                    voxels: voxels.len() as u32,
+                };
+                (0..BLOCK_VOXELS).filter(|&v| contradicts(says[other][v], says[believed][v])).for_each(|v| clear(&mut blocks[other].1, v));
+                changes.push(change);
+            }
+        }
+    }
+    changes
+}
+
+fn says(sums: &BlockSums, voxel: usize) -> Says {
+    let weight = sums.weight[voxel];
+    if weight == 0 || weight > WEIGHT_MAX {
+        return Says::Nothing;
+    }
+    let share = f64::from(sums.distance[voxel]) / f64::from(weight) / TRUNCATION;
+    match share {
+        _ if share >= FREE_MIN => Says::Free,
+        _ if share > 0.0 => Says::Nothing,
+        _ if share >= -BEHIND_MAX => Says::Surface,
+        _ => Says::Behind,
+    }
+}
+
+fn contradicts(one: Says, other: Says) -> bool {
+    matches!((one, other), (Says::Free, Says::Surface | Says::Behind) | (Says::Surface | Says::Behind, Says::Free))
+}
+
+fn clear(sums: &mut BlockSums, voxel: usize) {
+    (sums.distance[voxel], sums.weight[voxel]) = (0, 0);
+    sums.colour.iter_mut().flat_map(|planes| planes.iter_mut()).for_each(|plane| plane[voxel] = 0);
+}

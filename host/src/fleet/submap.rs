@@ -1,0 +1,185 @@
+//! What is kept of a run: its blocks in its own lattice, and the path of its camera.
+//!
+//! Values are taken over as they are: a map is carried into the world once, when it is known where it lies. A folder holds `map.blocks`, and
+//! `submap.json`, whose checksum covers every record: a map that was changed or cut off is refused.
+
+use super::FleetError;
+use super::distance_field::DistanceField;
+use super::free_space::{Camera, free_blocks};
+use super::tile_file::Lattice;
+use crate::formats::DraftFolder;
+use crate::run::store::{BlockFile, Position};
+use crate::run::{BLOCKS_FILE, write_whole};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock};
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+
+/// Name of what is known of a map.
+const HEAD_FILE: &str = "submap.json";
+
+/// What is known of a map.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Head {
+    voxel_size_m: f32,
+    truncation_m: f32,
+    colour: bool,
+    position: Position,
+    cameras_m: Vec<[f64; 3]>,
+}
+
+/// A run's map in its own lattice.
+pub struct Submap {
+    /// Its voxels.
+    pub lattice: Lattice,
+    /// Its blocks.
+    pub store: BlockFile<File>,
+}
+
+/// One block of a run.
+pub struct Source {
+    pub sdf: [i16; BLOCK_VOXELS],
+    pub weight: [u8; BLOCK_VOXELS],
+    pub colour: Option<Box<[[u8; BLOCK_VOXELS]; 3]>>,
+}
+
+impl Source {
+    /// Reads a block; `None` where it is not stored.
+    pub fn load(store: &mut BlockFile<File>, coord: BlockCoord, colour: bool) -> Option<Box<Self>> {
+        let mut source = Box::new(Self {
+            sdf: [0; BLOCK_VOXELS],
+            weight: [0; BLOCK_VOXELS],
+            colour: colour.then(|| Box::new([[0; BLOCK_VOXELS]; 3])),
+        });
+        let into = LoadedBlock {
+            coord,
+            sdf: &mut source.sdf,
+            weight: &mut source.weight,
+            colour: source.colour.as_deref_mut(),
+        };
+        (store.holds(coord) && store.load(into)).then_some(source)
+    }
+}
+
+/// All blocks of a store, tile by tile, ascending within a tile.
+pub fn blocks(store: &mut BlockFile<File>) -> Vec<BlockCoord> {
+    store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect()
+}
+
+/// Keeps the newest record of each block of a run in a new folder, and the blocks that its camera saw to be free. Returns their number.
+///
+/// # Errors
+/// The folder exists, a block cannot be read, or the disk refuses. Nothing half-written stays behind.
+pub fn keep(store: &mut BlockFile<File>, lattice: &Lattice, camera: &Camera, out: &Path) -> Result<u64, FleetError> {
+    if out.exists() {
+        return Err(FleetError::Exists { path: out.to_path_buf() });
+    }
+    let draft = DraftFolder::of(out);
+    std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
+    let path = draft.path().join(BLOCKS_FILE);
+    let (mut kept, _) = BlockFile::open(&path, lattice.voxel_size_m, lattice.truncation_m)?;
+    for coord in blocks(store) {
+        let source = Source::load(store, coord, lattice.colour)
+            .ok_or_else(|| FleetError::content(out, format!("is not made: block {coord:?} of the run cannot be read")))?;
+        let block = EvictedBlock {
+            coord,
+            sdf: &source.sdf,
+            weight: &source.weight,
+            colour: source.colour.as_deref(),
+        };
+        if !kept.store(block) {
+            return Err(not_stored(&kept, &path));
+        }
+    }
+    let field = DistanceField::of(&mut kept, lattice, 1);
+    let colour = lattice.colour.then(|| Box::new([[0; BLOCK_VOXELS]; 3]));
+    for (coord, views) in free_blocks(&field, camera).into_iter().filter(|(coord, _)| !field.holds(*coord)) {
+        let (sdf, weight) = ([i16::MAX; BLOCK_VOXELS], [views; BLOCK_VOXELS]);
+        if !kept.store(EvictedBlock { coord, sdf: &sdf, weight: &weight, colour: colour.as_deref() }) {
+            return Err(not_stored(&kept, &path));
+        }
+    }
+    let head = Head {
+        voxel_size_m: lattice.voxel_size_m,
+        truncation_m: lattice.truncation_m,
+        colour: lattice.colour,
+        position: kept.position().map_err(FleetError::io(&path))?,
+        cameras_m: camera.poses.iter().map(|pose| pose.translation_m).collect(),
+    };
+    let text = serde_json::to_string(&head).unwrap_or_default();
+    let head_path = draft.path().join(HEAD_FILE);
+    write_whole(&head_path, |file| file.write_all(text.as_bytes())).map_err(|error| FleetError::content(&head_path, error.to_string()))?;
+    draft.rename(out).map_err(FleetError::io(out))?;
+    Ok(kept.records())
+}
+
+/// Why a store took no block.
+pub fn not_stored(store: &BlockFile<File>, path: &Path) -> FleetError {
+    let source = store.failure().map_or_else(|| std::io::ErrorKind::Other.into(), |error| std::io::Error::other(error.to_string()));
+    FleetError::Io { path: path.to_path_buf(), source }
+}
+
+impl Submap {
+    /// Opens the map in a folder.
+    ///
+    /// # Errors
+    /// The folder is no map, or not as it was written.
+    pub fn open(folder: &Path) -> Result<Self, FleetError> {
+        let Head { voxel_size_m, truncation_m, colour, position, .. } = Head::read(folder)?;
+        let store = BlockFile::reopen(&folder.join(BLOCKS_FILE), voxel_size_m, truncation_m, &position)
+            .map_err(|_| FleetError::content(folder, "is damaged. Remove the folder and make it again"))?;
+        Ok(Self { lattice: Lattice { voxel_size_m, truncation_m, colour }, store })
+    }
+
+    /// Where the camera of the map in a folder was, in the map's axes, m.
+    ///
+    /// # Errors
+    /// The folder is no map.
+    pub fn cameras_m(folder: &Path) -> Result<Vec<[f64; 3]>, FleetError> {
+        Ok(Head::read(folder)?.cameras_m)
+    }
+}
+
+impl Head {
+    fn read(folder: &Path) -> Result<Self, FleetError> {
+        let path = folder.join(HEAD_FILE);
+        let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
+        serde_json::from_str(&text).map_err(|error| FleetError::content(&path, format!("is no map of a run: {error}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynvox_core::geometry::{StereoRig, Transform};
+
+    #[test]
+    fn a_kept_map_has_the_newest_values_and_a_changed_one_is_refused() {
+        let root = tempfile::TempDir::new().unwrap();
+        let (mut store, _) = BlockFile::open(&root.path().join("run.blocks"), 0.1, 0.5).unwrap();
+        for (x, weight) in [(3, 1), (-2, 5), (3, 9)] {
+            let (sdf, weight) = ([-7; BLOCK_VOXELS], [weight; BLOCK_VOXELS]);
+            assert!(store.store(EvictedBlock { coord: BlockCoord { x, y: 0, z: 0 }, sdf: &sdf, weight: &weight, colour: None }));
+        }
+        let lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: false };
+        let out = root.path().join("map");
+        let rig = StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
+        let camera = Camera { rig, size: (100, 40), poses: vec![Transform::from_translation([1.0, 2.0, 3.0])] };
+        assert_eq!(keep(&mut store, &lattice, &camera, &out).unwrap(), 2);
+        assert!(matches!(keep(&mut store, &lattice, &camera, &out), Err(FleetError::Exists { .. })));
+        let mut map = Submap::open(&out).unwrap();
+        assert_eq!((map.lattice, blocks(&mut map.store).len()), (lattice, 2));
+        assert_eq!(Submap::cameras_m(&out).unwrap(), [[1.0, 2.0, 3.0]]);
+        let source = Source::load(&mut map.store, BlockCoord { x: 3, y: 0, z: 0 }, false).unwrap();
+        assert_eq!((source.sdf[5], source.weight[5]), (-7, 9));
+        let path = out.join(BLOCKS_FILE);
+        let whole = std::fs::read(&path).unwrap();
+        for at in [20, whole.len() / 2, whole.len() - 1] {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1;
+            std::fs::write(&path, bytes).unwrap();
+            assert!(Submap::open(&out).err().unwrap().to_string().contains("is damaged"), "byte {at}");
+        }
+    }
+}
