@@ -34,8 +34,11 @@ const COMMANDS: [&str; 22] = [
     "fleet plan",
     "fleet run",
     "fleet status",
+    "fleet align",
+    "fleet resample",
     "fleet merge",
     "fleet mesh",
+    "fleet report",
 ];
 
 fn document(name: &str) -> String {

@@ -3,7 +3,7 @@
 
     pip install "dask[distributed]"
     dynvox fleet plan recordings.toml --out jobs
-    host/examples/fleet/dask_fleet.py --dynvox target/release/dynvox --jobs jobs --out map [--workers 2] [--memory 4GiB]
+    host/examples/fleet/dask_fleet.py --dynvox target/release/dynvox --jobs jobs --out map [--align] [--workers 2] [--memory 4GiB]
 
 A local cluster by default; `--scheduler ADDRESS` takes a running one (dask-jobqueue for Slurm, dask-kubernetes), whose workers are started with
 `--resources "MEMORY=BYTES"` and see the same folders.
@@ -15,12 +15,18 @@ from dask.utils import parse_bytes
 
 # Maps that one task of the tree adds.
 FAN_IN = 4
+# Memory of resampling.
+RESAMPLE_BYTES = 128 << 20
 
 
-def do_job(dynvox, folder, index, count):
+def do_job(dynvox, action, folder, index, count):
     """One job; a worker that dies is replaced and the job repeated."""
-    subprocess.run([dynvox, "fleet", "run", folder, "--shard", f"{index}/{count}"], check=True)
+    subprocess.run([dynvox, "fleet", action, folder, "--shard", f"{index}/{count}"], check=True)
     return index
+
+
+def align(dynvox, folder):
+    subprocess.run([dynvox, "fleet", "align", folder], check=True)
 
 
 def add(dynvox, maps, out):
@@ -49,6 +55,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name in ["dynvox", "jobs", "out"]:
         parser.add_argument(f"--{name}", required=True)
+    parser.add_argument("--align", action="store_true", help="register overlapping maps before they are merged")
     parser.add_argument("--scheduler")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--memory", default="4GiB", help="of each local worker")
@@ -56,11 +63,18 @@ def main():
     jobs = json.load(open(pathlib.Path(args.jobs) / "jobs.json"))["jobs"]
     cluster = args.scheduler or LocalCluster(n_workers=args.workers, threads_per_worker=4, memory_limit=0, resources={"MEMORY": parse_bytes(args.memory)})
     with Client(cluster) as client:
-        # As many jobs on a worker as its memory holds.
-        done = [client.submit(do_job, args.dynvox, args.jobs, nth, len(jobs), resources={"MEMORY": job["bytes"]}, retries=2, pure=False)
-                for nth, job in enumerate(jobs)]
-        client.gather(done)
-        maps = [str(pathlib.Path(args.jobs) / "submaps" / job["id"]) for job in jobs]
+        def all_of(action, bytes_of):
+            # As many jobs on a worker as its memory holds.
+            client.gather([client.submit(do_job, args.dynvox, action, args.jobs, nth, len(jobs), resources={"MEMORY": bytes_of(job)}, retries=2, pure=False)
+                           for nth, job in enumerate(jobs)])
+
+        all_of("run", lambda job: job["bytes"])
+        if args.align:
+            client.submit(align, args.dynvox, args.jobs, pure=False).result()
+        all_of("resample", lambda _: RESAMPLE_BYTES)
+        # The command names a map's folder by its place in the world.
+        maps = json.loads(subprocess.run([args.dynvox, "fleet", "status", args.jobs, "--json"], check=True, capture_output=True).stdout)
+        maps = [job["sums"] for job in maps]
         print(tree(client, args.dynvox, maps, args.out) if len(maps) > 1 else maps[0])
 
 

@@ -15,7 +15,7 @@ const POINTS_MAX: usize = 20_000;
 /// Points that must lie where the other map was seen.
 const POINTS_MIN: usize = 1_000;
 /// Share of these that must lie within the last limit.
-const INLIERS_MIN: f64 = 0.5;
+const INLIERS_MIN: f64 = 0.7;
 /// Largest root mean square of their distances, voxels.
 const RMS_MAX_VOXELS: f64 = 1.0;
 /// Least share of the weakest degree of freedom in the strongest.
@@ -155,9 +155,9 @@ pub fn register(
 }
 
 fn refusal(of: &Registration, moved: &Vector6<f64>, (voxel_size_m, pair, uncertainty): (f64, &Pair<'_>, &Uncertainty)) -> Option<String> {
-    // Both poses may be off, by three standard deviations each way; what a turn moves far from its own centre is added.
-    let turn_rad = 3.0 * std::f64::consts::SQRT_2 * uncertainty.rotation_rad;
-    let move_m = 3.0 * std::f64::consts::SQRT_2 * uncertainty.position_m + turn_rad * pair.centre_m.norm();
+    // Both poses may be off, by two standard deviations each; a turn also moves what is far from the map's origin.
+    let turn_rad = 2.0 * std::f64::consts::SQRT_2 * uncertainty.rotation_rad;
+    let move_m = 2.0 * std::f64::consts::SQRT_2 * uncertainty.position_m + turn_rad * pair.centre_m.norm();
     let (moved_m, turned_rad) = (moved.fixed_rows::<3>(3).norm(), moved.fixed_rows::<3>(0).norm());
     if of.points < POINTS_MIN {
         Some(format!("{} points are less than {POINTS_MIN}", of.points))

@@ -113,8 +113,12 @@ pub fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
         JobState::Open => "open",
     };
     if json {
-        let rows =
-            manifest.jobs.iter().map(|job| serde_json::json!({ "name": job.name, "id": job.id, "bytes": job.bytes, "state": word(job) }));
+        let poses = fleet::poses(&manifest, folder)?;
+        let rows = manifest.jobs.iter().zip(&poses).map(|(job, pose)| {
+            serde_json::json!({
+                "name": job.name, "id": job.id, "bytes": job.bytes, "state": word(job), "sums": job.sums(folder, pose),
+            })
+        });
         outln!("{}", serde_json::to_string_pretty(&rows.collect::<Vec<_>>())?);
         return Ok(());
     }
