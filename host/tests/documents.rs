@@ -13,7 +13,7 @@ use tempfile::TempDir;
 /// Words that stand for any name in documents.
 const PLACEHOLDERS: [&str; 3] = ["STAGE", "NAME", "NNNNNN"];
 /// Commands whose options are looked up.
-const COMMANDS: [&str; 22] = [
+const COMMANDS: [&str; 25] = [
     "run",
     "inspect",
     "calibration",

@@ -33,7 +33,7 @@ impl Averages {
     /// Of the map in `folder`, in a file beside `out` meanwhile; changes below `least_change_m3` are not listed.
     ///
     /// # Errors
-    /// A tile is damaged or of other voxels, there is none, or the disk refuses.
+    /// The folder has no tile, a tile is damaged or of other voxels, or the disk refuses.
     pub fn of(folder: &Path, out: &Path, least_change_m3: f64) -> Result<Self, FleetError> {
         let lattice = match tiles(folder)?.values().next() {
             Some(first) => TileReader::open(first)?.lattice(),

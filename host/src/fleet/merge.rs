@@ -122,7 +122,7 @@ mod tests {
     fn map(folder: &Path, seed: u64, lattice: &Lattice) {
         let mut random = Random::new(seed);
         let mut blocks = BTreeMap::new();
-        for _ in 0..30 {
+        for _ in 0..6 {
             let mut side = || random.below(8) as i16 * 10 - 40;
             let coord = BlockCoord { x: side(), y: 0, z: side() };
             let mut sums = BlockSums::zero(lattice.colour);
@@ -139,33 +139,51 @@ mod tests {
         }
     }
 
-    #[test]
-    fn maps_merged_in_any_order_and_tree_are_one() {
-        let root = tempfile::TempDir::new().unwrap();
-        let path = |name: String| root.path().join(name);
-        for seed in 0..8 {
-            map(&path(format!("map-{seed}")), seed, &LATTICE);
-        }
-        let (mut random, mut expected) = (Random::new(77), None);
-        for trial in 0..100 {
-            let mut maps: Vec<PathBuf> = (0..8).map(|seed| path(format!("map-{seed}"))).collect();
-            let mut step = 0;
-            while maps.len() > 1 {
+    /// Merges maps in a random tree, up to `workers` sums at once; the folder of the last one.
+    fn merged_by(workers: usize, mut maps: Vec<PathBuf>, scratch: &Path, random: &mut Random) -> PathBuf {
+        let mut step = 0;
+        while maps.len() > 1 {
+            let mut groups = Vec::new();
+            for _ in 0..workers.min(maps.len() / 2) {
                 // Some of those that are left, at random, become one.
-                let count = 2 + random.below(maps.len() as u32 - 1) as usize;
-                let chosen: Vec<_> = (0..count).map(|_| maps.swap_remove(random.below(maps.len() as u32) as usize)).collect();
-                let out = path(format!("merged-{trial}-{step}"));
-                merge(&chosen, &out).unwrap();
-                maps.push(out);
+                let most = (maps.len() as u32 - 1).min(8);
+                let count = 2 + random.below(most) as usize;
+                let chosen: Vec<_> =
+                    (0..count.min(maps.len())).map(|_| maps.swap_remove(random.below(maps.len() as u32) as usize)).collect();
+                groups.push((chosen, scratch.join(format!("merged-{step}"))));
                 step += 1;
+                if maps.len() < 2 {
+                    break;
+                }
             }
-            let found = digest(&maps[0]).unwrap();
-            assert_eq!(*expected.get_or_insert(found), found, "trial {trial}");
-            for step in 0..step {
-                std::fs::remove_dir_all(path(format!("merged-{trial}-{step}"))).unwrap();
-            }
+            std::thread::scope(|scope| {
+                groups.iter().for_each(|(chosen, out)| drop(scope.spawn(|| merge(chosen, out).unwrap())));
+            });
+            maps.extend(groups.into_iter().map(|(_, out)| out));
         }
-        assert_ne!(expected, Some(digest(&path("map-0".to_owned())).unwrap()));
+        maps.remove(0)
+    }
+
+    #[test]
+    fn maps_merged_in_any_order_and_tree_by_any_number_of_workers_are_one() {
+        let root = tempfile::TempDir::new().unwrap();
+        let path = |nth: usize| root.path().join(format!("map-{nth}"));
+        for nth in 0..64 {
+            map(&path(nth), nth as u64, &LATTICE);
+        }
+        let mut random = Random::new(77);
+        let mut digests = BTreeSet::new();
+        for count in [2, 3, 8, 64] {
+            let mut expected = None;
+            for trial in 0..100 {
+                let scratch = tempfile::TempDir::new_in(root.path()).unwrap();
+                let merged = merged_by(1 + trial % 4, (0..count).map(path).collect(), scratch.path(), &mut random);
+                let found = digest(&merged).unwrap();
+                assert_eq!(*expected.get_or_insert(found), found, "{count} maps, trial {trial}");
+            }
+            digests.extend(expected);
+        }
+        assert_eq!(digests.len(), 4, "other maps have another digest");
     }
 
     #[test]

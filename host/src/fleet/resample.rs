@@ -1,8 +1,9 @@
 //! A run's map as sums in the world's lattice.
 //!
 //! Each lattice point of the world is carried into the run's map, where distance, weight and colour are interpolated between the eight lattice
-//! points around it. All of them that count must have been seen. Where the lattices coincide the values are taken over as they are; elsewhere
-//! a surface moves by less than a twentieth of a voxel (tests), and a map loses at most one voxel at the rim of what was seen.
+//! points around it. Corners that count for at least half must have been seen; for the distance at the others the plane through those that were
+//! stands in. Where the lattices coincide the values are taken over as they are; elsewhere a surface moves by less than a twentieth of a voxel
+//! (tests).
 
 use super::FleetError;
 use super::block_sums::BlockSums;
@@ -21,6 +22,8 @@ use std::path::Path;
 const CACHED_BLOCKS: usize = 4_096;
 /// Share of a voxel that rounding may move a lattice point by.
 const ROUNDING: f64 = 1e-9;
+/// Share of a cell, as interpolation counts its corners, that must have been seen.
+const SEEN_MIN: f64 = 0.5;
 
 /// What became of a run's map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -208,20 +211,55 @@ impl<'s> SourceMap<'s> {
             std::array::from_fn(|axis| if (point[axis] - near[axis]).abs() < ROUNDING { near[axis] } else { point[axis] });
         let low = point.map(f64::floor);
         let share: [f64; 3] = std::array::from_fn(|axis| point[axis] - low[axis]);
-        let mut sums = [0.0; 5];
+        let (mut sums, mut seen, mut distances) = ([0.0; 5], 0.0, [None; 8]);
         for corner in 0..8usize {
-            let ahead: [bool; 3] = std::array::from_fn(|axis| corner >> axis & 1 == 1);
-            let factor = (0..3).fold(1.0, |product, axis| product * if ahead[axis] { share[axis] } else { 1.0 - share[axis] });
+            let factor = factor(&share, corner);
+            // On a lattice point no other counts.
             if factor == 0.0 {
                 continue;
             }
-            let (sdf, weight, [red, green, blue]) = self.voxel(std::array::from_fn(|axis| low[axis] as i32 + i32::from(ahead[axis])))?;
-            let values = [f64::from(sdf), f64::from(weight), f64::from(red), f64::from(green), f64::from(blue)];
+            let point = std::array::from_fn(|axis| low[axis] as i32 + (corner >> axis & 1) as i32);
+            let Some((sdf, weight, [red, green, blue])) = self.voxel(point) else { continue };
+            distances[corner] = Some(f64::from(sdf));
+            let values = [0.0, f64::from(weight), f64::from(red), f64::from(green), f64::from(blue)];
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+            seen += factor;
         }
+        if seen < SEEN_MIN {
+            return None;
+        }
+        sums[0] = distance(&distances, &share)? * seen;
+        let sums = sums.map(|sum| sum / seen);
         let [sdf, weight, red, green, blue] = sums.map(f64::round);
+        let sdf = if sdf.abs() > 32_767.0 { 32_767.0f64.copysign(sdf) } else { sdf };
         Some((sdf as i16, (weight as u8).max(1), [red as u8, green as u8, blue as u8]))
     }
+}
+
+/// What a corner of a cell counts.
+fn factor(share: &[f64; 3], corner: usize) -> f64 {
+    (0..3).fold(1.0, |product, axis| product * if corner >> axis & 1 == 1 { share[axis] } else { 1.0 - share[axis] })
+}
+
+/// Distance between the corners of a cell. For a corner that was not seen the plane through the others stands in; `None` where they give none.
+fn distance(corners: &[Option<f64>; 8], share: &[f64; 3]) -> Option<f64> {
+    let counts = |corner: &usize| factor(share, *corner) > 0.0;
+    let steps: [Option<f64>; 3] = std::array::from_fn(|axis| {
+        let pairs = (0..8usize).filter(|corner| corner >> axis & 1 == 0).filter_map(|low| Some(corners[low | 1 << axis]? - corners[low]?));
+        let (sum, count) = pairs.fold((0.0, 0.0), |(sum, count), step| (sum + step, count + 1.0));
+        (count > 0.0).then(|| sum / count)
+    });
+    (0..8usize).filter(counts).try_fold(0.0, |sum, corner| {
+        let beside = |axis: usize| {
+            let from = corners[corner ^ 1 << axis]?;
+            Some(if corner >> axis & 1 == 1 { from + steps[axis]? } else { from - steps[axis]? })
+        };
+        let stand_in = || {
+            let (sum, count) = (0..3).filter_map(beside).fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+            (count > 0.0).then(|| sum / count)
+        };
+        Some(sum + factor(share, corner) * corners[corner].or_else(stand_in)?)
+    })
 }
 
 #[cfg(test)]

@@ -54,7 +54,7 @@ pub struct ResolvedBlock {
 
 /// What one epoch says of a voxel.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Says {
+enum Statement {
     Nothing,
     Free,
     Surface,
@@ -99,13 +99,15 @@ fn resolve_block(coord: BlockCoord, mut blocks: Vec<(u32, BlockSums)>) -> (Resol
 
 /// Takes from the epochs what contradicts those that are believed.
 fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange> {
-    let says: Vec<Vec<Says>> = blocks.iter().map(|(_, sums)| (0..BLOCK_VOXELS).map(|voxel| says(sums, voxel)).collect()).collect();
+    let statements: Vec<Vec<Statement>> =
+        blocks.iter().map(|(_, sums)| (0..BLOCK_VOXELS).map(|voxel| statement(sums, voxel)).collect()).collect();
     let mut changes = Vec::new();
     // The latest pair first: what is taken from an epoch there contradicts nothing any more.
     for later in (1..blocks.len()).rev() {
         for earlier in (0..later).rev() {
             for (surface, free) in [(earlier, later), (later, earlier)] {
-                let differs = |voxel: &usize| says[surface][*voxel] == Says::Surface && says[free][*voxel] == Says::Free;
+                let differs =
+                    |voxel: &usize| statements[surface][*voxel] == Statement::Surface && statements[free][*voxel] == Statement::Free;
                 let seen = |of: usize, voxel: usize| blocks[of].1.weight[voxel] > 0;
                 let voxels: Vec<usize> = (0..BLOCK_VOXELS).filter(differs).filter(|&v| seen(surface, v) && seen(free, v)).collect();
                 if (voxels.len() as u32) < CONTRADICTIONS_MIN {
@@ -121,7 +123,9 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
                     believed: blocks[believed].0,
                     voxels: voxels.len() as u32,
                 };
-                (0..BLOCK_VOXELS).filter(|&v| contradicts(says[other][v], says[believed][v])).for_each(|v| clear(&mut blocks[other].1, v));
+                (0..BLOCK_VOXELS)
+                    .filter(|&v| contradicts(statements[other][v], statements[believed][v]))
+                    .for_each(|v| clear(&mut blocks[other].1, v));
                 changes.push(change);
             }
         }
@@ -129,22 +133,25 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
     changes
 }
 
-fn says(sums: &BlockSums, voxel: usize) -> Says {
+fn statement(sums: &BlockSums, voxel: usize) -> Statement {
     let weight = sums.weight[voxel];
     if weight == 0 || weight > WEIGHT_MAX {
-        return Says::Nothing;
+        return Statement::Nothing;
     }
     let share = f64::from(sums.distance[voxel]) / f64::from(weight) / TRUNCATION;
     match share {
-        _ if share >= FREE_MIN => Says::Free,
-        _ if share > 0.0 => Says::Nothing,
-        _ if share >= -BEHIND_MAX => Says::Surface,
-        _ => Says::Behind,
+        _ if share >= FREE_MIN => Statement::Free,
+        _ if share > 0.0 => Statement::Nothing,
+        _ if share >= -BEHIND_MAX => Statement::Surface,
+        _ => Statement::Behind,
     }
 }
 
-fn contradicts(one: Says, other: Says) -> bool {
-    matches!((one, other), (Says::Free, Says::Surface | Says::Behind) | (Says::Surface | Says::Behind, Says::Free))
+fn contradicts(one: Statement, other: Statement) -> bool {
+    matches!(
+        (one, other),
+        (Statement::Free, Statement::Surface | Statement::Behind) | (Statement::Surface | Statement::Behind, Statement::Free)
+    )
 }
 
 fn clear(sums: &mut BlockSums, voxel: usize) {
