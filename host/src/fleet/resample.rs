@@ -212,7 +212,7 @@ impl<'s> SourceMap<'s> {
         let low = point.map(f64::floor);
         let share: [f64; 3] = std::array::from_fn(|axis| point[axis] - low[axis]);
         let (mut sums, mut seen, mut distances) = ([0.0; 5], 0.0, [None; 8]);
-        for corner in 0..8usize {
+        for (corner, distance) in distances.iter_mut().enumerate() {
             let factor = factor(&share, corner);
             // On a lattice point no other counts.
             if factor == 0.0 {
@@ -220,7 +220,7 @@ impl<'s> SourceMap<'s> {
             }
             let point = std::array::from_fn(|axis| low[axis] as i32 + (corner >> axis & 1) as i32);
             let Some((sdf, weight, [red, green, blue])) = self.voxel(point) else { continue };
-            distances[corner] = Some(f64::from(sdf));
+            *distance = Some(f64::from(sdf));
             let values = [0.0, f64::from(weight), f64::from(red), f64::from(green), f64::from(blue)];
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
             seen += factor;
