@@ -5,7 +5,7 @@
 use super::distance_field::{DistanceField, SurfacePoint};
 use super::manifest::{rows_of, transform};
 use super::pose_graph::{Edge, Node, solve};
-use super::register::{RegisteredMap, Registration, Uncertainty, register};
+use super::register::{Fit, RegisteredMap, Registration, Uncertainty, register};
 use super::submap::Submap;
 use super::{FleetError, Job, Manifest};
 use crate::run::write_whole;
@@ -54,18 +54,9 @@ pub struct AlignedRecording {
 pub struct AlignedPair {
     /// Names of the recordings.
     pub recordings: [String; 2],
-    /// Surface points where the other map was seen.
-    pub points: usize,
-    /// Share of them that is near.
-    pub inlier_share: f64,
-    /// Root mean square of their distances as given, m.
-    pub rms_before_m: f64,
-    /// And of those that are near, aligned, m.
-    pub rms_m: f64,
-    /// Share of the weakest degree of freedom in the strongest.
-    pub min_eigen_share: f64,
-    /// Why the registration was not believed.
-    pub refused: Option<String>,
+    /// How well they fit, aligned.
+    #[serde(flatten)]
+    pub fit: Fit,
 }
 
 /// What is kept of a recording while others are registered.
@@ -88,7 +79,7 @@ impl Alignment {
         let mut pairs: Vec<([usize; 2], AlignedPair)> = Vec::new();
         for _ in 0..ROUNDS {
             let found = register_all(manifest, folder, (&sampled, &given, &poses, uncertainty))?;
-            let edges: Vec<Edge> = found.iter().filter(|(_, of)| of.refused.is_none()).map(|(nodes, of)| edge(*nodes, of)).collect();
+            let edges: Vec<Edge> = found.iter().filter(|(_, of)| of.fit.refused.is_none()).map(|(nodes, of)| edge(*nodes, of)).collect();
             poses = solve(&nodes, &edges, uncertainty, &poses);
             pairs = found.iter().map(|(nodes, of)| (*nodes, pair(manifest, *nodes, of, &pairs))).collect();
         }
@@ -186,14 +177,10 @@ fn edge(nodes: [usize; 2], of: &Registration) -> Edge {
 
 fn pair(manifest: &Manifest, [a, b]: [usize; 2], of: &Registration, before: &[([usize; 2], AlignedPair)]) -> AlignedPair {
     let first = before.iter().find(|(nodes, _)| *nodes == [a, b]);
+    let rms_before_m = first.map_or(of.fit.rms_before_m, |(_, pair)| pair.fit.rms_before_m);
     AlignedPair {
         recordings: [a, b].map(|at| manifest.jobs[at].name.clone()),
-        points: of.points,
-        inlier_share: of.inlier_share,
-        rms_before_m: first.map_or(of.rms_before_m, |(_, pair)| pair.rms_before_m),
-        rms_m: of.rms_m,
-        min_eigen_share: of.min_eigen_share,
-        refused: of.refused.clone(),
+        fit: Fit { rms_before_m, ..of.fit.clone() },
     }
 }
 
@@ -298,7 +285,7 @@ mod tests {
             assert!(error.angle_rad().to_degrees() < 0.1, "{at}: {} degrees", error.angle_rad().to_degrees());
         }
         assert!((found[3].inverse() * given[3]).distance_m() < 1e-9, "without overlap it stays");
-        assert!(alignment.pairs.iter().all(|pair| pair.refused.is_none() && pair.rms_m < pair.rms_before_m), "{alignment:?}");
+        assert!(alignment.pairs.iter().all(|pair| pair.fit.refused.is_none() && pair.fit.rms_m < pair.fit.rms_before_m), "{alignment:?}");
         assert_eq!(alignment, Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap());
         let mut others = manifest;
         others.jobs[1].t_world_camera[3] += 0.1;
@@ -315,7 +302,7 @@ mod tests {
         record(&manifest.jobs[1], root.path(), &Transform::from_translation([0.0, 0.0, 12.0]));
         let sure = Uncertainty { position_m: 0.05, rotation_rad: 0.001 };
         let alignment = Alignment::find(&manifest, root.path(), &sure).unwrap();
-        let why = alignment.pairs[0].refused.clone().unwrap();
+        let why = alignment.pairs[0].fit.refused.clone().unwrap();
         assert!(why.contains("more than the given poses may be off"), "{why}");
         assert!(alignment.recordings.iter().all(|of| of.moved_m < 1e-6), "{alignment:?}");
     }

@@ -39,7 +39,7 @@ pub use free_space::Camera;
 pub use manifest::{Identity, Job, JobState, MANIFEST_FILE, Manifest, RECORDINGS_EXAMPLE, Recording, Recordings};
 pub use merge::{Merged, digest, merge};
 pub use mesh::write_mesh;
-pub use register::Uncertainty;
+pub use register::{Fit, Uncertainty};
 pub use report::{RecordingPath, Report};
 pub use resample::{Resampled, resample};
 pub use submap::{Submap, keep};

@@ -9,6 +9,7 @@
 use super::distance_field::{DistanceField, SurfacePoint};
 use dynvox_core::geometry::Transform;
 use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 /// Points of one map in a registration at most.
 const POINTS_MAX: usize = 20_000;
@@ -48,6 +49,23 @@ pub struct Uncertainty {
     pub rotation_rad: f64,
 }
 
+/// How well two maps fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fit {
+    /// Points that lie where the other map was seen.
+    pub points: usize,
+    /// Share of them within the last limit.
+    pub inlier_share: f64,
+    /// Root mean square of their distances as given, m.
+    pub rms_before_m: f64,
+    /// And of those within the last limit after, m.
+    pub rms_m: f64,
+    /// Share of the weakest degree of freedom in the strongest.
+    pub min_eigen_share: f64,
+    /// Why it is not believed.
+    pub refused: Option<String>,
+}
+
 /// How two maps lie to one another.
 #[derive(Clone, Debug)]
 pub struct Registration {
@@ -57,18 +75,8 @@ pub struct Registration {
     pub information: Matrix6<f64>,
     /// Mean of the points, in the second map.
     pub centre_m: [f64; 3],
-    /// Points that lie where the other map was seen.
-    pub points: usize,
-    /// Share of them within the last limit.
-    pub inlier_share: f64,
-    /// Root mean square of distances before, m.
-    pub rms_before_m: f64,
-    /// And of those within the last limit after, m.
-    pub rms_m: f64,
-    /// Share of the weakest degree of freedom in the strongest.
-    pub min_eigen_share: f64,
-    /// Why it is not believed.
-    pub refused: Option<String>,
+    /// How well they fit.
+    pub fit: Fit,
 }
 
 /// Normal equations of one step.
@@ -138,10 +146,7 @@ pub fn register(
     }
     let last = pair.equations(&t_b_a, near_m);
     let variance = last.rms_m().max(1e-6).powi(2);
-    let mut registration = Registration {
-        t_b_a,
-        information: last.matrix / (variance * CORRELATED_POINTS),
-        centre_m: pair.centre_m.into(),
+    let mut fit = Fit {
         points: last.points,
         inlier_share: last.inliers as f64 / last.points.max(1) as f64,
         rms_before_m,
@@ -150,11 +155,12 @@ pub fn register(
         refused: None,
     };
     let moved = step_about(&pair.centre_m, &(t_b_a * given.inverse()));
-    registration.refused = refusal(&registration, &moved, (field.voxel_size_m, &pair, uncertainty));
-    Some(registration)
+    fit.refused = refusal(&fit, &moved, (field.voxel_size_m, &pair, uncertainty));
+    let information = last.matrix / (variance * CORRELATED_POINTS);
+    Some(Registration { t_b_a, information, centre_m: pair.centre_m.into(), fit })
 }
 
-fn refusal(of: &Registration, moved: &Vector6<f64>, (voxel_size_m, pair, uncertainty): (f64, &Pair<'_>, &Uncertainty)) -> Option<String> {
+fn refusal(of: &Fit, moved: &Vector6<f64>, (voxel_size_m, pair, uncertainty): (f64, &Pair<'_>, &Uncertainty)) -> Option<String> {
     // Both poses may be off, by two standard deviations each; a turn also moves what is far from the map's origin.
     let turn_rad = 2.0 * std::f64::consts::SQRT_2 * uncertainty.rotation_rad;
     let move_m = 2.0 * std::f64::consts::SQRT_2 * uncertainty.position_m + turn_rad * pair.centre_m.norm();

@@ -23,9 +23,10 @@ pub fn align(folder: &Path, uncertainty: &Uncertainty) -> anyhow::Result<()> {
     alignment.write(folder)?;
     outln!("{:<32}{:>9}{:>9}{:>12}{:>10}{:>11}  state", "recordings", "points", "near, %", "before, mm", "rms, mm", "weakest");
     for pair in &alignment.pairs {
-        let (names, state) = (pair.recordings.join(", "), pair.refused.as_deref().unwrap_or("accepted"));
-        let (near, before, after) = (100.0 * pair.inlier_share, 1e3 * pair.rms_before_m, 1e3 * pair.rms_m);
-        outln!("{names:<32}{:>9}{near:>9.1}{before:>12.1}{after:>10.1}{:>11.5}  {state}", pair.points, pair.min_eigen_share);
+        let fit = &pair.fit;
+        let (names, state) = (pair.recordings.join(", "), fit.refused.as_deref().unwrap_or("accepted"));
+        let (near, before, after) = (100.0 * fit.inlier_share, 1e3 * fit.rms_before_m, 1e3 * fit.rms_m);
+        outln!("{names:<32}{:>9}{near:>9.1}{before:>12.1}{after:>10.1}{:>11.5}  {state}", fit.points, fit.min_eigen_share);
     }
     outln!("\n{:<32}{:>10}{:>17}", "recording", "moved, m", "turned, degrees");
     alignment.recordings.iter().for_each(|of| outln!("{:<32}{:>10.3}{:>17.3}", of.name, of.moved_m, of.turned_deg));
