@@ -4,7 +4,7 @@ use super::{Config, MotionSource, PoseOrigin, StereoFrame};
 use crate::{
     egomotion::{
         Egomotion, Estimator, MotionEstimate,
-        icp::{self, IcpConfig, IcpReport, IcpStatus, MapPicture},
+        icp::{self, IcpConfig, IcpReport, MapPicture},
     },
     geometry::{StereoObservation, StereoRig, Transform},
     image::View,
@@ -142,7 +142,7 @@ impl Localization<'_, '_> {
         let config = &self.config.icp;
         let t_world_camera = *self.camera.t_world_camera();
         let is_cast = self.cast(&t_world_camera, size, executor);
-        let mut report = if is_cast { self.register(config) } else { IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() } };
+        let mut report = if is_cast { self.register(config) } else { IcpReport::unpaired() };
         let refined = self.scene_flow.refined();
         let matches = self.scene_flow.selection().iter().filter_map(|&index| refined.get(index as usize));
         let rig = self.config.scaled_rig();
@@ -165,7 +165,7 @@ impl Localization<'_, '_> {
             (Some(depth_m), Some(normal)) => {
                 icp::track(config, &rig, limits_m, self.disparity_q8, &MapPicture { depth_m, normal }, self.depth_m)
             }
-            _ => IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() },
+            _ => IcpReport::unpaired(),
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::{
 
 /// Distance over which brightness is compared, px: wider than what fusion blurs.
 const EDGE_PX: usize = 4;
-/// Least correlation of edges. Right poses have .16 to .74 on 06 and r1405, those half a metre aside up to .15.
+/// Least correlation of edges. Right poses have .16 to .74 on 06 and r1405, those half a metre aside up to .29.
 const CORRELATION_MIN: f64 = 0.25;
 /// How far ahead and behind the map must look less like the image, m.
 const ASIDE_M: f64 = 0.5;

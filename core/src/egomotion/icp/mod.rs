@@ -98,6 +98,11 @@ pub struct IcpReport {
 }
 
 impl IcpReport {
+    /// Where no point was paired.
+    pub(crate) fn unpaired() -> Self {
+        Self { status: IcpStatus::TooFewPairs, ..Self::default() }
+    }
+
     /// Contradicts the motion where too few of the matches counted in `matches` agree with it. Without matches it stands.
     pub(crate) fn check_matches(&mut self, config: &IcpConfig) {
         let [agreeing, all] = self.matches.map(f64::from);
@@ -133,7 +138,7 @@ pub fn track(
 ) -> IcpReport {
     let pyramid = Pyramid::build(rig, limits_m, disparity_q8, config.levels, memory);
     let mut t_previous_current = Transform::IDENTITY;
-    let mut report = IcpReport { status: IcpStatus::TooFewPairs, ..IcpReport::default() };
+    let mut report = IcpReport::unpaired();
     for (level, disparity_px) in pyramid.coarse_to_fine() {
         let pairing = Pairing::new(config, rig, level);
         for _ in 0..config.steps {
