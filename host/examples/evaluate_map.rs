@@ -25,7 +25,7 @@ fn main() -> anyhow::Result<()> {
     let line: Vec<String> = ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(run.iter().cloned()).collect();
     let plan = plan_of(&line)?;
     let poses = read_poses(trajectory.as_ref())?.poses;
-    let mut map = Averages::of(map.as_ref(), &std::env::temp_dir().join("evaluate_map"), 0.0)?;
+    let mut map = Averages::of(map.as_ref(), &std::env::temp_dir().join("evaluate_map"))?;
     let blocks = map.blocks as usize;
     let capacity = Capacity { blocks, visible_blocks: blocks, colour: map.lattice.colour, ..plan.capacity };
     let bytes = Volume::bytes(&capacity) + Raycaster::bytes(&capacity);

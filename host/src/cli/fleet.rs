@@ -3,8 +3,9 @@
 mod jobs;
 mod world;
 
-use crate::fleet::Uncertainty;
+use crate::fleet::{Job, Uncertainty};
 use crate::formats::Axes;
+use anyhow::bail;
 use dynvox_core::view::MeshConfig;
 use std::path::PathBuf;
 
@@ -24,7 +25,7 @@ enum Action {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
-    /// Do a share of the jobs that are not done: map, and keep the map's sums
+    /// Do a share of the jobs that are not done: map, and keep the map
     Run {
         /// Folder of the jobs
         folder: PathBuf,
@@ -143,6 +144,25 @@ pub fn run(args: &FleetArgs) -> anyhow::Result<()> {
         Action::Mesh { map, out, min_weight, axes } => world::mesh(map, out, *min_weight, *axes),
         Action::Report { folder, map, out, least_change_m3 } => world::report((folder, map), out, *least_change_m3),
     }
+}
+
+/// Does something with each job of a share. What fails is named, and the others go on; `are` says what has become of them.
+fn each<'j, T>(
+    jobs: impl Iterator<Item = (&'j Job, T)>,
+    are: &str,
+    mut act: impl FnMut(&Job, T) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let mut failed = Vec::new();
+    for (job, of) in jobs {
+        if let Err(error) = act(job, of) {
+            eprintln!("error: {}: {}", job.name, super::sentence(&error));
+            failed.push(job.name.as_str());
+        }
+    }
+    if failed.is_empty() {
+        return Ok(());
+    }
+    bail!("{} failed. The others are {are}; repeat the command for what is left", failed.join(", "))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::manifest::{rows_of, transform};
 use super::pose_graph::{Edge, Node, solve};
 use super::register::{Fit, RegisteredMap, Registration, Uncertainty, register};
 use super::submap::Submap;
-use super::{FleetError, Job, Manifest};
+use super::{FleetError, Job, Manifest, distance_m};
 use crate::run::write_whole;
 use dynvox_core::geometry::Transform;
 use serde::{Deserialize, Serialize};
@@ -127,8 +127,7 @@ impl Sampled {
         let points = field(job, folder)?.surface(POINTS_MAX);
         let mut centre_m = [0.0; 3];
         points.iter().for_each(|point| (0..3).for_each(|axis| centre_m[axis] += point.at_m[axis] / points.len() as f64));
-        let from_centre = |point: &SurfacePoint| (0..3).map(|axis| (point.at_m[axis] - centre_m[axis]).powi(2)).sum::<f64>().sqrt();
-        let radius_m = points.iter().map(from_centre).fold(0.0, f64::max);
+        let radius_m = points.iter().map(|point| distance_m(&point.at_m, &centre_m)).fold(0.0, f64::max);
         Ok(Self { points, centre_m, radius_m })
     }
 }
@@ -156,8 +155,7 @@ fn register_all(
         for a in b + 1..sampled.len() {
             let t_b_a = poses[b].inverse() * poses[a];
             let to_a = t_b_a.transform_point(sampled[a].centre_m);
-            let apart_m = (0..3).map(|axis| (to_a[axis] - sampled[b].centre_m[axis]).powi(2)).sum::<f64>().sqrt();
-            if apart_m > sampled[a].radius_m + sampled[b].radius_m {
+            if distance_m(&to_a, &sampled[b].centre_m) > sampled[a].radius_m + sampled[b].radius_m {
                 continue;
             }
             if map_b.is_none() {
@@ -192,7 +190,7 @@ fn recording(job: &Job, pose: &Transform, node: &Node) -> AlignedRecording {
         id: job.id.clone(),
         given: job.t_world_camera,
         t_world_camera: rows_of(pose),
-        moved_m: (0..3).map(|axis| (to[axis] - from[axis]).powi(2)).sum::<f64>().sqrt(),
+        moved_m: distance_m(&to, &from),
         turned_deg: motion.angle_rad().to_degrees(),
     }
 }

@@ -152,13 +152,13 @@ mod tests {
     }
 
     fn resolved(folder: &Path) -> (Vec<ResolvedBlock>, Vec<Change>) {
-        let (mut blocks, mut changed) = (Vec::new(), Vec::new());
-        let lattice = resolve(folder, |block, changes| {
+        let mut blocks = Vec::new();
+        let map = resolve(folder, |block| {
             blocks.push(block);
-            changed.extend_from_slice(changes);
             Ok(())
-        });
-        (blocks, changes(&changed, &lattice.unwrap(), 0.05))
+        })
+        .unwrap();
+        (blocks, changes(&map.changes, &map.lattice, 0.05))
     }
 
     /// Whether the map has a surface in the middle of the box's top.

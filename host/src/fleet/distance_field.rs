@@ -2,10 +2,10 @@
 //!
 //! **Memory.** 1 KiB and some bytes a block.
 
-use super::submap::{Source, blocks};
+use super::submap::{Source, blocks, lattice_point, voxel_of};
 use super::tile_file::Lattice;
 use crate::run::store::BlockFile;
-use dynvox_core::volume::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord};
 use hashbrown::HashMap;
 use std::fs::File;
 
@@ -89,10 +89,8 @@ impl DistanceField {
     pub fn surface(&self, most: usize) -> Vec<SurfacePoint> {
         let (mut points, mut stride, mut count) = (Vec::new(), 1usize, 0usize);
         for &coord in &self.order {
-            let origin = [coord.x, coord.y, coord.z].map(|side| i32::from(side) * BLOCK_SIDE as i32);
             for voxel in 0..BLOCK_VOXELS {
-                let offset = [voxel % BLOCK_SIDE, voxel / BLOCK_SIDE % BLOCK_SIDE, voxel / BLOCK_SIDE / BLOCK_SIDE];
-                let at: [i32; 3] = std::array::from_fn(|axis| origin[axis] + offset[axis] as i32);
+                let at = lattice_point(coord, voxel);
                 for axis in 0..3 {
                     let Some(crossing) = self.crossing(at, axis) else { continue };
                     count += 1;
@@ -135,9 +133,4 @@ impl DistanceField {
         let length = gradient.iter().map(|part| part * part).sum::<f64>().sqrt();
         (length > 0.1).then(|| SurfacePoint { at_m, normal: gradient.map(|part| part / length) })
     }
-}
-
-fn voxel_of(point: [i32; 3]) -> usize {
-    let [x, y, z] = point.map(|side| (side & 7) as usize);
-    x + BLOCK_SIDE * (y + BLOCK_SIDE * z)
 }

@@ -44,3 +44,8 @@ pub use report::{RecordingPath, Report};
 pub use resample::{Resampled, resample};
 pub use submap::{Submap, keep};
 pub use tile_file::Lattice;
+
+/// Distance between two points.
+fn distance_m(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
+}

@@ -1,9 +1,9 @@
 //! What recordings saw, where they went and what has changed: figures, a table of changes and a picture from above.
 
 use super::coverage::{Coverage, coverage};
-use super::resolve::{BlockChange, resolve};
+use super::resolve::{ResolvedMap, resolve};
 use super::submap::Submap;
-use super::{Change, FleetError, Manifest, changes, poses};
+use super::{Change, FleetError, Manifest, changes, distance_m, poses};
 use crate::formats::DraftFolder;
 use crate::run::write_whole;
 use dynvox_core::volume::BLOCK_SIDE;
@@ -66,28 +66,20 @@ impl Report {
         for (job, t_world_map) in manifest.jobs.iter().zip(poses(manifest, folder)?) {
             sums.push(job.sums(folder, &t_world_map));
             let cameras_m: Vec<_> = Submap::cameras_m(&job.submap(folder))?.into_iter().map(|at| t_world_map.transform_point(at)).collect();
-            let step_m = |ends: &[[f64; 3]]| (0..3).map(|axis| (ends[1][axis] - ends[0][axis]).powi(2)).sum::<f64>().sqrt();
             recordings.push(RecordingPath {
                 name: job.name.clone(),
                 epoch: job.epoch,
                 frames: cameras_m.len(),
-                path_m: cameras_m.windows(2).map(step_m).sum(),
+                path_m: cameras_m.windows(2).map(|ends| distance_m(&ends[1], &ends[0])).sum(),
                 cameras_m,
             });
         }
-        let (mut blocks, mut free_blocks, mut overflowed_voxels) = (0, 0, 0);
-        let mut changed: Vec<BlockChange> = Vec::new();
-        let lattice = resolve(map, |block, changes| {
-            changed.extend_from_slice(changes);
-            overflowed_voxels += block.average.overflowed;
-            *(if block.has_surface { &mut blocks } else { &mut free_blocks }) += 1;
-            Ok(())
-        })?;
+        let ResolvedMap { lattice, blocks, free_blocks, overflowed, changes: changed } = resolve(map, |_| Ok(()))?;
         Ok(Self {
             recordings,
             blocks,
             free_blocks,
-            overflowed_voxels,
+            overflowed_voxels: overflowed,
             coverage: coverage(&sums)?,
             changes: changes(&changed, &lattice, least_change_m3),
             block_m: f64::from(lattice.voxel_size_m) * BLOCK_SIDE as f64,

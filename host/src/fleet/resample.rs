@@ -7,7 +7,7 @@
 
 use super::FleetError;
 use super::block_sums::BlockSums;
-use super::submap::{Source, Submap};
+use super::submap::{Source, Submap, lattice_point, voxel_of};
 use super::tile_file::{self, Lattice};
 use super::tile_folder::WorldTile;
 use crate::formats::DraftFolder;
@@ -183,8 +183,7 @@ impl<'s> SourceMap<'s> {
     /// Distance, weight and colour at a lattice point of the run; `None` where it was not seen.
     fn voxel(&mut self, point: [i32; 3]) -> Option<(i16, u8, [u8; 3])> {
         let block = self.block(BlockCoord::of_lattice(point)?)?;
-        let [x, y, z] = point.map(|c| (c & 7) as usize);
-        let at = x + BLOCK_SIDE * (y + BLOCK_SIDE * z);
+        let at = voxel_of(point);
         let colour = block.colour.as_ref().map_or([0; 3], |planes| [planes[0][at], planes[1][at], planes[2][at]]);
         (block.weight[at] > 0).then_some((block.sdf[at], block.weight[at], colour))
     }
@@ -193,9 +192,7 @@ impl<'s> SourceMap<'s> {
     fn sums_at(&mut self, coord: BlockCoord, way: &LatticeWay, colour: bool) -> BlockSums {
         let mut sums = BlockSums::zero(colour);
         for voxel in 0..BLOCK_VOXELS {
-            let offset = [voxel % BLOCK_SIDE, voxel / BLOCK_SIDE % BLOCK_SIDE, voxel / BLOCK_SIDE / BLOCK_SIDE];
-            let origin = [coord.x, coord.y, coord.z];
-            let point = std::array::from_fn(|axis| f64::from(origin[axis]) * BLOCK_SIDE as f64 + offset[axis] as f64);
+            let point = lattice_point(coord, voxel).map(f64::from);
             if let Some((sdf, weight, colour)) = self.interpolated(way.to_map.apply(point)) {
                 sums.observe(voxel, sdf, weight, colour);
             }

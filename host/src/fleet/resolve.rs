@@ -61,16 +61,28 @@ enum Statement {
     Behind,
 }
 
-/// Reads all blocks of a map, tile by tile, and hands each with what changed in it to `sink`. Returns the voxels' lattice.
+/// What the blocks of a map come to.
+pub struct ResolvedMap {
+    /// Their voxels.
+    pub lattice: Lattice,
+    /// Blocks that have a surface.
+    pub blocks: u64,
+    /// Blocks that are known to be free.
+    pub free_blocks: u64,
+    /// Voxels that were seen too often for their sums.
+    pub overflowed: u64,
+    /// Blocks that have changed between epochs.
+    pub changes: Vec<BlockChange>,
+}
+
+/// Reads all blocks of a map, tile by tile, and hands each to `sink`.
 ///
 /// # Errors
 /// The folder has no tile, a tile is damaged or of other voxels, or an error of `sink`.
-pub fn resolve(
-    folder: &Path,
-    mut sink: impl FnMut(ResolvedBlock, &[BlockChange]) -> Result<(), FleetError>,
-) -> Result<Lattice, FleetError> {
+pub fn resolve(folder: &Path, mut sink: impl FnMut(ResolvedBlock) -> Result<(), FleetError>) -> Result<ResolvedMap, FleetError> {
     let files: Vec<(WorldTile, PathBuf)> = tiles(folder)?.into_iter().collect();
-    let mut lattice = None;
+    let (mut lattice, mut changes) = (None, Vec::new());
+    let (mut with_surface, mut free_blocks, mut overflowed) = (0, 0, 0);
     for of_tile in files.chunk_by(|a, b| a.0.sides == b.0.sides) {
         let mut heads = of_tile.iter().map(|(_, path)| Head::open(path, &mut lattice)).collect::<Result<Vec<_>, _>>()?;
         while let Some(coord) = least(&heads) {
@@ -78,11 +90,15 @@ pub fn resolve(
             for ((tile, _), head) in of_tile.iter().zip(&mut heads) {
                 blocks.extend(head.take(coord)?.map(|sums| (tile.epoch, sums)));
             }
-            let (block, changes) = resolve_block(coord, blocks);
-            sink(block, &changes)?;
+            let (block, changed) = resolve_block(coord, blocks);
+            changes.extend(changed);
+            overflowed += block.average.overflowed;
+            *(if block.has_surface { &mut with_surface } else { &mut free_blocks }) += 1;
+            sink(block)?;
         }
     }
-    lattice.ok_or_else(|| FleetError::content(folder, "has no tile: nothing was mapped"))
+    let lattice = lattice.ok_or_else(|| FleetError::content(folder, "has no tile: nothing was mapped"))?;
+    Ok(ResolvedMap { lattice, blocks: with_surface, free_blocks, overflowed, changes })
 }
 
 /// One block of some epochs, ascending.

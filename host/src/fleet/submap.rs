@@ -10,7 +10,7 @@ use super::tile_file::Lattice;
 use crate::formats::DraftFolder;
 use crate::run::store::{BlockFile, Position};
 use crate::run::{BLOCKS_FILE, write_whole};
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock};
+use dynvox_core::volume::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Write;
@@ -60,6 +60,19 @@ impl Source {
         };
         (store.holds(coord) && store.load(into)).then_some(source)
     }
+}
+
+/// The voxel of its block at a lattice point.
+pub fn voxel_of(point: [i32; 3]) -> usize {
+    let [x, y, z] = point.map(|side| (side & 7) as usize);
+    x + BLOCK_SIDE * (y + BLOCK_SIDE * z)
+}
+
+/// The lattice point of a block's voxel.
+pub fn lattice_point(coord: BlockCoord, voxel: usize) -> [i32; 3] {
+    let offset = [voxel % BLOCK_SIDE, voxel / BLOCK_SIDE % BLOCK_SIDE, voxel / BLOCK_SIDE / BLOCK_SIDE];
+    let blocks = [coord.x, coord.y, coord.z];
+    std::array::from_fn(|axis| i32::from(blocks[axis]) * BLOCK_SIDE as i32 + offset[axis] as i32)
 }
 
 /// All blocks of a store, tile by tile, ascending within a tile.

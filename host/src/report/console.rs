@@ -7,6 +7,7 @@ use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::TrajectoryErrors;
 use crate::observe::Sections;
 use crate::run::RunRecord;
+use dynvox_core::egomotion::SEGMENT_GAP_M;
 use std::path::Path;
 
 /// The figures of a run whose folder is `folder`, line by line.
@@ -114,7 +115,7 @@ fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
         ],
         None if trajectory.held_frames > 0 => {
             let extrapolated = ("poses extrapolated", format!("in {} frames: too few matches", trajectory.held_frames));
-            let apart = format!("{}: the camera was lost, and each stands 100 m above the one before", trajectory.segments);
+            let apart = format!("{}: the camera was lost, and each stands {SEGMENT_GAP_M} m above the one before", trajectory.segments);
             [extrapolated].into_iter().chain((trajectory.segments > 1).then_some(("segments of the map", apart))).collect()
         }
         None => Vec::new(),

@@ -1,8 +1,7 @@
 //! Jobs: made, done, listed.
 
-use super::Shard;
+use super::{Shard, each};
 use crate::cli::run::plan_of;
-use crate::cli::sentence;
 use crate::fleet::{self, Camera, Identity, Job, JobState, Lattice, Manifest, Recordings};
 use crate::formats::read_poses;
 use crate::run::store::BlockFile;
@@ -46,23 +45,13 @@ pub fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
 
 pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
     let manifest = Manifest::read(folder)?;
-    let mut failed = Vec::new();
-    for job in manifest.shard(shard.index, shard.of) {
-        if job.state(folder) == JobState::Done {
-            continue;
+    each(manifest.shard(shard.index, shard.of).map(|job| (job, ())), "done", |job, ()| {
+        if job.state(folder) != JobState::Done {
+            map(folder, job)?;
+            outln!("{} is done", job.name);
         }
-        match map(folder, job) {
-            Ok(()) => outln!("{} is done", job.name),
-            Err(error) => {
-                eprintln!("error: {}: {}", job.name, sentence(&error));
-                failed.push(job.name.as_str());
-            }
-        }
-    }
-    if failed.is_empty() {
-        return Ok(());
-    }
-    bail!("{} failed. The others are done; repeat the command for what is left", failed.join(", "))
+        Ok(())
+    })
 }
 
 /// Runs one job in a process of its own, and keeps its map.

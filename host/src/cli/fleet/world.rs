@@ -1,7 +1,6 @@
 //! Maps in the world: aligned, resampled, merged, shown.
 
-use super::Shard;
-use crate::cli::sentence;
+use super::{Shard, each};
 use crate::fleet::{self, Alignment, Averages, JobState, Manifest, Report, Submap, Uncertainty};
 use crate::formats::Axes;
 use crate::report::text::{counted, grouped};
@@ -37,11 +36,11 @@ pub fn resample(folder: &Path, shard: Shard) -> anyhow::Result<()> {
     let manifest = Manifest::read(folder)?;
     let poses = fleet::poses(&manifest, folder)?;
     std::fs::create_dir_all(folder.join("sums"))?;
-    let mut failed = Vec::new();
-    for (job, t_world_map) in manifest.jobs.iter().zip(&poses).skip(shard.index).step_by(shard.of) {
+    let posed = manifest.jobs.iter().zip(&poses).skip(shard.index).step_by(shard.of);
+    each(posed, "in the world", |job, t_world_map| {
         let out = job.sums(folder, t_world_map);
         if out.is_dir() {
-            continue;
+            return Ok(());
         }
         let resampled = Submap::open(&job.submap(folder)).and_then(|mut map| fleet::resample(&mut map, job.epoch, t_world_map, &out));
         match resampled {
@@ -50,19 +49,13 @@ pub fn resample(folder: &Path, shard: Shard) -> anyhow::Result<()> {
                 if resampled.beyond > 0 {
                     eprintln!("warning: {} blocks of {} are beyond the world's coordinates", resampled.beyond, job.name);
                 }
+                Ok(())
             }
             // Another worker was faster.
-            Err(_) if out.is_dir() => {}
-            Err(error) => {
-                eprintln!("error: {}: {}", job.name, sentence(&error.into()));
-                failed.push(job.name.as_str());
-            }
+            Err(_) if out.is_dir() => Ok(()),
+            Err(error) => Err(error.into()),
         }
-    }
-    if failed.is_empty() {
-        return Ok(());
-    }
-    bail!("{} failed. The others are in the world; repeat the command for what is left", failed.join(", "))
+    })
 }
 
 /// The folders of sums of jobs whose maps are all resampled.
@@ -95,7 +88,7 @@ pub fn merge(maps: &[PathBuf], out: &Path) -> anyhow::Result<()> {
 }
 
 pub fn mesh(map: &Path, out: &Path, min_weight: u8, axes: Axes) -> anyhow::Result<()> {
-    let mut averages = Averages::of(map, out, 0.0)?;
+    let mut averages = Averages::of(map, out)?;
     let mesh = fleet::write_mesh(&mut averages, out, min_weight, axes)?;
     outln!("{}: {} triangles of {} blocks", out.display(), grouped(mesh.triangles), grouped(averages.blocks));
     if averages.overflowed > 0 {
