@@ -35,6 +35,9 @@ pub struct EgomotionConfig {
     /// noise of a match. Those errors grow with the fourth power: a match at share s has weight 1 / (1 + (s / knee)^8). Above 0; 10 weighs
     /// all alike. DynSLAM: weights 1 / (s + 0.05), which leave twice the error in scale on the clips measured.
     pub side_knee: f64,
+    /// Error of a match, px over its four coordinates, at which it weighs a quarter: at error e it weighs 1 / (1 + (e / robust_px)²)². Above
+    /// 0, at most 100, which weighs all alike. DynSLAM: all alike.
+    pub robust_px: f64,
 }
 
 impl Default for EgomotionConfig {
@@ -52,6 +55,7 @@ impl Default for EgomotionConfig {
             sample_steps: 12,
             refine_steps: 50,
             side_knee: 0.3,
+            robust_px: 0.7,
         }
     }
 }
@@ -75,5 +79,6 @@ impl EgomotionConfig {
         require(problems, (1..=50).contains(&self.sample_steps), "egomotion.sample_steps", "must be in 1..=50");
         require(problems, (1..=250).contains(&self.refine_steps), "egomotion.refine_steps", "must be in 1..=250");
         require(problems, self.side_knee > 0.0 && self.side_knee <= 10.0, "egomotion.side_knee", "must be above 0 and at most 10");
+        require(problems, self.robust_px > 0.0 && self.robust_px <= 100.0, "egomotion.robust_px", "must be above 0 and at most 100");
     }
 }

@@ -16,7 +16,7 @@ use crate::{
 /// Step below which a hypothesis has converged (rad and m, the largest of six).
 const SAMPLE_STEP_MIN: f64 = 1e-6;
 /// Step below which the refinement has converged.
-const REFINE_STEP_MIN: f64 = 1e-8;
+const REFINE_STEP_MIN: f64 = 1e-6;
 /// Rounds of choosing inliers anew and refining on them.
 const ROUNDS: usize = 3;
 
@@ -231,7 +231,8 @@ impl<'s> Estimator<'s> {
             let matrix = RotationMatrix::new(&motion);
             let mut sums = NormalEquations::ZERO;
             for point in self.inlier_points() {
-                sums.add(&point, &matrix, rig, |_| side_weight(config, rig, &point));
+                let side = side_weight(config, rig, &point);
+                sums.add(&point, &matrix, rig, |squared| side * robust_weight(config, squared));
             }
             let Some(step) = sums.solve() else { return (motion, taken, false) };
             motion = motion.retract(step);
@@ -268,6 +269,12 @@ fn side_weight(config: &EgomotionConfig, rig: &StereoRig, point: &Point) -> f64 
     let square = share * share;
     let fourth = square * square;
     1.0 / (1.0 + fourth * fourth)
+}
+
+/// Weight by the squared error of a match, px² (Geman and McClure's, [`EgomotionConfig::robust_px`]).
+fn robust_weight(config: &EgomotionConfig, squared_px: f64) -> f64 {
+    let share = 1.0 / (1.0 + squared_px / (config.robust_px * config.robust_px));
+    share * share
 }
 
 fn largest(step: [f64; 6]) -> f64 {

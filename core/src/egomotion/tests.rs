@@ -132,6 +132,28 @@ fn two_outliers_in_five_are_found() {
 }
 
 #[test]
+fn inliers_that_are_off_together_pull_a_robust_refinement_less() {
+    let mut random = Random::new(4);
+    let mut matches = matches(600, 0, &motion(), &mut random);
+    for (n, m) in matches.iter_mut().enumerate() {
+        // One in five lies a pixel off to one side, within what counts as an inlier.
+        let off_px = if n % 5 == 0 { 1.0 } else { 0.0 };
+        for column in [&mut m.current_left[0], &mut m.current_right[0]] {
+            *column += off_px + 0.1 * (random.below(200) as f32 / 100.0 - 1.0);
+        }
+    }
+    let turn_off = |robust_px: f64| {
+        let mut slab = Box::new(Slab([0; BYTES]));
+        let config = EgomotionConfig { robust_px, side_knee: 10.0, ..EgomotionConfig::default() };
+        let found = estimator(&mut slab).estimate(&config, &RIG, &matches, &mut Random::new(1), None);
+        assert!(found.inliers > 590, "{found:?}");
+        between(&found.t_current_previous.unwrap(), &motion()).1
+    };
+    let (alike, robust) = (turn_off(100.0), turn_off(EgomotionConfig::default().robust_px));
+    assert!(robust < 0.3 * alike, "{robust} of {alike} degrees");
+}
+
+#[test]
 fn equal_seeds_give_equal_bits_and_a_warm_start_the_same_answer() {
     let matches = matches(300, 120, &motion(), &mut Random::new(4));
     assert_eq!(estimate(&matches, &RIG, 7), estimate(&matches, &RIG, 7));

@@ -169,7 +169,7 @@ section!(scene_flow: SceneFlowConfig {
 });
 section!(egomotion: EgomotionConfig {
     samples, confidence, inlier_px, refined_inlier_px, matches_min, inlier_share_min, acceleration_max_m_s2, inlier_share_strong,
-    right_ahead_max_m, sample_steps, refine_steps, side_knee,
+    right_ahead_max_m, sample_steps, refine_steps, side_knee, robust_px,
 });
 section!(icp: IcpConfig {
     levels, steps, distance_m, noise_px, pairs_min, held_min, step_max_m, step_max_rad, explained_min, explained_px,

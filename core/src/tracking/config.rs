@@ -197,6 +197,7 @@ impl MotionConfig {
             matches_min: 6,
             inlier_share_min: 0.0,
             side_knee: 10.0,
+            robust_px: 100.0,
             ..EgomotionConfig::default()
         }
     }
