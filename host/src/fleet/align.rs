@@ -272,7 +272,10 @@ mod tests {
             off(2, [0.6 * degree, -0.8 * degree, 0.0], [-0.15, 0.05, -0.12]),
             off(3, [0.0, degree, 0.0], [0.2, 0.0, 0.0]),
         ];
-        let manifest = Manifest { jobs: given.iter().enumerate().map(|(nth, given)| job(nth, given)).collect() };
+        let manifest = Manifest {
+            program: String::new(),
+            jobs: given.iter().enumerate().map(|(nth, given)| job(nth, given)).collect(),
+        };
         manifest.jobs.iter().zip(&truth).for_each(|(job, truth)| record(job, root.path(), truth));
         let alignment = Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap();
         alignment.write(root.path()).unwrap();
@@ -295,7 +298,10 @@ mod tests {
         let root = tempfile::TempDir::new().unwrap();
         std::fs::create_dir_all(root.path().join("submaps")).unwrap();
         let given = [Transform::IDENTITY, Transform::from_translation([0.4, 0.0, 12.0])];
-        let manifest = Manifest { jobs: given.iter().enumerate().map(|(nth, given)| job(nth, given)).collect() };
+        let manifest = Manifest {
+            program: String::new(),
+            jobs: given.iter().enumerate().map(|(nth, given)| job(nth, given)).collect(),
+        };
         record(&manifest.jobs[0], root.path(), &given[0]);
         record(&manifest.jobs[1], root.path(), &Transform::from_translation([0.0, 0.0, 12.0]));
         let sure = Uncertainty { position_m: 0.05, rotation_rad: 0.001 };

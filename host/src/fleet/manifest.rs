@@ -1,10 +1,11 @@
 //! What there is to do: a list of recordings becomes a list of jobs, each with its bytes of memory and a name that is a hash of all that
 //! decides its result, so that what is done is known by its folder.
 
-use super::FleetError;
+use super::{FleetError, submap, tile_file};
 use crate::run::write_whole;
 use dynvox_core::digest::Digest;
 use dynvox_core::geometry::Transform;
+use dynvox_core::mapper::snapshot;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -59,7 +60,7 @@ pub struct Recording {
 pub struct Job {
     /// The recording's name.
     pub name: String,
-    /// Hash of the arguments, the settings and the images.
+    /// Hash of the program's version, the arguments, the settings and the images.
     pub id: String,
     /// Arguments of `dynvox run`.
     pub arguments: Vec<String>,
@@ -94,8 +95,16 @@ pub struct Identity {
 /// All jobs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
+    /// The program that planned them, and its formats: another one may map otherwise, and does not take over what this one did.
+    pub program: String,
     /// In the order of the recordings.
     pub jobs: Vec<Job>,
+}
+
+/// The program's version, and those of what it keeps: the core's state, maps in their own lattice, sums.
+pub(super) fn program() -> String {
+    let [core, maps, sums] = [snapshot::VERSION, submap::VERSION, tile_file::VERSION];
+    format!("dynvox {}, core {core}, maps {maps}, sums {sums}", env!("CARGO_PKG_VERSION"))
 }
 
 impl Recordings {
@@ -143,18 +152,24 @@ impl Manifest {
                 bytes: identity.bytes,
             });
         }
-        Ok(Self { jobs })
+        Ok(Self { program: program(), jobs })
     }
 
     /// Reads the jobs in a folder.
     ///
     /// # Errors
-    /// The folder has no list of jobs.
+    /// The folder has no list of jobs, or another version of the program planned them.
     pub fn read(folder: &Path) -> Result<Self, FleetError> {
         let path = folder.join(MANIFEST_FILE);
         let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
-        serde_json::from_str(&text)
-            .map_err(|error| FleetError::content(&path, format!("is no list of jobs: {error}. Make it with `dynvox fleet plan`")))
+        let again = "Make it with `dynvox fleet plan`";
+        let manifest: Self = serde_json::from_str(&text)
+            .map_err(|error| FleetError::content(&path, format!("is no list of jobs of this version: {error}. {again}")))?;
+        if manifest.program != program() {
+            let [planned, own] = [&manifest.program, &program()];
+            return Err(FleetError::content(&path, format!("was planned by {planned}; this is {own}, which maps anew. {again}")));
+        }
+        Ok(manifest)
     }
 
     /// Writes the jobs into a folder.
@@ -218,6 +233,7 @@ impl Job {
 
 fn id(arguments: &[String], of_input: u64) -> String {
     let mut digest = Digest::default();
+    digest.bytes(program().as_bytes());
     arguments.iter().for_each(|argument| {
         digest.u64(argument.len() as u64);
         digest.bytes(argument.as_bytes());
@@ -282,5 +298,17 @@ mod tests {
         let refused = Manifest::plan(&path, &Recordings::read(&path).unwrap(), identify).unwrap_err();
         assert!(refused.to_string().contains("no rigid motion as t_world_camera of tuesday"), "{refused}");
         assert!(Manifest::read(root.path()).is_err());
+    }
+
+    #[test]
+    fn jobs_of_another_version_are_refused() {
+        let root = tempfile::TempDir::new().unwrap();
+        let path = root.path().join(MANIFEST_FILE);
+        Manifest { program: program(), jobs: Vec::new() }.write(root.path()).unwrap();
+        assert!(Manifest::read(root.path()).is_ok());
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replace("sums 1", "sums 0")).unwrap();
+        let refused = Manifest::read(root.path()).unwrap_err().to_string();
+        assert!(refused.contains("sums 0; this is dynvox ") && refused.contains("Make it with `dynvox fleet plan`"), "{refused}");
     }
 }

@@ -16,6 +16,8 @@ use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
+/// Version of what a map consists of: its blocks, those that are added to them, and what is known of it.
+pub const VERSION: u32 = 2;
 /// Name of what is known of a map.
 const HEAD_FILE: &str = "submap.json";
 

@@ -18,6 +18,8 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+/// Version of the format: the last figure of what a tile begins with.
+pub const VERSION: u32 = (MAGIC[7] - b'0') as u32;
 const MAGIC: [u8; 8] = *b"dynvoxA1";
 const HEAD: usize = 28;
 /// Bytes of it that its checksum covers.
