@@ -160,3 +160,37 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
     let other = dynvox(root, &["fleet", "resample", "jobs"]);
     assert!(output_text(&other).contains("is not of these jobs. Align again"), "{}", output_text(&other));
 }
+
+#[test]
+fn a_recording_lies_where_its_fixes_or_its_poses_say() {
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    let shared =
+        RECORDINGS.split("[[recording]]").next().unwrap().replace("\"--profile\"", "\"--set\", \"street.frames=14\", \"--profile\"");
+    // On the equator, from 50 m north of the world's origin on, 0.88 m a frame; the first two frames have no fix.
+    let fix = |frame: u32| format!("{:.12} 8 90 0 0 {}\n", (50.0 + 0.88 * f64::from(frame)) / 110_574.389, std::f64::consts::FRAC_PI_2);
+    let fixes = "-\n-\n".to_owned() + &(2..14).map(fix).collect::<String>();
+    fs::write(root.join("fixes.txt"), fixes).unwrap();
+    let poses: String = (0..14).map(|frame| format!("1 0 0 60 0 1 0 0 0 0 1 {}\n", 0.8 * f64::from(frame))).collect();
+    fs::write(root.join("poses.txt"), poses).unwrap();
+    let list = "[[recording]]\nname = \"fixed\"\narguments = []\ngnss = \"fixes.txt\"\n\n[[recording]]\nname = \"posed\"\nposes_in_world = true\n\
+                arguments = [\"--start\", \"5\", \"--frames\", \"3\", \"--egomotion\", \"file:poses.txt\"]\n";
+    fs::write(root.join("recordings.toml"), format!("origin = [0, 8, 92]\n{shared}{list}")).unwrap();
+    done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
+    let jobs: serde_json::Value = serde_json::from_slice(&fs::read(root.join("jobs/jobs.json")).unwrap()).unwrap();
+    assert_eq!((&jobs["jobs"][0]["gnss"]["origin"][2], &jobs["jobs"][1]["t_world_camera"][11]), (&92.0.into(), &4.0.into()), "{jobs}");
+    let open: serde_json::Value = serde_json::from_str(&done(root, &["fleet", "status", "jobs", "--json"])).unwrap();
+    assert!(open[0]["sums"].is_null() && open[1]["sums"].is_string(), "{open}");
+    let ran = done(root, &["fleet", "run", "jobs"]);
+    assert!(ran.contains("fixed lies along its fixes, with standard deviations of 0."), "{ran}");
+    done(root, &["fleet", "align", "jobs"]);
+    let alignment: serde_json::Value = serde_json::from_slice(&fs::read(root.join("jobs/alignment.json")).unwrap()).unwrap();
+    let at = |axis: usize| alignment["recordings"][0]["given"][4 * axis + 3].as_f64().unwrap();
+    assert!(at(0).abs() < 0.2 && (at(1) - 2.0).abs() < 0.2 && (at(2) - 50.0).abs() < 0.2, "{alignment}");
+    fs::write(root.join("fixes.txt"), "0 8 90\n".repeat(14)).unwrap();
+    let standing = dynvox(root, &["fleet", "resample", "jobs"]);
+    assert!(output_text(&standing).contains("is not of these jobs"), "{}", output_text(&standing));
+    fs::remove_file(root.join("jobs/alignment.json")).unwrap();
+    let standing = dynvox(root, &["fleet", "resample", "jobs"]);
+    assert!(output_text(&standing).contains("does not say where fixed lies") && output_text(&standing).contains("fixed failed"));
+}

@@ -3,6 +3,7 @@
 //! **Memory.** The distances of two maps, and 200,000 surface points of each recording, 48 bytes each.
 
 use super::distance_field::{DistanceField, SurfacePoint};
+use super::georeference::{Prior, prior};
 use super::manifest::{rows_of, transform};
 use super::pose_graph::{Edge, Node, solve};
 use super::register::{Fit, RegisteredMap, Registration, Uncertainty, register};
@@ -20,6 +21,8 @@ pub const ALIGNMENT_FILE: &str = "alignment.json";
 const POINTS_MAX: usize = 200_000;
 /// Weight of a voxel that takes part.
 const MIN_WEIGHT: u8 = 3;
+/// How much surer the first recording is than the others.
+const FIRST_SHARE: f64 = 1e-4;
 /// Registrations of all pairs, each from the poses that the last one gave.
 const ROUNDS: usize = 3;
 
@@ -72,15 +75,25 @@ impl Alignment {
     /// # Errors
     /// A map is damaged or missing.
     pub fn find(manifest: &Manifest, folder: &Path, uncertainty: &Uncertainty) -> Result<Self, FleetError> {
-        let given: Vec<Transform> = manifest.jobs.iter().map(|job| job.t_world_camera().unwrap_or_default()).collect();
+        let priors = manifest.jobs.iter().map(|job| prior(job, folder)).collect::<Result<Vec<_>, _>>()?;
         let sampled = manifest.jobs.iter().map(|job| Sampled::of(job, folder)).collect::<Result<Vec<_>, _>>()?;
-        let nodes: Vec<Node> = given.iter().zip(&sampled).map(|(&given, of)| Node { given, centre_m: of.centre_m }).collect();
-        let mut poses = given.clone();
+        let node = |(at, (prior, of)): (usize, (&Prior, &Sampled))| {
+            // Without fixes the world is where the first recording says.
+            let share = if at == 0 { FIRST_SHARE } else { 1.0 };
+            Node {
+                given: prior.t_world_map,
+                uncertainty: prior.uncertainty.unwrap_or_else(|| uncertainty.times(share)),
+                centre_m: of.centre_m,
+            }
+        };
+        let nodes: Vec<Node> = priors.iter().zip(&sampled).enumerate().map(node).collect();
+        let allowed: Vec<Uncertainty> = priors.iter().map(|prior| prior.uncertainty.unwrap_or(*uncertainty)).collect();
+        let mut poses: Vec<Transform> = nodes.iter().map(|node| node.given).collect();
         let mut pairs: Vec<([usize; 2], AlignedPair)> = Vec::new();
         for _ in 0..ROUNDS {
-            let found = register_all(manifest, folder, (&sampled, &given, &poses, uncertainty))?;
+            let found = register_all(manifest, folder, (&sampled, &nodes, &poses, &allowed))?;
             let edges: Vec<Edge> = found.iter().filter(|(_, of)| of.fit.refused.is_none()).map(|(nodes, of)| edge(*nodes, of)).collect();
-            poses = solve(&nodes, &edges, uncertainty, &poses);
+            poses = solve(&nodes, &edges, &poses);
             pairs = found.iter().map(|(nodes, of)| (*nodes, pair(manifest, *nodes, of, &pairs))).collect();
         }
         let recordings = manifest.jobs.iter().zip(&poses).zip(&nodes).map(|((job, pose), node)| recording(job, pose, node));
@@ -101,25 +114,29 @@ impl Alignment {
     }
 }
 
-/// Where the maps of jobs lie in the world: as aligned, or as given where nothing was aligned.
+/// Where the maps of jobs lie in the world: as aligned, or as given where nothing was aligned. With fixes that is known of a map that is there.
 ///
 /// # Errors
 /// The alignment is not of these jobs.
-pub fn poses(manifest: &Manifest, folder: &Path) -> Result<Vec<Transform>, FleetError> {
+pub fn poses(manifest: &Manifest, folder: &Path) -> Result<Vec<Result<Transform, FleetError>>, FleetError> {
     let path = folder.join(ALIGNMENT_FILE);
+    let given: Vec<_> = manifest.jobs.iter().map(|job| Ok(prior(job, folder)?.t_world_map)).collect();
     if !path.is_file() {
-        return Ok(manifest.jobs.iter().map(|job| job.t_world_camera().unwrap_or_default()).collect());
+        return Ok(given);
     }
     let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
     let other = || FleetError::content(&path, "is not of these jobs. Align again with `dynvox fleet align`, or remove it");
     let alignment: Alignment = serde_json::from_str(&text).map_err(|_| other())?;
     // Numbers read from JSON may differ in their last bit.
     let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs());
-    let is_same = |(job, of): (&Job, &AlignedRecording)| job.id == of.id && job.t_world_camera.iter().zip(&of.given).all(is_near);
-    if alignment.recordings.len() != manifest.jobs.len() || !manifest.jobs.iter().zip(&alignment.recordings).all(is_same) {
+    let is_same = |((job, given), of): ((&Job, &Result<Transform, FleetError>), &AlignedRecording)| {
+        job.id == of.id && given.as_ref().is_ok_and(|given| rows_of(given).iter().zip(&of.given).all(is_near))
+    };
+    let jobs = manifest.jobs.iter().zip(&given);
+    if alignment.recordings.len() != jobs.len() || !jobs.zip(&alignment.recordings).all(is_same) {
         return Err(other());
     }
-    alignment.recordings.iter().map(|of| transform(&of.t_world_camera).ok_or_else(other)).collect()
+    Ok(alignment.recordings.iter().map(|of| transform(&of.t_world_camera).ok_or_else(other)).collect())
 }
 
 impl Sampled {
@@ -138,13 +155,13 @@ fn field(job: &Job, folder: &Path) -> Result<DistanceField, FleetError> {
     Ok(DistanceField::of(&mut map.store, &map.lattice, MIN_WEIGHT))
 }
 
-type Known<'k> = (&'k [Sampled], &'k [Transform], &'k [Transform], &'k Uncertainty);
+type Known<'k> = (&'k [Sampled], &'k [Node], &'k [Transform], &'k [Uncertainty]);
 
 /// All pairs that may overlap, in the order of the jobs.
 fn register_all(
     manifest: &Manifest,
     folder: &Path,
-    (sampled, given, poses, uncertainty): Known<'_>,
+    (sampled, nodes, poses, uncertainties): Known<'_>,
 ) -> Result<Vec<([usize; 2], Registration)>, FleetError> {
     let load = |at: usize| -> Result<RegisteredMap, FleetError> {
         Ok(RegisteredMap { field: field(&manifest.jobs[at], folder)?, points: sampled[at].points.clone() })
@@ -162,7 +179,8 @@ fn register_all(
                 map_b = Some(load(b)?);
             }
             let Some(map_b) = &map_b else { continue };
-            let registration = register((&load(a)?, map_b), (&(given[b].inverse() * given[a]), &t_b_a), uncertainty);
+            let given = nodes[b].given.inverse() * nodes[a].given;
+            let registration = register((&load(a)?, map_b), (&given, &t_b_a), &uncertainties[a].and(&uncertainties[b]));
             found.extend(registration.map(|registration| ([a, b], registration)));
         }
     }
@@ -188,7 +206,7 @@ fn recording(job: &Job, pose: &Transform, node: &Node) -> AlignedRecording {
     AlignedRecording {
         name: job.name.clone(),
         id: job.id.clone(),
-        given: job.t_world_camera,
+        given: rows_of(&node.given),
         t_world_camera: rows_of(pose),
         moved_m: distance_m(&to, &from),
         turned_deg: motion.angle_rad().to_degrees(),
@@ -199,7 +217,7 @@ fn recording(job: &Job, pose: &Transform, node: &Node) -> AlignedRecording {
 mod tests {
     use super::*;
     use crate::fleet::tile_file::Lattice;
-    use crate::fleet::{Camera, keep};
+    use crate::fleet::{Camera, Given, keep};
     use crate::run::store::BlockFile;
     use dynvox_core::geometry::StereoRig;
     use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock};
@@ -244,7 +262,7 @@ mod tests {
             name: format!("part {nth}"),
             id: format!("{nth:016x}"),
             arguments: Vec::new(),
-            t_world_camera: rows_of(given),
+            given: Given::TWorldCamera(rows_of(given)),
             epoch: 0,
             bytes: 0,
         }
@@ -279,7 +297,7 @@ mod tests {
         manifest.jobs.iter().zip(&truth).for_each(|(job, truth)| record(job, root.path(), truth));
         let alignment = Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap();
         alignment.write(root.path()).unwrap();
-        let found = poses(&manifest, root.path()).unwrap();
+        let found: Vec<Transform> = poses(&manifest, root.path()).unwrap().into_iter().map(Result::unwrap).collect();
         for at in 0..3 {
             let error = truth[at].inverse() * found[at];
             assert!(error.distance_m() < 0.03, "{at}: {} m, {alignment:?}", error.distance_m());
@@ -289,7 +307,8 @@ mod tests {
         assert!(alignment.pairs.iter().all(|pair| pair.fit.refused.is_none() && pair.fit.rms_m < pair.fit.rms_before_m), "{alignment:?}");
         assert_eq!(alignment, Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap());
         let mut others = manifest;
-        others.jobs[1].t_world_camera[3] += 0.1;
+        let moved = Transform::from_translation([0.1, 0.0, 0.0]) * given[1];
+        others.jobs[1].given = Given::TWorldCamera(rows_of(&moved));
         assert!(poses(&others, root.path()).unwrap_err().to_string().contains("is not of these jobs"));
     }
 

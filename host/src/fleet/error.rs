@@ -40,6 +40,9 @@ pub enum FleetError {
         /// The folder.
         path: PathBuf,
     },
+    /// A file of another program.
+    #[error(transparent)]
+    Format(#[from] crate::formats::FormatError),
     /// A run's blocks.
     #[error(transparent)]
     Store(#[from] crate::run::store::StoreError),

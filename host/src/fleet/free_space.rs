@@ -32,8 +32,17 @@ pub struct Camera {
     pub rig: StereoRig,
     /// Image width and height, px.
     pub size: (usize, usize),
-    /// The poses, in the map's axes.
-    pub poses: Vec<Transform>,
+    /// Its frames.
+    pub poses: Vec<CameraPose>,
+}
+
+/// Where a camera was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraPose {
+    /// Number of the frame in the data set.
+    pub frame: usize,
+    /// The camera in the map.
+    pub t_map_camera: Transform,
 }
 
 /// Depths of a view, m, 0 where it shows no surface.
@@ -47,7 +56,7 @@ struct Depths {
 pub fn free_blocks(field: &DistanceField, camera: &Camera) -> BTreeMap<BlockCoord, u8> {
     let mut views: BTreeMap<BlockCoord, u8> = BTreeMap::new();
     let mut last: Option<Transform> = None;
-    for pose in &camera.poses {
+    for CameraPose { t_map_camera: pose, .. } in &camera.poses {
         if last.is_some_and(|last| (last.inverse() * *pose).distance_m() < APART_M) {
             continue;
         }

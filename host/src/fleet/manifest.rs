@@ -1,7 +1,7 @@
 //! What there is to do: a list of recordings becomes a list of jobs, each with its bytes of memory and a name that is a hash of all that
 //! decides its result, so that what is done is known by its folder.
 
-use super::{FleetError, submap, tile_file};
+use super::{FleetError, Recording, Recordings, submap, tile_file};
 use crate::run::write_whole;
 use dynvox_core::digest::Digest;
 use dynvox_core::geometry::Transform;
@@ -12,49 +12,6 @@ use std::path::{Path, PathBuf};
 
 /// Name of the list of jobs.
 pub const MANIFEST_FILE: &str = "jobs.json";
-/// A list of recordings, as an example.
-pub const RECORDINGS_EXAMPLE: &str = "\
-arguments = [\"--memory\", \"256MiB\"]   # of `dynvox run`, for all
-
-[[recording]]
-name = \"monday\"
-arguments = [\"recordings/monday\", \"--instances\", \"none\"]
-
-[[recording]]
-name = \"tuesday\"
-arguments = [\"recordings/tuesday\"]
-t_world_camera = [1, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]   # its first camera in the world, a row of KITTI
-epoch = 1   # where it contradicts recordings of epoch 0, a rule decides
-";
-
-/// The recordings to map.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Recordings {
-    /// Arguments of `dynvox run` for all of them.
-    #[serde(default)]
-    pub arguments: Vec<String>,
-    /// One by one.
-    #[serde(rename = "recording")]
-    pub recordings: Vec<Recording>,
-}
-
-/// A recording.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Recording {
-    /// Its name in tables.
-    pub name: String,
-    /// Arguments of `dynvox run`.
-    pub arguments: Vec<String>,
-    /// Its first camera in the world, camera to world; the world's origin where it is absent.
-    #[serde(default)]
-    pub t_world_camera: Option<[f64; 12]>,
-    /// The epoch it belongs to, such as 20261122: maps of different epochs are not averaged where they contradict one another.
-    #[serde(default)]
-    pub epoch: u32,
-}
-
 /// One run to do.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Job {
@@ -64,12 +21,30 @@ pub struct Job {
     pub id: String,
     /// Arguments of `dynvox run`.
     pub arguments: Vec<String>,
-    /// First camera in the world, camera to world: the rows of a 3 x 4 matrix.
-    pub t_world_camera: [f64; 12],
+    /// Where it lies in the world.
+    #[serde(flatten)]
+    pub given: Given,
     /// The epoch it belongs to.
     pub epoch: u32,
     /// Most memory of the run, bytes.
     pub bytes: u64,
+}
+
+/// Where a recording lies in the world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Given {
+    /// First camera in the world, camera to world: the rows of a 3 x 4 matrix.
+    TWorldCamera([f64; 12]),
+    /// Along fixes of a receiver of satellites.
+    Gnss {
+        /// File or folder of the fixes.
+        file: PathBuf,
+        /// The antenna in the camera's axes, m.
+        antenna_m: [f64; 3],
+        /// Latitude and longitude, degrees, and altitude, m, of the world's origin.
+        origin: [f64; 3],
+    },
 }
 
 /// What became of a job.
@@ -90,6 +65,8 @@ pub struct Identity {
     pub digest: u64,
     /// Most memory of the run, bytes.
     pub bytes: u64,
+    /// Its first camera, where poses come from a file.
+    pub first_pose: Option<Transform>,
 }
 
 /// All jobs.
@@ -102,41 +79,25 @@ pub struct Manifest {
 }
 
 /// The program's version, and those of what it keeps: the core's state, maps in their own lattice, sums.
-pub(super) fn program() -> String {
+fn program() -> String {
     let [core, maps, sums] = [snapshot::VERSION, submap::VERSION, tile_file::VERSION];
     format!("dynvox {}, core {core}, maps {maps}, sums {sums}", env!("CARGO_PKG_VERSION"))
-}
-
-impl Recordings {
-    /// Reads a list.
-    ///
-    /// # Errors
-    /// It cannot be read, or is none.
-    pub fn read(path: &Path) -> Result<Self, FleetError> {
-        let text = std::fs::read_to_string(path).map_err(FleetError::io(path))?;
-        toml::from_str(&text).map_err(|error| {
-            let why = error.message().replace('\n', " ");
-            FleetError::content(path, format!("is no list of recordings: {why}. An example:\n\n{RECORDINGS_EXAMPLE}"))
-        })
-    }
 }
 
 impl Manifest {
     /// The jobs of recordings. `identify` says what a run of some arguments is.
     ///
     /// # Errors
-    /// A place in the world is no rigid motion, or that of `identify`.
+    /// It is not said where a recording lies, or that of `identify`.
     pub fn plan<E: From<FleetError>>(
         path: &Path,
         recordings: &Recordings,
         identify: impl Fn(&[String]) -> Result<Identity, E>,
     ) -> Result<Self, E> {
         let mut jobs: Vec<Job> = Vec::new();
-        for Recording { name, arguments, t_world_camera, epoch } in &recordings.recordings {
-            let t_world_camera = t_world_camera.unwrap_or([1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
-            if transform(&t_world_camera).is_none() {
-                return Err(FleetError::content(path, format!("has no rigid motion as t_world_camera of {name}")).into());
-            }
+        let origin = recordings.origin()?;
+        for recording in &recordings.recordings {
+            let Recording { name, arguments, epoch, .. } = recording;
             let arguments: Vec<String> = arguments.iter().chain(&recordings.arguments).cloned().collect();
             let identity = identify(&arguments)?;
             let id = id(&arguments, identity.digest);
@@ -147,7 +108,7 @@ impl Manifest {
                 name: name.clone(),
                 id,
                 arguments,
-                t_world_camera,
+                given: recording.given(origin, identity.first_pose.as_ref()).map_err(|reason| FleetError::content(path, reason))?,
                 epoch: *epoch,
                 bytes: identity.bytes,
             });
@@ -193,11 +154,6 @@ impl Job {
     /// Whether settings and images are those it was planned with.
     pub fn is_of(&self, digest: u64) -> bool {
         self.id == id(&self.arguments, digest)
-    }
-
-    /// First camera in the world.
-    pub fn t_world_camera(&self) -> Option<Transform> {
-        transform(&self.t_world_camera)
     }
 
     /// Where its map is in the world's lattice, when it lies at a pose: the name is a hash of both.
@@ -265,9 +221,12 @@ pub(super) fn transform(rows: &[f64; 12]) -> Option<Transform> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fleet::RECORDINGS_EXAMPLE;
 
     fn identify(arguments: &[String]) -> Result<Identity, FleetError> {
-        Ok(Identity { digest: arguments.len() as u64, bytes: 7 })
+        let first_pose =
+            arguments.iter().any(|argument| argument.contains("file:")).then(|| Transform::from_translation([0.0, 1.0, 700.0]));
+        Ok(Identity { digest: arguments.len() as u64, bytes: 7, first_pose })
     }
 
     #[test]
@@ -280,24 +239,12 @@ mod tests {
         assert_eq!(Manifest::read(root.path()).unwrap(), manifest);
         let [monday, tuesday] = &manifest.jobs[..] else { panic!("{manifest:?}") };
         assert_eq!(monday.arguments, ["recordings/monday", "--instances", "none", "--memory", "256MiB"]);
-        assert_eq!(tuesday.t_world_camera().unwrap().translation_m, [5.2, 0.0, -3.1]);
+        assert_eq!(tuesday.given, Given::TWorldCamera([1.0, 0.0, 0.0, 5.2, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -3.1]));
         assert!(monday.is_of(5) && !monday.is_of(4) && monday.id != tuesday.id);
         assert_eq!(manifest.shard(1, 2).collect::<Vec<_>>(), [tuesday]);
         assert_eq!(tuesday.state(root.path()), JobState::Open);
         std::fs::create_dir_all(tuesday.submap(root.path())).unwrap();
         assert_eq!(tuesday.state(root.path()), JobState::Done);
-    }
-
-    #[test]
-    fn wrong_lists_and_motions_are_refused_with_an_example() {
-        let root = tempfile::TempDir::new().unwrap();
-        let path = root.path().join("recordings.toml");
-        std::fs::write(&path, "[[drives]]\n").unwrap();
-        assert!(Recordings::read(&path).unwrap_err().to_string().contains("[[recording]]"));
-        std::fs::write(&path, RECORDINGS_EXAMPLE.replace("[1, 0, 0, 5.2", "[2, 0, 0, 5.2")).unwrap();
-        let refused = Manifest::plan(&path, &Recordings::read(&path).unwrap(), identify).unwrap_err();
-        assert!(refused.to_string().contains("no rigid motion as t_world_camera of tuesday"), "{refused}");
-        assert!(Manifest::read(root.path()).is_err());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Poses of recordings from what was given and how their maps lie to one another: weighted least squares.
 //!
-//! Each recording's map is rigid. Given poses are weak observations, registrations strong ones; the first recording stays where it is. A
-//! recording without a registration stays where it was given.
+//! Each recording's map is rigid. Given poses are weak observations, registrations strong ones. A recording without a registration stays where it
+//! was given.
 //!
 //! **Memory.** A matrix of 36 x 36 numbers for each two recordings.
 
@@ -12,14 +12,14 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 const ITERATIONS_MAX: usize = 20;
 /// A step that changes no pose by more ends them, m and rad.
 const STEP_MIN: f64 = 1e-10;
-/// How much surer the first recording is than the others.
-const FIRST_SHARE: f64 = 1e-4;
 
 /// A recording.
 #[derive(Clone, Debug)]
 pub struct Node {
     /// Its map in the world, as given.
     pub given: Transform,
+    /// How far that may be off.
+    pub uncertainty: Uncertainty,
     /// The map's centre, in the map: what is not known about its rotation is about it.
     pub centre_m: [f64; 3],
 }
@@ -38,16 +38,15 @@ pub struct Edge {
 }
 
 /// Where the maps lie in the world, from `start` on.
-pub fn solve(nodes: &[Node], edges: &[Edge], uncertainty: &Uncertainty, start: &[Transform]) -> Vec<Transform> {
+pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transform> {
     let mut poses = start.to_vec();
     for _ in 0..ITERATIONS_MAX {
         let mut matrix = DMatrix::zeros(6 * nodes.len(), 6 * nodes.len());
         let mut vector = DVector::zeros(6 * nodes.len());
         for (at, node) in nodes.iter().enumerate() {
-            let share = if at == 0 { FIRST_SHARE } else { 1.0 };
             let centre_m = Vector3::from(poses[at].transform_point(node.centre_m));
             let to_centre = about(&centre_m);
-            let information = to_centre.transpose() * prior(uncertainty, share);
+            let information = to_centre.transpose() * prior(&node.uncertainty);
             add(&mut matrix, at, at, &(information * to_centre));
             add_vector(&mut vector, at, &(information * step_about(&centre_m, &(node.given * poses[at].inverse()))));
         }
@@ -95,8 +94,8 @@ fn about(centre_m: &Vector3<f64>) -> Matrix6<f64> {
     matrix
 }
 
-fn prior(uncertainty: &Uncertainty, share: f64) -> Matrix6<f64> {
-    let (turn, shift) = ((share * uncertainty.rotation_rad).powi(-2), (share * uncertainty.position_m).powi(-2));
+fn prior(uncertainty: &Uncertainty) -> Matrix6<f64> {
+    let (turn, shift) = (uncertainty.rotation_rad.powi(-2), uncertainty.position_m.powi(-2));
     Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift))
 }
 
@@ -133,25 +132,32 @@ mod tests {
             motion_about(&centre, &Vector6::new(0.0, 0.017 * at, 0.0, 0.15, -0.05 * at, 0.1)) * *pose
         };
         let given = [truth[0], off(&truth[1], 1.0), off(&truth[2], -1.0), off(&truth[3], 1.0)];
-        let nodes: Vec<Node> = given.iter().map(|&given| Node { given, centre_m }).collect();
+        let uncertainty = |at: usize| UNCERTAINTY.times(if at == 0 { 1e-4 } else { 1.0 });
+        let node = |(at, &given): (usize, &Transform)| Node { given, uncertainty: uncertainty(at), centre_m };
+        let nodes: Vec<Node> = given.iter().enumerate().map(node).collect();
         let edge = |a: usize, b: usize| Edge {
             nodes: [a, b],
             t_b_a: truth[b].inverse() * truth[a],
             information: Matrix6::identity() * 1e6,
             centre_m: [1.0, 2.0, 30.0],
         };
-        let solved = solve(&nodes, &[edge(0, 1), edge(1, 2)], &UNCERTAINTY, &given);
+        let solved = solve(&nodes, &[edge(0, 1), edge(1, 2)], &given);
         for at in 0..3 {
             assert!(apart(&solved[at], &truth[at], centre_m) < 1e-3, "{at}: {}", apart(&solved[at], &truth[at], centre_m));
             assert!((solved[at].inverse() * truth[at]).angle_rad() < 1e-4);
         }
         assert!(apart(&solved[3], &given[3], centre_m) < 1e-9);
-        assert_eq!(solved, solve(&nodes, &[edge(0, 1), edge(1, 2)], &UNCERTAINTY, &given));
+        assert_eq!(solved, solve(&nodes, &[edge(0, 1), edge(1, 2)], &given));
     }
 
     #[test]
     fn of_two_registrations_that_contradict_the_surer_one_counts() {
-        let nodes = [0.0, 0.0].map(|x| Node { given: Transform::from_translation([x, 0.0, 0.0]), centre_m: [0.0; 3] });
+        let node = |share: f64| Node {
+            given: Transform::IDENTITY,
+            uncertainty: UNCERTAINTY.times(share),
+            centre_m: [0.0; 3],
+        };
+        let nodes = [1e-4, 1.0].map(node);
         let edge = |x: f64, sure: f64| Edge {
             nodes: [1, 0],
             t_b_a: Transform::from_translation([x, 0.0, 0.0]),
@@ -159,7 +165,7 @@ mod tests {
             centre_m: [0.0; 3],
         };
         let start = nodes.each_ref().map(|node| node.given);
-        let solved = solve(&nodes, &[edge(0.1, 9e6), edge(0.2, 1e6)], &UNCERTAINTY, &start);
+        let solved = solve(&nodes, &[edge(0.1, 9e6), edge(0.2, 1e6)], &start);
         assert!((solved[1].translation_m[0] - 0.11).abs() < 1e-4, "{:?}", solved[1]);
     }
 }

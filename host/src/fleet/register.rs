@@ -49,6 +49,21 @@ pub struct Uncertainty {
     pub rotation_rad: f64,
 }
 
+impl Uncertainty {
+    /// A multiple of it.
+    pub fn times(&self, factor: f64) -> Self {
+        Self { position_m: factor * self.position_m, rotation_rad: factor * self.rotation_rad }
+    }
+
+    /// How far two poses may be off to one another.
+    pub fn and(&self, other: &Self) -> Self {
+        Self {
+            position_m: self.position_m.hypot(other.position_m),
+            rotation_rad: self.rotation_rad.hypot(other.rotation_rad),
+        }
+    }
+}
+
 /// How well two maps fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
@@ -119,8 +134,8 @@ pub fn step_about(centre_m: &Vector3<f64>, motion: &Transform) -> Vector6<f64> {
     Vector6::new(turn.x, turn.y, turn.z, moved.x, moved.y, moved.z)
 }
 
-/// Registers a map with another: `given` is the first map in the second by the poses that were given, `guess` by what is known now. `None` where
-/// too few points could meet.
+/// Registers a map with another: `given` is the first map in the second by the poses that were given, which may be off by `uncertainty`, `guess` by
+/// what is known now. `None` where too few points could meet.
 pub fn register(
     (a, b): (&RegisteredMap, &RegisteredMap),
     (given, guess): (&Transform, &Transform),
@@ -161,9 +176,9 @@ pub fn register(
 }
 
 fn refusal(of: &Fit, moved: &Vector6<f64>, (voxel_size_m, pair, uncertainty): (f64, &Pair<'_>, &Uncertainty)) -> Option<String> {
-    // Both poses may be off, by two standard deviations each; a turn also moves what is far from the map's origin.
-    let turn_rad = 2.0 * std::f64::consts::SQRT_2 * uncertainty.rotation_rad;
-    let move_m = 2.0 * std::f64::consts::SQRT_2 * uncertainty.position_m + turn_rad * pair.centre_m.norm();
+    // Two standard deviations; a turn also moves what is far from the map's origin.
+    let turn_rad = 2.0 * uncertainty.rotation_rad;
+    let move_m = 2.0 * uncertainty.position_m + turn_rad * pair.centre_m.norm();
     let (moved_m, turned_rad) = (moved.fixed_rows::<3>(3).norm(), moved.fixed_rows::<3>(0).norm());
     if of.points < POINTS_MIN {
         Some(format!("{} points are less than {POINTS_MIN}", of.points))

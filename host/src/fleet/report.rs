@@ -64,8 +64,10 @@ impl Report {
     pub fn of((folder, manifest): (&Path, &Manifest), map: &Path, least_change_m3: f64) -> Result<Self, FleetError> {
         let (mut sums, mut recordings) = (Vec::new(), Vec::new());
         for (job, t_world_map) in manifest.jobs.iter().zip(poses(manifest, folder)?) {
+            let t_world_map = t_world_map?;
             sums.push(job.sums(folder, &t_world_map));
-            let cameras_m: Vec<_> = Submap::cameras_m(&job.submap(folder))?.into_iter().map(|at| t_world_map.transform_point(at)).collect();
+            let cameras = Submap::cameras(&job.submap(folder))?;
+            let cameras_m: Vec<_> = cameras.iter().map(|of| (t_world_map * of.t_map_camera).translation_m).collect();
             recordings.push(RecordingPath {
                 name: job.name.clone(),
                 epoch: job.epoch,

@@ -5,7 +5,8 @@
 
 use super::FleetError;
 use super::distance_field::DistanceField;
-use super::free_space::{Camera, free_blocks};
+use super::free_space::{Camera, CameraPose, free_blocks};
+use super::manifest::{rows_of, transform};
 use super::tile_file::Lattice;
 use crate::formats::DraftFolder;
 use crate::run::store::{BlockFile, Position};
@@ -28,7 +29,8 @@ struct Head {
     truncation_m: f32,
     colour: bool,
     position: Position,
-    cameras_m: Vec<[f64; 3]>,
+    /// Number of the frame in the data set, and the rows of the camera in the map.
+    cameras: Vec<(usize, [f64; 12])>,
 }
 
 /// A run's map in its own lattice.
@@ -120,7 +122,7 @@ pub fn keep(store: &mut BlockFile<File>, lattice: &Lattice, camera: &Camera, out
         truncation_m: lattice.truncation_m,
         colour: lattice.colour,
         position: kept.position().map_err(FleetError::io(&path))?,
-        cameras_m: camera.poses.iter().map(|pose| pose.translation_m).collect(),
+        cameras: camera.poses.iter().map(|of| (of.frame, rows_of(&of.t_map_camera))).collect(),
     };
     let text = serde_json::to_string(&head).unwrap_or_default();
     let head_path = draft.path().join(HEAD_FILE);
@@ -147,12 +149,14 @@ impl Submap {
         Ok(Self { lattice: Lattice { voxel_size_m, truncation_m, colour }, store })
     }
 
-    /// Where the camera of the map in a folder was, in the map's axes, m.
+    /// Where the camera of the map in a folder was.
     ///
     /// # Errors
     /// The folder is no map.
-    pub fn cameras_m(folder: &Path) -> Result<Vec<[f64; 3]>, FleetError> {
-        Ok(Head::read(folder)?.cameras_m)
+    pub fn cameras(folder: &Path) -> Result<Vec<CameraPose>, FleetError> {
+        let camera = |(frame, rows): (usize, [f64; 12])| Some(CameraPose { frame, t_map_camera: transform(&rows)? });
+        let cameras = Head::read(folder)?.cameras.into_iter().map(camera).collect::<Option<_>>();
+        cameras.ok_or_else(|| FleetError::content(folder, "is damaged. Remove the folder and make it again"))
     }
 }
 
@@ -180,12 +184,13 @@ mod tests {
         let lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: false };
         let out = root.path().join("map");
         let rig = StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
-        let camera = Camera { rig, size: (100, 40), poses: vec![Transform::from_translation([1.0, 2.0, 3.0])] };
+        let pose = CameraPose { frame: 7, t_map_camera: Transform::from_translation([1.0, 2.0, 3.0]) };
+        let camera = Camera { rig, size: (100, 40), poses: vec![pose] };
         assert_eq!(keep(&mut store, &lattice, &camera, &out).unwrap(), 2);
         assert!(matches!(keep(&mut store, &lattice, &camera, &out), Err(FleetError::Exists { .. })));
         let mut map = Submap::open(&out).unwrap();
         assert_eq!((map.lattice, blocks(&mut map.store).len()), (lattice, 2));
-        assert_eq!(Submap::cameras_m(&out).unwrap(), [[1.0, 2.0, 3.0]]);
+        assert_eq!(Submap::cameras(&out).unwrap(), [pose]);
         let source = Source::load(&mut map.store, BlockCoord { x: 3, y: 0, z: 0 }, false).unwrap();
         assert_eq!((source.sdf[5], source.weight[5]), (-7, 9));
         let path = out.join(BLOCKS_FILE);

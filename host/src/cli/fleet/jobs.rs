@@ -2,8 +2,9 @@
 
 use super::{Shard, each};
 use crate::cli::run::plan_of;
-use crate::fleet::{self, Camera, Identity, Job, JobState, Lattice, Manifest, Recordings};
+use crate::fleet::{self, Camera, CameraPose, Identity, Job, JobState, Lattice, Manifest, Recordings};
 use crate::formats::read_poses;
+use crate::observe::tables::read_frame_digests;
 use crate::run::store::BlockFile;
 use crate::run::{BLOCKS_FILE, Plan, RunManifest, stereo_frame};
 use anyhow::{Context, bail};
@@ -13,6 +14,8 @@ use std::process::Command;
 
 /// The camera's path in a run folder.
 const TRAJECTORY_FILE: &str = "trajectory_kitti.txt";
+/// Its frames.
+const FRAMES_FILE: &str = "frames.csv";
 
 /// The plan of a run's arguments.
 fn planned(arguments: &[String]) -> anyhow::Result<Plan> {
@@ -32,7 +35,8 @@ fn identify(plan: &Plan) -> anyhow::Result<Identity> {
         let images = plan.dataset.frame(index)?;
         digest.u64(stereo_frame(&images, &[]).map_or(0, |frame| frame.digest()));
     }
-    Ok(Identity { digest: digest.finish(), bytes: plan.rss_limit_bytes })
+    let first_pose = plan.poses.iter().flatten().next().copied();
+    Ok(Identity { digest: digest.finish(), bytes: plan.rss_limit_bytes, first_pose })
 }
 
 pub fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
@@ -49,6 +53,10 @@ pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
         if job.state(folder) != JobState::Done {
             map(folder, job)?;
             outln!("{} is done", job.name);
+            if let Some(of) = fleet::prior(job, folder)?.uncertainty {
+                let turn_deg = of.rotation_rad.to_degrees();
+                outln!("{} lies along its fixes, with standard deviations of {:.2} m and {turn_deg:.2} degrees", job.name, of.position_m);
+            }
         }
         Ok(())
     })
@@ -83,15 +91,18 @@ fn map(folder: &Path, job: &Job) -> anyhow::Result<()> {
     };
     let blocks = run_folder.join(BLOCKS_FILE);
     let (mut store, _) = BlockFile::open(&blocks, lattice.voxel_size_m, lattice.truncation_m)?;
-    let camera = Camera {
-        rig: plan.config.rig,
-        size: plan.dataset.size(),
-        poses: read_poses(&run_folder.join(TRAJECTORY_FILE))?.poses,
-    };
+    let camera = Camera { rig: plan.config.rig, size: plan.dataset.size(), poses: cameras(&run_folder)? };
     std::fs::create_dir_all(folder.join("submaps"))?;
     fleet::keep(&mut store, &lattice, &camera, &job.submap(folder))?;
     std::fs::remove_file(&blocks)?;
     Ok(())
+}
+
+/// Where the camera of a run was in its frames.
+fn cameras(run_folder: &Path) -> anyhow::Result<Vec<CameraPose>> {
+    let poses = read_poses(&run_folder.join(TRAJECTORY_FILE))?.poses;
+    let rows = read_frame_digests(&std::fs::read_to_string(run_folder.join(FRAMES_FILE))?)?;
+    Ok(rows.iter().zip(poses).map(|(row, t_map_camera)| CameraPose { frame: row.frame, t_map_camera }).collect())
 }
 
 pub fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
@@ -105,7 +116,8 @@ pub fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
         let poses = fleet::poses(&manifest, folder)?;
         let rows = manifest.jobs.iter().zip(&poses).map(|(job, pose)| {
             serde_json::json!({
-                "name": job.name, "id": job.id, "bytes": job.bytes, "state": word(job), "sums": job.sums(folder, pose),
+                "name": job.name, "id": job.id, "bytes": job.bytes, "state": word(job),
+                "sums": pose.as_ref().ok().map(|pose| job.sums(folder, pose)),
             })
         });
         outln!("{}", serde_json::to_string_pretty(&rows.collect::<Vec<_>>())?);

@@ -36,8 +36,9 @@ pub fn resample(folder: &Path, shard: Shard) -> anyhow::Result<()> {
     let manifest = Manifest::read(folder)?;
     let poses = fleet::poses(&manifest, folder)?;
     std::fs::create_dir_all(folder.join("sums"))?;
-    let posed = manifest.jobs.iter().zip(&poses).skip(shard.index).step_by(shard.of);
+    let posed = manifest.jobs.iter().zip(poses).skip(shard.index).step_by(shard.of);
     each(posed, "in the world", |job, t_world_map| {
+        let t_world_map = &t_world_map?;
         let out = job.sums(folder, t_world_map);
         if out.is_dir() {
             return Ok(());
@@ -61,7 +62,7 @@ pub fn resample(folder: &Path, shard: Shard) -> anyhow::Result<()> {
 /// The folders of sums of jobs whose maps are all resampled.
 fn sums_of(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let manifest = done_jobs(folder)?;
-    let poses = fleet::poses(&manifest, folder)?;
+    let poses = fleet::poses(&manifest, folder)?.into_iter().collect::<Result<Vec<_>, _>>()?;
     let inputs: Vec<PathBuf> = manifest.jobs.iter().zip(&poses).map(|(job, pose)| job.sums(folder, pose)).collect();
     let missing = manifest.jobs.iter().zip(&inputs).filter(|(_, sums)| !sums.is_dir()).map(|(job, _)| job.name.as_str());
     let missing: Vec<&str> = missing.collect();

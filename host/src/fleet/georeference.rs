@@ -1,0 +1,311 @@
+//! Where a recording lies in the world, from fixes of a receiver of satellites along its path: a rigid motion by least squares.
+//!
+//! Umeyama's closed form without scale (*Least-squares estimation of transformation parameters between two point patterns*, PAMI 1991), repeated with
+//! Cauchy's weights, whose scale is that of the median residual, so that fixes reflected by houses do not count. Where roll, pitch and yaw come with
+//! the fixes, their mean rotation is one more observation in the same form: a straight path says nothing about the turn about itself.
+//!
+//! The world is the plane through the origin of the fixes: x east, y down, z north.
+
+use super::FleetError;
+use super::manifest::{Given, Job, transform};
+use super::register::Uncertainty;
+use super::submap::Submap;
+use crate::formats::{Fix, LocalPlane, read_gnss};
+use dynvox_core::geometry::Transform;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use std::path::Path;
+
+/// Frames with a fix.
+const FIXES_MIN: usize = 10;
+/// Largest standard deviation of the turn about any axis, rad: a registration does not find more.
+const TURN_MAX_RAD: f64 = 0.052;
+/// How well the axes of the inertial system are those of the camera, and how well it measures them, rad.
+const ANGLES_SIGMA_RAD: f64 = 0.0175;
+/// Angles may contradict positions by no more, rad.
+const CONTRADICTION_MAX_RAD: f64 = 0.175;
+/// Fixes in a row err alike: so many count as one.
+const CORRELATED_FIXES: f64 = 10.0;
+/// Largest standard deviation of a fix from the path, m.
+const SIGMA_MAX_M: f64 = 10.0;
+/// Residuals are never believed to be smaller, m.
+const SIGMA_MIN_M: f64 = 0.01;
+/// The median length of a vector of three normally distributed numbers.
+const MEDIAN_LENGTH: f64 = 1.538;
+/// Cauchy's limit, in standard deviations.
+const LIMIT: f64 = 2.385;
+const ROUNDS: usize = 50;
+
+/// Where a recording's map lies as given, and how far that may be off where it is known.
+#[derive(Clone, Copy, Debug)]
+pub struct Prior {
+    /// The map in the world.
+    pub t_world_map: Transform,
+    /// One standard deviation, where the fixes tell it.
+    pub uncertainty: Option<Uncertainty>,
+}
+
+/// The antenna in the map and in the world, m.
+type PointPair = (Vector3<f64>, Vector3<f64>);
+
+/// A frame with a fix.
+#[derive(Clone, Copy, Debug)]
+struct Observation {
+    /// Its camera in the map.
+    t_map_camera: Transform,
+    /// The antenna in the world, m.
+    at_m: Vector3<f64>,
+    /// Its camera's axes in the world, where angles were measured.
+    axes: Option<Matrix3<f64>>,
+}
+
+/// Where the map of a job lies as given. With fixes its map must be there.
+///
+/// # Errors
+/// The map or the fixes cannot be read, or the fixes do not say where the map lies.
+pub fn prior(job: &Job, folder: &Path) -> Result<Prior, FleetError> {
+    let (gnss, antenna_m, origin) = match &job.given {
+        Given::TWorldCamera(rows) => {
+            let t_world_map =
+                transform(rows).ok_or_else(|| FleetError::content(folder, format!("has no rigid motion for {}", job.name)))?;
+            return Ok(Prior { t_world_map, uncertainty: None });
+        }
+        Given::Gnss { file, antenna_m, origin } => (file, antenna_m, origin),
+    };
+    let fixes = read_gnss(gnss)?;
+    let cameras = Submap::cameras(&job.submap(folder))?;
+    let plane = LocalPlane::at(*origin);
+    let seen = cameras.iter().filter_map(|camera| {
+        let fix = fixes.get(camera.frame).copied().flatten()?;
+        Some(Observation::of(&camera.t_map_camera, &fix, &plane))
+    });
+    let found = georeference(&seen.collect::<Vec<_>>(), *antenna_m);
+    found.map_err(|reason| FleetError::content(gnss, format!("does not say where {} lies: {reason}", job.name)))
+}
+
+impl Observation {
+    fn of(t_map_camera: &Transform, fix: &Fix, plane: &LocalPlane) -> Self {
+        let [east, north, up] = plane.east_north_up_m(fix.geodetic);
+        Self {
+            t_map_camera: *t_map_camera,
+            at_m: Vector3::new(east, -up, north),
+            axes: fix.angles_rad.map(camera_axes),
+        }
+    }
+}
+
+/// The camera's axes (x right, y down, z ahead) in the world, of a vehicle with x ahead, y left, z up.
+fn camera_axes([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
+    let about =
+        |axis: [f64; 3], angle: f64| Matrix3::from(Transform::new(axis.map(|side| side * angle), [0.0; 3]).rotation_matrix()).transpose();
+    let enu_vehicle = about([0.0, 0.0, 1.0], yaw) * about([0.0, 1.0, 0.0], pitch) * about([1.0, 0.0, 0.0], roll);
+    let world_enu = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
+    let vehicle_camera = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    world_enu * enu_vehicle * vehicle_camera
+}
+
+/// The rotation nearest to a matrix.
+fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let svd = matrix.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let sign = if (u * v_t).determinant() < 0.0 { -1.0 } else { 1.0 };
+    Some(u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t)
+}
+
+/// A motion, the fixes' weights and their standard deviation.
+struct Estimate {
+    rotation: Matrix3<f64>,
+    shift_m: Vector3<f64>,
+    sigma_m: f64,
+    weights: Vec<f64>,
+}
+
+impl Estimate {
+    /// By fixes, and angles where there are any.
+    fn of(points: &[PointPair], axes: Option<&Matrix3<f64>>) -> Option<Self> {
+        let start = Self {
+            rotation: Matrix3::identity(),
+            shift_m: Vector3::zeros(),
+            sigma_m: 1.0,
+            weights: vec![1.0; points.len()],
+        };
+        (0..ROUNDS).try_fold(start, |estimate, _| estimate.next(points, axes))
+    }
+
+    /// The motion that fits best with some weights, and the weights that follow from it.
+    fn next(&self, points: &[PointPair], axes: Option<&Matrix3<f64>>) -> Option<Self> {
+        let centres = centres(points, &self.weights);
+        let mut sum = axes.copied().unwrap_or_else(Matrix3::zeros) / (2.0 * ANGLES_SIGMA_RAD.powi(2));
+        for ((from, to), weight) in points.iter().zip(&self.weights) {
+            sum += (weight / information_of(self.sigma_m)) * (to - centres.1) * (from - centres.0).transpose();
+        }
+        let rotation = nearest_rotation(&sum)?;
+        let shift_m = centres.1 - rotation * centres.0;
+        let residuals_m: Vec<f64> = points.iter().map(|(from, to)| (to - rotation * from - shift_m).norm()).collect();
+        let mut sorted = residuals_m.clone();
+        sorted.sort_by(f64::total_cmp);
+        let sigma_m = (sorted.get(sorted.len() / 2)? / MEDIAN_LENGTH).max(SIGMA_MIN_M);
+        let weights = residuals_m.iter().map(|residual_m| 1.0 / (1.0 + (residual_m / (LIMIT * sigma_m)).powi(2))).collect();
+        Some(Self { rotation, shift_m, sigma_m, weights })
+    }
+
+    /// Standard deviation of the turn about the axis that is known least, rad.
+    fn turn_sigma_rad(&self, points: &[PointPair], with_angles: bool) -> f64 {
+        let (centre, _) = centres(points, &self.weights);
+        let mut information = if with_angles { Matrix3::identity() / ANGLES_SIGMA_RAD.powi(2) } else { Matrix3::zeros() };
+        for ((from, _), weight) in points.iter().zip(&self.weights) {
+            let arm = from - centre;
+            information += (weight / information_of(self.sigma_m)) * (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose());
+        }
+        let least = SymmetricEigen::new(information).eigenvalues.min();
+        if least > 0.0 { least.sqrt().recip().min(std::f64::consts::PI) } else { std::f64::consts::PI }
+    }
+}
+
+/// What a fix's square is divided by.
+fn information_of(sigma_m: f64) -> f64 {
+    sigma_m * sigma_m * CORRELATED_FIXES
+}
+
+fn angle_rad(rotation: &Matrix3<f64>) -> f64 {
+    ((rotation.trace() - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
+}
+
+fn centres(points: &[PointPair], weights: &[f64]) -> PointPair {
+    let total: f64 = weights.iter().sum();
+    let sum = |of: fn(&PointPair) -> Vector3<f64>| {
+        points.iter().zip(weights).fold(Vector3::zeros(), |sum, (point, weight)| sum + of(point) * *weight) / total
+    };
+    (sum(|point| point.0), sum(|point| point.1))
+}
+
+/// Where the map lies, or why the frames do not say.
+fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, String> {
+    if frames.len() < FIXES_MIN {
+        return Err(format!("{} frames with a fix are less than {FIXES_MIN}", frames.len()));
+    }
+    let points: Vec<_> = frames.iter().map(|of| (Vector3::from(of.t_map_camera.transform_point(antenna_m)), of.at_m)).collect();
+    let turned = frames.iter().filter_map(|of| Some(of.axes? * Matrix3::from(of.t_map_camera.rotation_matrix())));
+    let axes = turned.clone().next().and_then(|_| nearest_rotation(&turned.sum()));
+    let unclear = || "its positions are not finite".to_owned();
+    let by_positions = Estimate::of(&points, None).ok_or_else(unclear)?;
+    let estimate = Estimate::of(&points, axes.as_ref()).ok_or_else(unclear)?;
+    let off_rad = axes.map_or(0.0, |axes| angle_rad(&(axes.transpose() * by_positions.rotation)));
+    if off_rad > CONTRADICTION_MAX_RAD && by_positions.turn_sigma_rad(&points, false) < TURN_MAX_RAD {
+        return Err(format!(
+            "its angles contradict its positions by {:.0} degrees. The camera must look along the vehicle",
+            off_rad.to_degrees()
+        ));
+    }
+    let (position_m, rotation_rad) = (estimate.sigma_m, estimate.turn_sigma_rad(&points, axes.is_some()));
+    if position_m > SIGMA_MAX_M {
+        return Err(format!(
+            "its fixes are {position_m:.0} m off its path (one standard deviation; at most {SIGMA_MAX_M}). Give those of this recording"
+        ));
+    }
+    if rotation_rad > TURN_MAX_RAD {
+        let [found, most] = [rotation_rad, TURN_MAX_RAD].map(f64::to_degrees);
+        return Err(format!(
+            "its turn is known to {found:.1} degrees only (one standard deviation; at most {most:.1}), for the path is short, nearly straight, or its \
+             fixes are noisy. Give roll, pitch and yaw with the fixes, or t_world_camera"
+        ));
+    }
+    let rows = estimate.rotation.transpose().into();
+    let t_world_map = Transform::from_rotation_matrix(&rows, estimate.shift_m.into()).normalized();
+    Ok(Prior {
+        t_world_map,
+        // The error of a receiver lasts longer than a recording: its mean over the path is no surer than one fix.
+        uncertainty: Some(Uncertainty { position_m, rotation_rad }),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers between -1 and 1.
+    struct Noise(u64);
+
+    impl Noise {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 33) as f64 / f64::from(1u32 << 30) - 1.0
+        }
+
+        /// About normally distributed, with a standard deviation.
+        fn vector(&mut self, sigma: f64) -> Vector3<f64> {
+            Vector3::from_fn(|_, _| (0..12).map(|_| self.next()).sum::<f64>() * 0.5 * sigma)
+        }
+    }
+
+    const ANTENNA_M: [f64; 3] = [0.3, -0.9, -1.1];
+
+    fn world() -> Transform {
+        Transform::new([0.02, 2.1, -0.03], [310.0, -4.0, -95.0])
+    }
+
+    /// 300 frames along a path of 240 m whose direction swings by some degrees; every eighth fix is reflected by a house.
+    fn observed(bend_rad: f64, step_m: f64, sigma_m: f64, angles_off_rad: Option<f64>) -> Vec<Observation> {
+        let (mut noise, mut at_m) = (Noise(7), [0.0; 3]);
+        let frame = |nth: usize| {
+            let (sine, cosine) = (f64::from(nth as u32) * 0.03).sin_cos();
+            let t_map_camera = Transform::new([0.3 * bend_rad * cosine, bend_rad * sine, 0.0], at_m);
+            let ahead = t_map_camera.rotate([0.0, 0.0, step_m]);
+            (0..3).for_each(|axis| at_m[axis] += ahead[axis]);
+            let t_world_camera = world() * t_map_camera;
+            let reflected = if nth % 8 == 3 { noise.vector(25.0) } else { Vector3::zeros() };
+            let at_m = Vector3::from(t_world_camera.transform_point(ANTENNA_M)) + noise.vector(sigma_m) + reflected;
+            let off = |by: f64| Transform::new([0.0, by, 0.0], [0.0; 3]) * t_world_camera;
+            Observation {
+                t_map_camera,
+                at_m,
+                axes: angles_off_rad.map(|by| Matrix3::from(off(by).rotation_matrix()).transpose()),
+            }
+        };
+        (0..300).map(frame).collect()
+    }
+
+    fn error(found: &Prior, at_m: [f64; 3]) -> (f64, f64) {
+        let apart = Vector3::from(found.t_world_map.transform_point(at_m)) - Vector3::from(world().transform_point(at_m));
+        (apart.norm(), (found.t_world_map.inverse() * world()).angle_rad())
+    }
+
+    #[test]
+    fn a_bent_path_lies_where_its_fixes_say_within_the_stated_error() {
+        let frames = observed(0.6, 0.8, 0.4, None);
+        let found = georeference(&frames, ANTENNA_M).unwrap();
+        let stated = found.uncertainty.unwrap();
+        let (off_m, turned_rad) = error(&found, frames[150].t_map_camera.translation_m);
+        assert!((0.3..0.5).contains(&stated.position_m), "{stated:?}");
+        assert!(off_m < stated.position_m && turned_rad < 2.0 * stated.rotation_rad, "{off_m} m, {turned_rad} rad, {stated:?}");
+        let exact = georeference(&observed(0.6, 0.8, 0.0, None), ANTENNA_M).unwrap();
+        let (off_m, turned_rad) = error(&exact, [0.0; 3]);
+        assert!(off_m < 0.01 && turned_rad < 1e-4, "reflected fixes alone: {off_m} m, {turned_rad} rad");
+        assert!(error(&georeference(&frames, [0.0; 3]).unwrap(), [0.0; 3]).0 > 0.5, "the antenna counts");
+    }
+
+    #[test]
+    fn a_straight_or_short_path_is_refused_unless_angles_are_given() {
+        for (bend_rad, step_m) in [(0.0, 0.8), (0.6, 0.002)] {
+            let refused = georeference(&observed(bend_rad, step_m, 0.4, None), ANTENNA_M).unwrap_err();
+            assert!(refused.contains("degrees only") && refused.contains("Give roll, pitch and yaw"), "{refused}");
+            let found = georeference(&observed(bend_rad, step_m, 0.4, Some(0.01)), ANTENNA_M).unwrap();
+            let (off_m, turned_rad) = error(&found, [0.0; 3]);
+            assert!(off_m < 0.5 && turned_rad < 0.02, "{off_m} m, {turned_rad} rad");
+        }
+        let few = georeference(&observed(0.6, 0.8, 0.4, None)[..9], ANTENNA_M).unwrap_err();
+        assert!(few.contains("9 frames with a fix are less than 10"), "{few}");
+        let turned = |bend_rad: f64| georeference(&observed(bend_rad, 0.8, 0.4, Some(1.5)), ANTENNA_M).unwrap_err();
+        assert!(turned(0.6).contains("contradict its positions by 8"), "{}", turned(0.6));
+        assert!(turned(0.0).contains("m off its path"), "{}", turned(0.0));
+    }
+
+    #[test]
+    fn a_vehicle_that_heads_north_has_the_axes_of_the_world() {
+        let north = camera_axes([0.0, 0.0, std::f64::consts::FRAC_PI_2]);
+        assert!((north - Matrix3::identity()).norm() < 1e-12, "{north}");
+        let nose_down = camera_axes([0.0, 0.1, std::f64::consts::FRAC_PI_2]) * Vector3::z();
+        assert!((nose_down - Vector3::new(0.0, 0.1f64.sin(), 0.1f64.cos())).norm() < 1e-12, "positive with the nose down: {nose_down}");
+        let left_up = camera_axes([0.1, 0.0, std::f64::consts::FRAC_PI_2]) * Vector3::x();
+        assert!((left_up - Vector3::new(0.1f64.cos(), 0.1f64.sin(), 0.0)).norm() < 1e-12, "positive with the left side up: {left_up}");
+    }
+}
