@@ -41,6 +41,8 @@ pub struct Camera {
 pub struct CameraPose {
     /// Number of the frame in the data set.
     pub frame: usize,
+    /// Segment of the map: another one begins above where the camera was lost.
+    pub segment: u32,
     /// The camera in the map.
     pub t_map_camera: Transform,
 }

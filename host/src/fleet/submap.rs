@@ -1,5 +1,7 @@
 //! What is kept of a run: its blocks in its own lattice, and the path of its camera.
 //!
+//! Where the camera was lost, a run begins another segment of its map high above, whose place is not known: only the first segment is kept.
+//!
 //! Values are taken over as they are: a map is carried into the world once, when it is known where it lies. A folder holds `map.blocks`, and
 //! `submap.json`, whose checksum covers every record: a map that was changed or cut off is refused.
 
@@ -31,6 +33,8 @@ struct Head {
     position: Position,
     /// Number of the frame in the data set, and the rows of the camera in the map.
     cameras: Vec<(usize, [f64; 12])>,
+    /// Frames of later segments.
+    left_out_frames: usize,
 }
 
 /// A run's map in its own lattice.
@@ -84,10 +88,32 @@ pub fn blocks(store: &mut BlockFile<File>) -> Vec<BlockCoord> {
     store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect()
 }
 
-/// Keeps the newest record of each block of a run in a new folder, and the blocks that its camera saw to be free. Returns their number.
+/// The first segment of a run's map.
+struct FirstSegment {
+    camera: Camera,
+    left_out_frames: usize,
+    /// Blocks are of later segments where their y, which points down, is less.
+    top: i16,
+}
+
+impl FirstSegment {
+    /// `None` where segments lie at one height.
+    fn of(camera: &Camera, block_m: f64) -> Option<Self> {
+        let (first, later): (Vec<CameraPose>, Vec<CameraPose>) = camera.poses.iter().partition(|pose| pose.segment == 0);
+        let height = |pose: &CameraPose| pose.t_map_camera.translation_m[1];
+        let top_m = first.iter().map(height).fold(f64::INFINITY, f64::min);
+        let bottom_m = later.iter().map(height).fold(f64::NEG_INFINITY, f64::max);
+        let top = if later.is_empty() { i16::MIN } else { (0.5 * (top_m + bottom_m) / block_m).floor() as i16 };
+        let camera = Camera { poses: first, ..*camera };
+        (bottom_m < top_m).then_some(Self { camera, left_out_frames: later.len(), top })
+    }
+}
+
+/// Keeps the newest record of each block of a run's first segment in a new folder, and the blocks that its camera saw to be free. Returns their
+/// number.
 ///
 /// # Errors
-/// The folder exists, a block cannot be read, or the disk refuses. Nothing half-written stays behind.
+/// The folder exists, a block cannot be read, segments cannot be told apart, or the disk refuses. Nothing half-written stays behind.
 pub fn keep(store: &mut BlockFile<File>, lattice: &Lattice, camera: &Camera, out: &Path) -> Result<u64, FleetError> {
     if out.exists() {
         return Err(FleetError::Exists { path: out.to_path_buf() });
@@ -96,7 +122,11 @@ pub fn keep(store: &mut BlockFile<File>, lattice: &Lattice, camera: &Camera, out
     std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
     let path = draft.path().join(BLOCKS_FILE);
     let (mut kept, _) = BlockFile::open(&path, lattice.voxel_size_m, lattice.truncation_m)?;
-    for coord in blocks(store) {
+    let apart = FirstSegment::of(camera, f64::from(lattice.voxel_size_m) * BLOCK_SIDE as f64);
+    let FirstSegment { camera, left_out_frames, top } = apart.ok_or_else(|| {
+        FleetError::content(out, "is not made: the camera was lost, and climbed where the map went on. End the run before, with --frames")
+    })?;
+    for coord in blocks(store).into_iter().filter(|coord| coord.y >= top) {
         let source = Source::load(store, coord, lattice.colour)
             .ok_or_else(|| FleetError::content(out, format!("is not made: block {coord:?} of the run cannot be read")))?;
         let block = EvictedBlock {
@@ -111,7 +141,7 @@ pub fn keep(store: &mut BlockFile<File>, lattice: &Lattice, camera: &Camera, out
     }
     let field = DistanceField::of(&mut kept, lattice, 1);
     let colour = lattice.colour.then(|| Box::new([[0; BLOCK_VOXELS]; 3]));
-    for (coord, views) in free_blocks(&field, camera).into_iter().filter(|(coord, _)| !field.holds(*coord)) {
+    for (coord, views) in free_blocks(&field, &camera).into_iter().filter(|(coord, _)| !field.holds(*coord)) {
         let (sdf, weight) = ([i16::MAX; BLOCK_VOXELS], [views; BLOCK_VOXELS]);
         if !kept.store(EvictedBlock { coord, sdf: &sdf, weight: &weight, colour: colour.as_deref() }) {
             return Err(not_stored(&kept, &path));
@@ -123,6 +153,7 @@ pub fn keep(store: &mut BlockFile<File>, lattice: &Lattice, camera: &Camera, out
         colour: lattice.colour,
         position: kept.position().map_err(FleetError::io(&path))?,
         cameras: camera.poses.iter().map(|of| (of.frame, rows_of(&of.t_map_camera))).collect(),
+        left_out_frames,
     };
     let text = serde_json::to_string(&head).unwrap_or_default();
     let head_path = draft.path().join(HEAD_FILE);
@@ -149,14 +180,24 @@ impl Submap {
         Ok(Self { lattice: Lattice { voxel_size_m, truncation_m, colour }, store })
     }
 
-    /// Where the camera of the map in a folder was.
+    /// Where the camera of the map in a folder was, in frames of its segment.
     ///
     /// # Errors
     /// The folder is no map.
     pub fn cameras(folder: &Path) -> Result<Vec<CameraPose>, FleetError> {
-        let camera = |(frame, rows): (usize, [f64; 12])| Some(CameraPose { frame, t_map_camera: transform(&rows)? });
+        let camera = |(frame, rows): (usize, [f64; 12])| Some(CameraPose { frame, segment: 0, t_map_camera: transform(&rows)? });
         let cameras = Head::read(folder)?.cameras.into_iter().map(camera).collect::<Option<_>>();
         cameras.ok_or_else(|| FleetError::content(folder, "is damaged. Remove the folder and make it again"))
+    }
+}
+
+impl Submap {
+    /// Frames of the run whose place in the map in a folder is not known, for the camera was lost before.
+    ///
+    /// # Errors
+    /// The folder is no map.
+    pub fn left_out_frames(folder: &Path) -> Result<usize, FleetError> {
+        Ok(Head::read(folder)?.left_out_frames)
     }
 }
 
@@ -184,7 +225,7 @@ mod tests {
         let lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: false };
         let out = root.path().join("map");
         let rig = StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
-        let pose = CameraPose { frame: 7, t_map_camera: Transform::from_translation([1.0, 2.0, 3.0]) };
+        let pose = CameraPose { frame: 7, segment: 0, t_map_camera: Transform::from_translation([1.0, 2.0, 3.0]) };
         let camera = Camera { rig, size: (100, 40), poses: vec![pose] };
         assert_eq!(keep(&mut store, &lattice, &camera, &out).unwrap(), 2);
         assert!(matches!(keep(&mut store, &lattice, &camera, &out), Err(FleetError::Exists { .. })));
@@ -201,5 +242,28 @@ mod tests {
             std::fs::write(&path, bytes).unwrap();
             assert!(Submap::open(&out).err().unwrap().to_string().contains("is damaged"), "byte {at}");
         }
+    }
+
+    #[test]
+    fn only_the_first_segment_of_a_map_is_kept() {
+        let root = tempfile::TempDir::new().unwrap();
+        let (mut store, _) = BlockFile::open(&root.path().join("run.blocks"), 0.1, 0.5).unwrap();
+        // Blocks of 0.8 m: one about the camera, one 30 m above it on a hill, one about the camera 100 m up.
+        for y in [1, -37, -120] {
+            let (sdf, weight) = ([-7; BLOCK_VOXELS], [9; BLOCK_VOXELS]);
+            assert!(store.store(EvictedBlock { coord: BlockCoord { x: 3, y, z: 0 }, sdf: &sdf, weight: &weight, colour: None }));
+        }
+        let lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: false };
+        let rig = StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
+        let pose =
+            |frame: usize, segment: u32, y: f64| CameraPose { frame, segment, t_map_camera: Transform::from_translation([0.0, y, 0.0]) };
+        let camera = |poses: &[CameraPose]| Camera { rig, size: (100, 40), poses: poses.to_vec() };
+        let two = [pose(0, 0, 0.0), pose(1, 0, -2.0), pose(2, 1, -98.0)];
+        let out = root.path().join("map");
+        assert_eq!(keep(&mut store, &lattice, &camera(&two), &out).unwrap(), 2);
+        assert_eq!((Submap::cameras(&out).unwrap().len(), Submap::left_out_frames(&out).unwrap()), (2, 1));
+        let mixed = keep(&mut store, &lattice, &camera(&[pose(0, 0, 0.0), pose(1, 1, 1.0)]), &root.path().join("mixed"));
+        assert!(mixed.unwrap_err().to_string().contains("the camera was lost, and climbed"));
+        assert!(!root.path().join("mixed").exists());
     }
 }

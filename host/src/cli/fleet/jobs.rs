@@ -2,9 +2,10 @@
 
 use super::{Shard, each};
 use crate::cli::run::plan_of;
-use crate::fleet::{self, Camera, CameraPose, Identity, Job, JobState, Lattice, Manifest, Recordings};
+use crate::fleet::{self, Camera, CameraPose, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap};
 use crate::formats::read_poses;
 use crate::observe::tables::read_frame_digests;
+use crate::report::text::counted;
 use crate::run::store::BlockFile;
 use crate::run::{BLOCKS_FILE, Plan, RunManifest, stereo_frame};
 use anyhow::{Context, bail};
@@ -52,7 +53,7 @@ pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
     each(manifest.shard(shard.index, shard.of).map(|job| (job, ())), "done", |job, ()| {
         if job.state(folder) != JobState::Done {
             map(folder, job)?;
-            outln!("{} is done", job.name);
+            outln!("{} is {}", job.name, state(folder, job));
             if let Some(of) = fleet::prior(job, folder)?.uncertainty {
                 let turn_deg = of.rotation_rad.to_degrees();
                 outln!("{} lies along its fixes, with standard deviations of {:.2} m and {turn_deg:.2} degrees", job.name, of.position_m);
@@ -102,21 +103,38 @@ fn map(folder: &Path, job: &Job) -> anyhow::Result<()> {
 fn cameras(run_folder: &Path) -> anyhow::Result<Vec<CameraPose>> {
     let poses = read_poses(&run_folder.join(TRAJECTORY_FILE))?.poses;
     let rows = read_frame_digests(&std::fs::read_to_string(run_folder.join(FRAMES_FILE))?)?;
-    Ok(rows.iter().zip(poses).map(|(row, t_map_camera)| CameraPose { frame: row.frame, t_map_camera }).collect())
+    Ok(rows.iter().zip(poses).map(|(row, t_map_camera)| CameraPose { frame: row.frame, segment: row.segment, t_map_camera }).collect())
+}
+
+/// What became of a job, in words.
+fn state(folder: &Path, job: &Job) -> String {
+    match (job.state(folder), left_out(folder, job)) {
+        (JobState::Done, 1..) => format!("done; {} after the camera was lost are left out", counted(left_out(folder, job), "frame")),
+        (state, _) => word(state).to_owned(),
+    }
+}
+
+const fn word(state: JobState) -> &'static str {
+    match state {
+        JobState::Done => "done",
+        JobState::Started => "started",
+        JobState::Open => "open",
+    }
+}
+
+/// Frames of a job's map whose place in it is not known.
+fn left_out(folder: &Path, job: &Job) -> usize {
+    Submap::left_out_frames(&job.submap(folder)).unwrap_or_default()
 }
 
 pub fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
     let manifest = Manifest::read(folder)?;
-    let word = |job: &Job| match job.state(folder) {
-        JobState::Done => "done",
-        JobState::Started => "started",
-        JobState::Open => "open",
-    };
     if json {
         let poses = fleet::poses(&manifest, folder)?;
         let rows = manifest.jobs.iter().zip(&poses).map(|(job, pose)| {
             serde_json::json!({
-                "name": job.name, "id": job.id, "bytes": job.bytes, "state": word(job),
+                "name": job.name, "id": job.id, "bytes": job.bytes, "state": word(job.state(folder)),
+                "left_out_frames": left_out(folder, job),
                 "sums": pose.as_ref().ok().map(|pose| job.sums(folder, pose)),
             })
         });
@@ -124,6 +142,6 @@ pub fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
         return Ok(());
     }
     outln!("{:<24}{:<20}{:>14}  state", "recording", "id", "memory, MiB");
-    manifest.jobs.iter().for_each(|job| outln!("{:<24}{:<20}{:>14}  {}", job.name, job.id, job.bytes >> 20, word(job)));
+    manifest.jobs.iter().for_each(|job| outln!("{:<24}{:<20}{:>14}  {}", job.name, job.id, job.bytes >> 20, state(folder, job)));
     Ok(())
 }

@@ -114,6 +114,9 @@ struct DigestColumns {
 pub struct FrameDigests {
     /// Number of the frame in the data set.
     pub frame: usize,
+    /// Segment of the map.
+    #[serde(default)]
+    pub segment: u32,
     /// Digest of all stages.
     pub digest: String,
     /// Digest of the decoded input.
