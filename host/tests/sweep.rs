@@ -1,4 +1,4 @@
-//! A sweep as a user meets it: interrupted, resumed, divided into shards.
+//! A sweep as a user meets it: interrupted, resumed, divided into shares.
 #![allow(missing_docs)]
 
 mod binary;
@@ -55,7 +55,7 @@ fn kill_after_two_results(root: &Path, out: &str) {
 }
 
 #[test]
-fn a_killed_sweep_resumes_and_merged_shards_equal_the_whole() {
+fn a_killed_sweep_resumes_and_merged_shares_equal_the_whole() {
     let root = TempDir::new().unwrap();
     let results = |out: &str| results(&root.path().join(out));
     kill_after_two_results(root.path(), "cut");
@@ -69,10 +69,20 @@ fn a_killed_sweep_resumes_and_merged_shards_equal_the_whole() {
     assert_eq!(results("cut").len(), 7, "two late, two scales, tracker, no objects and motion");
     assert_eq!(names(&root.path().join("cut")), ["methods.csv", "plan.json", "prune-weight.csv", "report.html", "runs", "scale.csv"]);
     assert!(names(&root.path().join("cut/runs")).iter().all(|name| name.ends_with(".json")), "only its result stays of a run");
-    for part in ["1/2", "2/2"] {
-        let run = dynvox(root.path(), &[&SWEEP[..], &[&part[..1], "--shard", part]].concat());
-        assert!(run.status.success() && results(&part[..1]).len() >= 3, "{}", output_text(&run));
+    for (machine, share) in [("1", "0/2"), ("2", "1/2")] {
+        let planned = dynvox(root.path(), &[&SWEEP[..], &[machine, "--plan"]].concat());
+        assert!(planned.stdout.starts_with(b"7 jobs in ") && results(machine).is_empty(), "{}", output_text(&planned));
+        let run = dynvox(root.path(), &["fleet", "run", machine, "--shard", share]);
+        assert!(run.status.success() && results(machine).len() >= 3, "{}", output_text(&run));
+        let again = dynvox(root.path(), &["fleet", "run", machine, "--shard", share]);
+        assert!(again.status.success() && again.stdout.is_empty(), "what is done is left alone");
+        let status: serde_json::Value =
+            serde_json::from_slice(&dynvox(root.path(), &["fleet", "status", machine, "--json"]).stdout).unwrap();
+        let done = status.as_array().unwrap().iter().filter(|job| job["state"] == "done" && job["bytes"].as_u64() > Some(1 << 20));
+        assert_eq!(done.count(), results(machine).len(), "{status}");
     }
+    let merged = dynvox(root.path(), &["fleet", "resample", "1"]);
+    assert!(output_text(&merged).contains("which keep no maps"), "{}", output_text(&merged));
     let merged = dynvox(root.path(), &["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
     assert!(merged.status.success(), "{}", output_text(&merged));
     for table in ["prune-weight.csv", "scale.csv", "methods.csv"] {

@@ -1,6 +1,6 @@
 //! `dynvox fleet`.
 
-mod jobs;
+pub mod jobs;
 mod world;
 
 use crate::fleet::{Job, Uncertainty};
@@ -100,9 +100,9 @@ enum Action {
 
 /// Every `of`-th job from `index` on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Shard {
-    index: usize,
-    of: usize,
+pub struct Shard {
+    pub index: usize,
+    pub of: usize,
 }
 
 impl std::str::FromStr for Shard {

@@ -1,6 +1,8 @@
 //! `dynvox sweep`.
 
+use super::fleet::jobs;
 use super::run::{self, RunArgs};
+use crate::fleet::{Job, Manifest};
 use crate::input::{self, OpenOptions};
 use crate::sweep::{Data, Kind, Plan, Results, RunResult, SweepFolder, SweepRequest, merge};
 use anyhow::{Context, bail};
@@ -44,11 +46,11 @@ pub struct SweepArgs {
     /// One setting of every run; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Run only part I of N, one on each machine; --merge combines the folders
-    #[arg(long, value_name = "I/N", value_parser = part_of)]
-    shard: Option<(usize, usize)>,
-    /// Merge the folders of several parts into --out, without a run
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["data", "shard"])]
+    /// Run nothing: make jobs in --out, each with its bytes of memory, which dynvox fleet run does in shares; --merge draws the page
+    #[arg(long)]
+    plan: bool,
+    /// Merge the folders of several machines into --out, without a run; --out may be one of them
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["data", "plan"])]
     merge: Vec<PathBuf>,
     /// Folder for results, tables and report.html; an interrupted sweep continues there
     #[arg(long, default_value = "out/sweep", value_name = "DIR")]
@@ -59,11 +61,6 @@ pub struct SweepArgs {
     /// Show no progress
     #[arg(long)]
     quiet: bool,
-}
-
-fn part_of(text: &str) -> Result<(usize, usize), String> {
-    let parts = text.split_once('/').and_then(|(part, parts)| Some((part.parse().ok()?, parts.parse().ok()?)));
-    parts.filter(|(part, parts)| (1..=*parts).contains(part)).ok_or_else(|| "must be I/N with I from 1 to N, as in 2/3".to_owned())
 }
 
 pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
@@ -88,20 +85,18 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         common: args.common(),
     });
     let folder = SweepFolder::open(&args.out, &plan)?;
-    let (part, parts) = args.shard.unwrap_or((1, 1));
-    let share = plan.share(part, parts);
-    for (at, key) in share.iter().enumerate() {
-        if folder.result(key).is_file() {
-            continue;
-        }
-        let (Some(arguments), Some(one)) = (plan.runs.get(*key), data_of(&plan, key, &labels).and_then(|at| data.get(at))) else {
-            continue;
-        };
+    let keys = plan.keys();
+    let line = |key: &str| Some(args.line(data.get(data_of(&plan, key, &labels)?)?, plan.runs.get(key)?));
+    if args.plan {
+        let job = |key: &&str| jobs::of_figures(key, line(key).unwrap_or_default(), SweepFolder::result_below(key));
+        return jobs::write(&Manifest::of(keys.iter().map(job).collect::<anyhow::Result<_>>()?), &args.out);
+    }
+    for (at, key) in keys.iter().enumerate() {
+        let Some(line) = line(key).filter(|_| !folder.result(key).is_file()) else { continue };
         if !args.quiet && !args.json {
-            eprintln!("run {} of {}: {} {}", at + 1, share.len(), one.label(), arguments.join(" "));
+            eprintln!("run {} of {}: {}", at + 1, keys.len(), line.join(" "));
         }
-        let result = make(args, one, arguments, &folder.scratch_dir(key)).with_context(|| format!("run {key} ended"))?;
-        result.write(&folder.result(key))?;
+        figures(&folder, &plan, key, &line)?.write(&folder.result(key))?;
         // The page is written after every run, so that an interrupted sweep has one, too.
         folder.draw(&plan, &folder.results(&plan)?)?;
     }
@@ -120,6 +115,14 @@ impl SweepArgs {
         common.extend(self.set.iter().flat_map(|set| ["--set".to_owned(), set.clone()]));
         common
     }
+
+    /// Arguments of `dynvox run` for one run.
+    fn line(&self, data: &Data, arguments: &[String]) -> Vec<String> {
+        let path = data.path.iter().map(|path| path.display().to_string());
+        let sequence = data.sequence.iter().flat_map(|sequence| ["--sequence".to_owned(), sequence.clone()]);
+        let threads = self.threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]);
+        path.chain(sequence).chain(threads).chain(arguments.iter().cloned()).collect()
+    }
 }
 
 /// The reference that a data set has.
@@ -135,15 +138,19 @@ fn data_of(plan: &Plan, key: &str, labels: &[String]) -> Option<usize> {
     labels.iter().position(|label| *label == point.data)
 }
 
-/// Runs once. Only the result remains.
-fn make(args: &SweepArgs, data: &Data, arguments: &[String], scratch_dir: &Path) -> anyhow::Result<RunResult> {
-    let mut line = vec!["dynvox".to_owned(), "--quiet".to_owned()];
-    line.extend(data.path.iter().map(|path| path.display().to_string()));
-    line.extend(data.sequence.iter().flat_map(|sequence| ["--sequence".to_owned(), sequence.clone()]));
-    line.extend(args.threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]));
-    line.extend_from_slice(arguments);
-    let record = run::record(&RunArgs::parse(&line)?, scratch_dir)?;
-    Ok(RunResult::of(arguments, &record)?)
+/// Runs once, with these arguments. Only the result remains.
+fn figures(folder: &SweepFolder, plan: &Plan, key: &str, line: &[String]) -> anyhow::Result<RunResult> {
+    let result = || -> anyhow::Result<RunResult> {
+        let record = run::record(&RunArgs::parse(&jobs::quiet_line(line))?, &folder.scratch_dir(key))?;
+        Ok(RunResult::of(plan.runs.get(key).context("it is of no point of the sweep")?, &record)?)
+    };
+    result().with_context(|| format!("run {key} ended"))
+}
+
+/// Does the run of a job in the folder of a sweep.
+pub fn figures_of(folder: &Path, job: &Job) -> anyhow::Result<RunResult> {
+    let folder = SweepFolder::of(folder);
+    figures(&folder, &folder.plan()?, &job.name, &job.arguments)
 }
 
 fn print_result(args: &SweepArgs, plan: &Plan, results: &Results, page: &Path) -> anyhow::Result<()> {

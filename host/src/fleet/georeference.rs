@@ -70,6 +70,9 @@ pub fn prior(job: &Job, folder: &Path) -> Result<Prior, FleetError> {
             return Ok(Prior { t_world_map, uncertainty: None });
         }
         Given::Gnss { file, antenna_m, origin } => (file, antenna_m, origin),
+        Given::Figures(_) => {
+            return Err(FleetError::content(folder, "has the jobs of a sweep, which keep no maps. Draw them with `dynvox sweep --merge`"));
+        }
     };
     let fixes = read_gnss(gnss)?;
     let cameras = Submap::cameras(&job.submap(folder))?;

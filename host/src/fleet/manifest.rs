@@ -45,12 +45,14 @@ pub enum Given {
         /// Latitude and longitude, degrees, and altitude, m, of the world's origin.
         origin: [f64; 3],
     },
+    /// Nowhere: the run's figures are wanted, as this file below the folder of the jobs, and no map.
+    Figures(PathBuf),
 }
 
 /// What became of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JobState {
-    /// Its map is there.
+    /// Its map or its figures are there.
     Done,
     /// A run was started: it goes on, or ended early.
     Started,
@@ -100,20 +102,19 @@ impl Manifest {
             let Recording { name, arguments, epoch, .. } = recording;
             let arguments: Vec<String> = arguments.iter().chain(&recordings.arguments).cloned().collect();
             let identity = identify(&arguments)?;
-            let id = id(&arguments, identity.digest);
-            if let Some(same) = jobs.iter().find(|job| job.id == id) {
+            let given = recording.given(origin, identity.first_pose.as_ref()).map_err(|reason| FleetError::content(path, reason))?;
+            let job = Job { epoch: *epoch, ..Job::new(name, arguments, &identity, given) };
+            if let Some(same) = jobs.iter().find(|other| other.id == job.id) {
                 return Err(FleetError::content(path, format!("has one recording twice: {} is {name}. Remove one", same.name)).into());
             }
-            jobs.push(Job {
-                name: name.clone(),
-                id,
-                arguments,
-                given: recording.given(origin, identity.first_pose.as_ref()).map_err(|reason| FleetError::content(path, reason))?,
-                epoch: *epoch,
-                bytes: identity.bytes,
-            });
+            jobs.push(job);
         }
-        Ok(Self { program: program(), jobs })
+        Ok(Self::of(jobs))
+    }
+
+    /// Jobs planned by this program.
+    pub fn of(jobs: Vec<Job>) -> Self {
+        Self { program: program(), jobs }
     }
 
     /// Reads the jobs in a folder.
@@ -151,6 +152,18 @@ impl Manifest {
 }
 
 impl Job {
+    /// Of a run of some arguments, and what is wanted of it.
+    pub fn new(name: &str, arguments: Vec<String>, identity: &Identity, given: Given) -> Self {
+        Self {
+            name: name.to_owned(),
+            id: id(&arguments, identity.digest),
+            arguments,
+            given,
+            epoch: 0,
+            bytes: identity.bytes,
+        }
+    }
+
     /// Whether settings and images are those it was planned with.
     pub fn is_of(&self, digest: u64) -> bool {
         self.id == id(&self.arguments, digest)
@@ -179,7 +192,11 @@ impl Job {
     pub fn state(&self, folder: &Path) -> JobState {
         let run = self.run_folder(folder);
         let started = run.exists() || run.with_file_name(format!(".{}.partial", self.id)).exists();
-        match (self.submap(folder).is_dir(), started) {
+        let is_done = match &self.given {
+            Given::Figures(file) => folder.join(file).is_file(),
+            Given::TWorldCamera(_) | Given::Gnss { .. } => self.submap(folder).is_dir(),
+        };
+        match (is_done, started) {
             (true, _) => JobState::Done,
             (false, true) => JobState::Started,
             (false, false) => JobState::Open,

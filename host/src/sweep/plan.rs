@@ -1,6 +1,7 @@
 //! Which runs a sweep is made of. Points of different sweeps that mean the same run share it.
 
 use dynvox_core::digest::Digest;
+use dynvox_core::mapper::snapshot;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -143,6 +144,9 @@ impl Plan {
                     }
                     let label = data.label();
                     let mut digest = Digest::default();
+                    // Figures of another version are not taken over.
+                    digest.bytes(env!("CARGO_PKG_VERSION").as_bytes());
+                    digest.u64(snapshot::VERSION.into());
                     arguments.iter().for_each(|argument| digest.bytes(argument.as_bytes()));
                     let run = format!("{label}-{:016x}", digest.finish());
                     plan.points.push(Point { kind, data: label, value, run: run.clone() });
@@ -153,15 +157,15 @@ impl Plan {
         plan
     }
 
-    /// Keys of the runs, in the order in which points need them, for part `part` of `parts` (from 1).
-    pub fn share(&self, part: usize, parts: usize) -> Vec<&str> {
+    /// Keys of the runs, in the order in which points need them.
+    pub fn keys(&self) -> Vec<&str> {
         let mut keys: Vec<&str> = Vec::new();
         for point in &self.points {
             if !keys.contains(&point.run.as_str()) {
                 keys.push(&point.run);
             }
         }
-        keys.into_iter().skip(part - 1).step_by(parts).collect()
+        keys
     }
 
     /// The points of one sweep on one data set.

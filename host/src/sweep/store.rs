@@ -37,6 +37,11 @@ impl SweepFolder {
         Ok(folder)
     }
 
+    /// The folder of a plan that is there.
+    pub fn of(root: &Path) -> Self {
+        Self { root: root.to_path_buf() }
+    }
+
     /// The plan in the folder.
     ///
     /// # Errors
@@ -49,7 +54,12 @@ impl SweepFolder {
 
     /// Where the result of a run is or will be.
     pub fn result(&self, key: &str) -> PathBuf {
-        self.root.join("runs").join(format!("{key}.json"))
+        self.root.join(Self::result_below(key))
+    }
+
+    /// The same, below the folder.
+    pub fn result_below(key: &str) -> PathBuf {
+        Path::new("runs").join(format!("{key}.json"))
     }
 
     /// Scratch directory of a run.
@@ -96,7 +106,7 @@ impl SweepFolder {
 pub fn merge(parts: &[PathBuf], target: &Path) -> Result<(Plan, SweepFolder, Results), SweepError> {
     let mut merged: Option<(Plan, Results)> = None;
     for root in parts {
-        let part = SweepFolder { root: root.clone() };
+        let part = SweepFolder::of(root);
         let plan = part.plan()?;
         let results = part.results(&plan)?;
         let Some((first, all)) = &mut merged else {

@@ -1,8 +1,8 @@
 //! Jobs: made, done, listed.
 
 use super::{Shard, each};
-use crate::cli::run::plan_of;
-use crate::fleet::{self, Camera, CameraPose, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap};
+use crate::cli::{run::plan_of, sweep};
+use crate::fleet::{self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap};
 use crate::formats::read_poses;
 use crate::observe::tables::read_frame_digests;
 use crate::report::text::counted;
@@ -10,7 +10,7 @@ use crate::run::store::BlockFile;
 use crate::run::{BLOCKS_FILE, Plan, RunManifest, stereo_frame};
 use anyhow::{Context, bail};
 use dynvox_core::digest::Digest;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The camera's path in a run folder.
@@ -20,8 +20,12 @@ const FRAMES_FILE: &str = "frames.csv";
 
 /// The plan of a run's arguments.
 fn planned(arguments: &[String]) -> anyhow::Result<Plan> {
-    let line: Vec<String> = ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(arguments.iter().cloned()).collect();
-    plan_of(&line)
+    plan_of(&quiet_line(arguments))
+}
+
+/// The command line of some arguments.
+pub fn quiet_line(arguments: &[String]) -> Vec<String> {
+    ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(arguments.iter().cloned()).collect()
 }
 
 /// What identifies a run: its settings, what is known of its data set, its first and its last image.
@@ -40,9 +44,19 @@ fn identify(plan: &Plan) -> anyhow::Result<Identity> {
     Ok(Identity { digest: digest.finish(), bytes: plan.rss_limit_bytes, first_pose })
 }
 
+/// A job whose figures are wanted, as a file below the folder of the jobs.
+pub fn of_figures(name: &str, arguments: Vec<String>, file: PathBuf) -> anyhow::Result<Job> {
+    let identity = identify(&planned(&arguments)?)?;
+    Ok(Job::new(name, arguments, &identity, Given::Figures(file)))
+}
+
 pub fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
     let of = |arguments: &[String]| identify(&planned(arguments)?);
-    let manifest = Manifest::plan(recordings, &Recordings::read(recordings)?, of)?;
+    write(&Manifest::plan(recordings, &Recordings::read(recordings)?, of)?, out)
+}
+
+/// Writes jobs, and says what to do with them.
+pub fn write(manifest: &Manifest, out: &Path) -> anyhow::Result<()> {
     manifest.write(out)?;
     outln!("{} jobs in {}. Do them with: dynvox fleet run {}", manifest.jobs.len(), out.display(), out.display());
     Ok(())
@@ -52,9 +66,11 @@ pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
     let manifest = Manifest::read(folder)?;
     each(manifest.shard(shard.index, shard.of).map(|job| (job, ())), "done", |job, ()| {
         if job.state(folder) != JobState::Done {
-            map(folder, job)?;
+            done(folder, job)?;
             outln!("{} is {}", job.name, state(folder, job));
-            if let Some(of) = fleet::prior(job, folder)?.uncertainty {
+            if matches!(job.given, Given::Gnss { .. })
+                && let Some(of) = fleet::prior(job, folder)?.uncertainty
+            {
                 let turn_deg = of.rotation_rad.to_degrees();
                 outln!("{} lies along its fixes, with standard deviations of {:.2} m and {turn_deg:.2} degrees", job.name, of.position_m);
             }
@@ -63,27 +79,47 @@ pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
     })
 }
 
-/// Runs one job in a process of its own, and keeps its map.
-fn map(folder: &Path, job: &Job) -> anyhow::Result<()> {
+/// Does one job, of the settings and images it was planned for.
+fn done(folder: &Path, job: &Job) -> anyhow::Result<()> {
     let is_same = |plan: &Plan| anyhow::Ok(job.is_of(identify(plan)?.digest));
     let plan = planned(&job.arguments)?;
     if !is_same(&plan)? {
         bail!("its settings or images are not those of the plan. Plan again");
     }
-    let run_folder = job.run_folder(folder);
+    let figures = match &job.given {
+        Given::Figures(file) => Some((folder.join(file), sweep::figures_of(folder, job)?)),
+        Given::TWorldCamera(_) | Given::Gnss { .. } => {
+            run_apart(folder, job)?;
+            None
+        }
+    };
+    if !is_same(&planned(&job.arguments)?)? {
+        bail!("its images have changed while it ran. Plan again");
+    }
+    match figures {
+        Some((file, figures)) => Ok(figures.write(&file)?),
+        None => keep_map(folder, job, &plan),
+    }
+}
+
+/// Runs one job in a process of its own.
+fn run_apart(folder: &Path, job: &Job) -> anyhow::Result<()> {
     let run = Command::new(std::env::current_exe()?)
         .arg("run")
         .args(&job.arguments)
         .args(["--quiet", "--keep-blocks", "--overwrite", "--out"])
-        .arg(&run_folder)
+        .arg(job.run_folder(folder))
         .output()
         .context("the run cannot be started")?;
     if !run.status.success() {
         bail!("{}", String::from_utf8_lossy(&run.stderr).trim().trim_start_matches("error: "));
     }
-    if !is_same(&planned(&job.arguments)?)? {
-        bail!("its images have changed while it ran. Plan again");
-    }
+    Ok(())
+}
+
+/// Keeps the map of a job's run, and removes the run's block file.
+fn keep_map(folder: &Path, job: &Job, plan: &Plan) -> anyhow::Result<()> {
+    let run_folder = job.run_folder(folder);
     let volume = &plan.config.volume;
     let lattice = Lattice {
         voxel_size_m: volume.voxel_size_m,
