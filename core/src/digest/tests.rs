@@ -244,3 +244,32 @@ fn tells_lengths_and_orders_apart_and_makes_nan_one() {
     assert_eq!(of(|d| d.f32s([f32::NAN, 1.0])), of(|d| d.f32s([-f32::NAN, 1.0])));
     assert_ne!(of(|d| d.f64(0.0)), of(|d| d.f64(-0.0)));
 }
+
+#[test]
+fn digests_are_those_that_files_hold() {
+    // Written down once, from another program after the same description: results of other versions and machines are compared by these.
+    let keys: [u64; LANES] = [
+        0xE220_A839_7B1D_CDAF,
+        0x6E78_9E6A_A1B9_65F5,
+        0x06C4_5D18_8009_454F,
+        0xF88B_B8A8_724C_81ED,
+        0x1B39_896A_51A8_749B,
+        0x53CB_9F0C_747E_A2EB,
+        0x2C82_9ABE_1F45_32E1,
+        0xC584_133A_C916_AB3D,
+    ];
+    assert_eq!(KEYS, keys);
+    let digests = [
+        (of(|_| ()), 0xB4C3_8494_5E67_376E),
+        (of(|d| d.u64(1)), 0x70EA_A146_1E1E_3A23),
+        (of(|d| d.u64(u64::MAX)), 0xBB3F_DD80_E761_09F2),
+        (of(|d| d.f64(f64::NAN)), 0xF43C_2178_569F_8FAD),
+        (of(|d| d.f64(-1.5)), 0x9EA4_D3C5_22B8_5D35),
+        (of(|d| d.f32s([1.0, f32::NAN])), 0x2E20_C754_A7CE_E2CF),
+        (of(|d| d.bytes(&[1, 2, 3])), 0x15C7_8AA8_936E_25AC),
+        (of(|d| d.i16s(&[-1; 40])), 0x90B4_2A19_B910_A0E1),
+    ];
+    for (at, (found, expected)) in digests.into_iter().enumerate() {
+        assert_eq!(found, expected, "digest {at}");
+    }
+}

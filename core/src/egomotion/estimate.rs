@@ -280,3 +280,6 @@ fn robust_weight(config: &EgomotionConfig, squared_px: f64) -> f64 {
 fn largest(step: [f64; 6]) -> f64 {
     step.iter().map(|x| libm::fabs(*x)).fold(0.0, |most, x| if x > most { x } else { most })
 }
+
+#[cfg(test)]
+mod tests;

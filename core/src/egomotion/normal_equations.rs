@@ -145,3 +145,6 @@ impl NormalEquations {
         step.iter().all(|x| x.is_finite()).then_some(step)
     }
 }
+
+#[cfg(test)]
+mod tests;

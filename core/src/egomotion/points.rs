@@ -210,3 +210,6 @@ fn triangulate(m: &Match, rig: &StereoRig) -> Option<Point> {
         right,
     })
 }
+
+#[cfg(test)]
+mod tests;

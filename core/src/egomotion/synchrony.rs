@@ -140,4 +140,108 @@ mod tests {
         let far = all.map(|m| Match { current_right: m.current_left, ..m });
         assert_eq!(RightAhead::of(&RIG, far.iter()), None, "without disparity");
     }
+
+    #[test]
+    fn each_bound_on_the_distance_decides_by_itself() {
+        let is_synchronous = |distance_m: f64, sigma_m: f64, agree: bool, after_gap: bool| {
+            let both =
+                [distance_m, -distance_m].map(|distance_m| RightAhead { distance_m, sigma_m }.is_synchronous(0.125, agree, after_gap));
+            assert_eq!(both[0], both[1], "ahead and behind are alike");
+            both[0]
+        };
+        // Four standard deviations beyond four times the most, however many agree.
+        assert!(is_synchronous(0.75, 0.0625, true, true) && !is_synchronous(0.76, 0.0625, true, false));
+        assert!(is_synchronous(0.5, 0.0, true, true) && !is_synchronous(0.51, 0.0, true, true));
+        // One standard deviation beyond the most: where few agree.
+        assert!(is_synchronous(0.1875, 0.0625, false, false) && !is_synchronous(0.19, 0.0625, false, false));
+        assert!(is_synchronous(0.19, 0.0625, true, false));
+        // One standard deviation below twice the most: after a gap, where few agree.
+        assert!(is_synchronous(0.125, 0.125, false, true) && !is_synchronous(0.126, 0.125, false, true));
+        assert!(is_synchronous(0.126, 0.125, false, false) && is_synchronous(0.126, 0.125, true, true));
+    }
+
+    /// Matches that the model holds of exactly: rows shifted by `shift_px`, a focal length longer by a share, the right camera ahead; and each
+    /// row off by a noise.
+    fn modelled(shift_px: f64, longer: f64, ahead_m: f64, noise_px: impl Fn(usize) -> f64) -> [Match; 60] {
+        core::array::from_fn(|index| {
+            let at = index as f64;
+            let (y_px, disparity_px) = (12.0 * (at % 13.0) - 70.0, 8.0 + 3.0 * (at % 11.0));
+            let (u_left, v_left) = (300.0 + 5.0 * at, RIG.center_v_px + y_px);
+            let v_right = v_left + shift_px + longer * y_px / 700.0 + ahead_m * y_px * disparity_px / 350.0 + noise_px(index);
+            let [left, right] = [[u_left, v_left], [u_left - disparity_px, v_right]].map(|at| at.map(|px| px as f32));
+            Match {
+                previous_left: [0.0; 2],
+                previous_right: [0.0; 2],
+                current_left: left,
+                current_right: right,
+            }
+        })
+    }
+
+    #[test]
+    fn what_the_model_holds_of_exactly_is_found_exactly() {
+        for (shift_px, longer, ahead_m) in [(0.0, 0.0, 0.0), (0.5, -3.0, 0.2), (-1.5, 2.0, -0.7), (0.0, 0.0, 0.05)] {
+            let found = RightAhead::of(&RIG, modelled(shift_px, longer, ahead_m, |_| 0.0).iter()).unwrap();
+            assert!((found.distance_m - ahead_m).abs() < 1e-4 && found.sigma_m < 1e-4, "{ahead_m}: {found:?}");
+        }
+    }
+
+    /// The plain way: four rounds of weighted least squares by Gauss's elimination, each sum by itself.
+    fn plainly(matches: &[Match]) -> [f64; 2] {
+        let rows = || {
+            matches.iter().map(|m| {
+                let [u, v] = m.current_left.map(f64::from);
+                let [u_right, v_right] = m.current_right.map(f64::from);
+                let y = v - 180.0;
+                ([1.0, y / 700.0, y * (u - u_right) / 350.0], v_right - v)
+            })
+        };
+        let (mut solution, mut variance) = ([0.0; 3], 0.0);
+        for _ in 0..4 {
+            let residual = |row: &[f64; 3], difference: f64| difference - (0..3).map(|at| row[at] * solution[at]).sum::<f64>();
+            let weight = |row: &[f64; 3], difference: f64| 1.0 / (1.0 + 4.0 * residual(row, difference).powi(2));
+            // The matrix, the right side, and the unit vector that gives the last entry of the inverse.
+            let mut system: [[f64; 5]; 3] = core::array::from_fn(|i| {
+                let sum = |of: &dyn Fn(&[f64; 3], f64) -> f64| rows().map(|(row, d)| weight(&row, d) * row[i] * of(&row, d)).sum::<f64>();
+                [sum(&|row, _| row[0]), sum(&|row, _| row[1]), sum(&|row, _| row[2]), sum(&|_, d| d), f64::from(u8::from(i == 2))]
+            });
+            for i in 0..3 {
+                system[i] = system[i].map(|entry| entry / system[i][i]);
+                for other in (0..3).filter(|other| *other != i) {
+                    let factor = system[other][i];
+                    system[other] = core::array::from_fn(|at| system[other][at] - factor * system[i][at]);
+                }
+            }
+            let weights: f64 = rows().map(|(row, d)| weight(&row, d)).sum();
+            let squares: f64 = rows().map(|(row, d)| weight(&row, d) * residual(&row, d).powi(2)).sum();
+            variance = squares / weights * system[2][4];
+            solution = system.map(|row| row[3]);
+        }
+        [solution[2], variance.sqrt()]
+    }
+
+    #[test]
+    fn distance_and_deviation_are_those_of_weighted_least_squares() {
+        let mut random = Random::new(6);
+        for most_px in [0.1, 0.5, 3.0] {
+            let noise: [f64; 60] = core::array::from_fn(|_| (f64::from(random.below(2_001)) / 1_000.0 - 1.0) * most_px);
+            let all = modelled(0.4, 1.0, 0.3, |index| noise[index]);
+            let (found, [distance_m, sigma_m]) = (RightAhead::of(&RIG, all.iter()).unwrap(), plainly(&all));
+            assert!((found.distance_m - distance_m).abs() < 1e-9, "{most_px} px: {found:?} {distance_m}");
+            assert!((found.sigma_m - sigma_m).abs() < 1e-9 && sigma_m > 0.0, "{most_px} px: {found:?} {sigma_m}");
+        }
+    }
+
+    #[test]
+    fn twenty_matches_are_enough() {
+        let all = modelled(0.4, 1.0, 0.3, |_| 0.0);
+        assert!(RightAhead::of(&RIG, all.iter().take(MATCHES_MIN)).is_some());
+        // Matches without disparity are none.
+        let some =
+            core::array::from_fn::<_, 21, _>(|at| if at < 2 { Match { current_right: all[at].current_left, ..all[at] } } else { all[at] });
+        assert_eq!(RightAhead::of(&RIG, some.iter()), None);
+        // All of one disparity: distance and focal length cannot be told apart.
+        let alike = all.map(|m| Match { current_right: [m.current_left[0] - 9.0, m.current_right[1]], ..m });
+        assert_eq!(RightAhead::of(&RIG, alike.iter()), None);
+    }
 }

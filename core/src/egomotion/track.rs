@@ -264,3 +264,6 @@ impl Egomotion {
         self.held
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -144,4 +144,61 @@ mod tests {
             assert_eq!(index.find(coord, |slot| Some(coords[slot.index()])), Some(slot));
         }
     }
+
+    #[test]
+    fn the_table_is_the_least_power_of_two_that_holds_twice_the_blocks_and_fits_its_bytes_exactly() {
+        for blocks in (0..200).chain([BLOCKS, 895, 896, 897, 5_000]) {
+            // hashbrown fills a table up to 7/8.
+            let buckets = (4..).map(|shift| 1usize << shift).find(|buckets| buckets * 7 / 8 >= 2 * blocks).unwrap();
+            assert_eq!(BlockIndex::bytes(blocks), (5 * buckets + 64).next_multiple_of(64), "{blocks} blocks");
+            let mut slab = vec![[0u64; 8]; BlockIndex::bytes(blocks) / 64 + 1];
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
+            let mut carver = Carver::new(bytes, BlockIndex::bytes(blocks)).unwrap();
+            let index = BlockIndex::new_in(blocks, &mut carver);
+            assert_eq!((carver.check(), carver.footprint().bytes()), (Ok(()), BlockIndex::bytes(blocks)));
+            assert!(index.table.capacity() >= 2 * blocks && index.is_empty());
+            let text = std::format!("{index:?}");
+            assert_eq!(text, std::format!("BlockIndex {{ len: 0, capacity: {} }}", index.table.capacity()));
+        }
+    }
+
+    #[test]
+    fn neighbouring_blocks_spread_evenly_over_buckets_and_tags() {
+        // What the table looks at: low bits for the bucket, the topmost seven for the tag.
+        for apart in [1, 16] {
+            let (mut buckets, mut tags, mut both) = ([0u32; 256], [0u32; 128], vec![0u32; 1 << 15]);
+            for at in 0..1i32 << 15 {
+                let coord = BlockCoord::new(apart * (at % 32 - 16), apart * (at / 32 % 32 - 16), apart * (at / 1_024 - 16)).unwrap();
+                let (bucket, tag) = ((hash(coord) % 256) as usize, (hash(coord) >> 57) as usize);
+                buckets[bucket] += 1;
+                tags[tag] += 1;
+                both[bucket * 128 + tag] += 1;
+            }
+            // Chance leaves the means, 128 and 256, by six standard deviations nowhere. One bucket and tag have one block of the 32,768 on average;
+            // chance has up to nine, these multipliers up to 13.
+            assert!(buckets.iter().all(|count| (60..=196).contains(count)), "{buckets:?}");
+            assert!(tags.iter().all(|count| (160..=352).contains(count)), "{tags:?}");
+            let most = both.iter().max().unwrap();
+            assert!(*most <= 16, "{most} of one bucket and one tag");
+        }
+    }
+
+    #[test]
+    fn a_block_beside_another_of_its_hash_is_compared_and_one_that_is_not_there_is_not_found() {
+        let mut slab = vec![[0u64; 8]; BlockIndex::bytes(8) / 64 + 1];
+        let mut carver = Carver::new(bytemuck::cast_slice_mut(&mut slab), BlockIndex::bytes(8)).unwrap();
+        let mut index = BlockIndex::new_in(8, &mut carver);
+        let coord = BlockCoord::new(3, -2, 1).unwrap();
+        // Two slots whose blocks lie at the same place: the table cannot tell, but both are compared until one is right.
+        let (wrong, right) = (Slot::new(4), Slot::new(7));
+        index.insert(coord, wrong, |_| Some(coord)).unwrap();
+        index.insert(coord, right, |_| Some(coord)).unwrap();
+        let coord_of = |slot: Slot| (slot == right).then_some(coord);
+        let (found, compared) = index.probe(coord, coord_of);
+        assert_eq!((found, index.find(coord, coord_of)), (Some(right), Some(right)));
+        assert!((1..=2).contains(&compared));
+        assert_eq!((index.probe(coord, |_| None), index.find(coord, |_| None)), ((None, 2), None));
+        assert_eq!((index.remove(coord, |_| None), index.len()), (false, 2));
+        assert_eq!((index.remove(coord, coord_of), index.find(coord, |_| Some(coord))), (true, Some(wrong)));
+    }
 }

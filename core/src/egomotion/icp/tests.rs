@@ -1,5 +1,7 @@
 //! A scene of planes, rendered from two poses with a known motion between them.
 
+mod parts;
+
 use super::*;
 use crate::{
     geometry::Transform,
@@ -132,20 +134,30 @@ fn matches_can_contradict_the_motion() {
 }
 
 #[test]
-fn settings_out_of_range_are_named() {
-    let problems = |config: IcpConfig| {
-        let mut problems = Problems::new();
+fn settings_out_of_range_are_named_and_their_bounds_are_taken() {
+    let problems = |change: fn(&mut IcpConfig, f32), value: f32| {
+        let (mut problems, mut config) = (Problems::new(), IcpConfig::default());
+        change(&mut config, value);
         config.validate(&mut problems);
         problems.iter().map(|problem| problem.key).collect::<Vec<_>>()
     };
-    assert!(problems(IcpConfig::default()).is_empty());
-    let wrong = IcpConfig {
-        levels: 0,
-        steps: 0,
-        distance_m: 0.0,
-        noise_px: f32::NAN,
-        pairs_min: 1.5,
-        ..IcpConfig::default()
-    };
-    assert_eq!(problems(wrong), ["icp.levels", "icp.steps", "icp.distance_m", "icp.noise_px", "icp.pairs_min"]);
+    type Setting = (&'static str, fn(&mut IcpConfig, f32), &'static [f32], &'static [f32]);
+    const SHARE: (&[f32], &[f32]) = (&[0.0, 1.0], &[-0.01, 1.01, f32::NAN]);
+    const ABOVE_0: (&[f32], &[f32]) = (&[1e-9, 1e9], &[0.0, -1.0, f32::NAN, f32::INFINITY]);
+    let settings: [Setting; 10] = [
+        ("icp.levels", |config, value| config.levels = value as u8, &[1.0, 4.0], &[0.0, 5.0]),
+        ("icp.steps", |config, value| config.steps = value as u8, &[1.0, 50.0], &[0.0, 51.0]),
+        ("icp.distance_m", |config, value| config.distance_m = value, ABOVE_0.0, ABOVE_0.1),
+        ("icp.noise_px", |config, value| config.noise_px = value, &[0.0, 9.0], &[-0.01, f32::NAN, f32::INFINITY]),
+        ("icp.pairs_min", |config, value| config.pairs_min = value, SHARE.0, SHARE.1),
+        ("icp.held_min", |config, value| config.held_min = value, SHARE.0, SHARE.1),
+        ("icp.step_max_m", |config, value| config.step_max_m = value, ABOVE_0.0, ABOVE_0.1),
+        ("icp.step_max_rad", |config, value| config.step_max_rad = value, ABOVE_0.0, ABOVE_0.1),
+        ("icp.explained_min", |config, value| config.explained_min = value, SHARE.0, SHARE.1),
+        ("icp.explained_px", |config, value| config.explained_px = value, ABOVE_0.0, ABOVE_0.1),
+    ];
+    for (key, change, good, bad) in settings {
+        good.iter().for_each(|&value| assert!(problems(change, value).is_empty(), "{key} = {value}"));
+        bad.iter().for_each(|&value| assert_eq!(problems(change, value), [key], "{key} = {value}"));
+    }
 }

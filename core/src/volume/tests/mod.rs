@@ -4,6 +4,7 @@ pub(crate) mod analytic;
 mod erasing;
 mod eviction;
 mod fusion;
+mod history;
 mod pruning;
 
 use super::*;

@@ -162,6 +162,55 @@ fn a_short_history_prunes_early_and_says_so() {
 }
 
 #[test]
+fn a_history_as_long_as_the_lag_prunes_in_time() {
+    with_volume(&Capacity { history_frames: 3, ..CAPACITY }, &pruning(1, 3), |volume| {
+        volume.visible.begin_frame();
+        let slot = plant(volume, BlockCoord::default(), |_| 1);
+        frame(volume, &[slot]);
+        for _ in 0..2 {
+            assert_eq!(frame(volume, &[]), PruneReport::default());
+        }
+        assert_eq!(volume.history.len(), 3);
+        let report = frame(volume, &[]);
+        assert_eq!((report.early, report.blocks_freed, volume.history.len()), (0, 1, 3));
+    });
+}
+
+#[test]
+fn a_block_is_far_where_all_that_was_seen_of_it_is_farther_than_allowed() {
+    let units = 16_384;
+    let at_units = f32::from(units as u16) / 32_767.0;
+    for (prune_distance, near, weight, left) in [
+        (at_units, units, 9, 1),
+        (at_units.next_down(), units, 9, 0),
+        (at_units.next_down(), units - 1, 9, 1),
+        (at_units.next_down(), 0, 0, 0),
+    ] {
+        with_volume(&CAPACITY, &VolumeConfig { prune_distance, ..pruning(1, 1) }, |volume| {
+            volume.visible.begin_frame();
+            let slot = plant(volume, BlockCoord::default(), |voxel| if voxel == 77 { weight } else { 9 });
+            volume.blocks.voxels[slot.index()].sdf.fill(-units);
+            volume.blocks.voxels[slot.index()].sdf[77] = near;
+            assert_eq!(volume.prune_block(slot, 1), (0, left == 0));
+            assert_eq!(volume.pool.len(), left, "at {prune_distance}, nearest {near} of weight {weight}");
+        });
+    }
+}
+
+#[test]
+fn voxels_of_a_block_are_counted_by_how_often_they_were_seen() {
+    with_volume(&CAPACITY, &pruning(3, 1), |volume| {
+        volume.visible.begin_frame();
+        // 64 voxels of each weight from 0 to 7.
+        let slot = plant(volume, BlockCoord::default(), |voxel| (voxel % 8) as u8);
+        assert_eq!(volume.prune_block(slot, 3), (3 * 64, false));
+        assert_eq!(volume.prune_block(slot, 3), (0, false), "nothing of low weight is left");
+        assert_eq!(volume.prune_block(slot, 6), (3 * 64, false), "4 to 6");
+        assert_eq!(volume.prune_block(slot, 7), (64, true));
+    });
+}
+
+#[test]
 fn weight_zero_is_off() {
     with_volume(&CAPACITY, &pruning(0, 1), |volume| {
         volume.visible.begin_frame();
