@@ -1,11 +1,14 @@
 //! The mapper as a whole, in a scene with known geometry.
 
+mod errors;
 mod mutations;
 mod plan;
 mod random_runs;
 mod raw;
 mod resume;
 mod self_calibration;
+mod set;
+mod views;
 
 use super::*;
 use crate::{
