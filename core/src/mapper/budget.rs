@@ -174,6 +174,7 @@ impl Capacity {
             ),
             (self.planning_height <= MAX_SIDE_CELLS, "planning_height", "must be at most 1,024"),
             (self.objects == 0 || self.object_blocks > 0, "object_blocks", "must be above 0 where there are objects"),
+            (self.is_countable(usize::MAX as u64), "blocks", "and all other bounds need more bytes than this machine has addresses"),
         ];
         match rules.iter().find(|(holds, ..)| !holds) {
             Some((_, bound, rule)) => Err(CapacityProblem { bound, rule }),
@@ -282,10 +283,7 @@ impl<'o> Question<'o> {
     /// With as many blocks as fit, and as can be counted.
     fn filled(&self, capacity: Capacity) -> Capacity {
         let fits = |blocks: usize| self.with_blocks(&capacity, blocks).bytes() <= self.bytes;
-        // A block has at least 512 voxels of 3 bytes.
-        let block_bytes = 512 * if capacity.colour { 6 } else { 3 };
-        let most = self.bytes.saturating_sub(capacity.bytes()) / block_bytes;
-        let (mut fitting, mut too_many) = (0, if most < MAX_COUNT { most + 1 } else { MAX_COUNT + 1 });
+        let (mut fitting, mut too_many) = (0, self.too_many_blocks(&capacity));
         while fitting + 1 < too_many {
             let middle = fitting + (too_many - fitting) / 2;
             if fits(middle) {
@@ -295,6 +293,14 @@ impl<'o> Question<'o> {
             }
         }
         self.with_blocks(&capacity, fitting)
+    }
+
+    /// So many blocks that they cannot fit or be counted; few enough that their bytes can be, in 32 bits as well.
+    fn too_many_blocks(&self, capacity: &Capacity) -> usize {
+        // A block has at least 512 voxels of 3 bytes.
+        let block_bytes = 512 * if capacity.colour { 6 } else { 3 };
+        let most = self.bytes.saturating_sub(capacity.bytes()) / block_bytes;
+        if most < MAX_COUNT { most + 1 } else { MAX_COUNT + 1 }
     }
 
     /// The same with so many blocks; at most four in five of them are visible at once.

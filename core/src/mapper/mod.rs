@@ -1,5 +1,6 @@
 //! The loop of the paper (Section III), one line per stage.
 
+mod addresses;
 mod budget;
 mod clock;
 mod config;
@@ -36,7 +37,7 @@ use crate::{
     egomotion::{Egomotion, Estimator},
     geometry::{StereoRig, Transform},
     image::View,
-    memory::{Carver, region_bytes},
+    memory::{Carver, SlabError, region_bytes},
     objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
     planning::Planning,
     rectify::{RawCamera, RectifiedImages, Rectifier, self_calibration::SelfCalibration},
@@ -85,7 +86,7 @@ pub struct Mapper<'s> {
 }
 
 impl Capacity {
-    /// Bytes of slab a mapper of this capacity needs.
+    /// Bytes of slab a mapper of this capacity needs, for a capacity that [`Capacity::validate`] takes: beyond, they may be more than can be counted.
     ///
     /// ```
     /// use dynvox_core::{Capacity, Slab};
@@ -145,6 +146,9 @@ impl<'s> Mapper<'s> {
     pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {
         if let Some(problem) = config.validate().first() {
             return Err(NewError::Config(*problem));
+        }
+        if !capacity.is_countable(usize::MAX as u64) {
+            return Err(NewError::Slab(SlabError::TooSmall { missing: usize::MAX }));
         }
         let mut carver = Carver::new(slab, capacity.bytes())?;
         let mut mapper = Self::new_in(capacity, config, &mut carver);

@@ -151,3 +151,40 @@ fn the_bytes_of_every_valid_capacity_can_be_summed_up() {
     }
     assert_eq!((largest.blocks, largest.history_frames), (1 << 28, 1 << 16));
 }
+
+#[test]
+fn no_capacity_that_is_considered_for_a_budget_of_2_gib_has_bytes_beyond_32_bits() {
+    let (mut random, mut largest) = (Random::new(8), 0);
+    for at in 0..20_000 {
+        // Small and large images; the largest first.
+        let shift = random.below(7);
+        let image = if at < 100 {
+            (4_096, 4_096)
+        } else {
+            (64 + random.below(8_128 >> shift) as usize, 32 + random.below(8_160 >> shift) as usize)
+        };
+        let options = BudgetOptions {
+            colour: [None, Some(false), Some(true)].get(random.below(3) as usize).copied().flatten(),
+            objects: (random.below(2) == 0).then(|| random.below(17) as usize),
+            voxel_size_m: (random.below(2) == 0).then(|| 0.001 + random.below(50) as f32 / 100.0),
+            raw_image: if random.below(2) == 0 { [4_096, 4_096] } else { [0, 0] },
+        };
+        // What a slice can hold on a machine of 32 bits.
+        let Ok(question) = Question::new(i32::MAX as usize, image.0, image.1, &options) else { continue };
+        let least = question.least();
+        let mut considered = std::vec![least, question.with_blocks(&least, question.too_many_blocks(&least))];
+        for colour in [false, true] {
+            let base = question.image_only(colour);
+            considered.push(Capacity { crop_pixels: base.pixels() * 8 / 5, ..base });
+            for (objects, object_blocks) in [(16, 4_000), (8, 1_200), (4, 700), (2, 300), (2, 150), (0, 0)] {
+                let objects = options.objects.unwrap_or(objects);
+                let with_objects = Capacity { objects, object_blocks, crop_pixels: base.pixels() * 8 / 5, ..base };
+                considered.push(question.with_blocks(&with_objects, question.too_many_blocks(&with_objects)));
+            }
+        }
+        let most = considered.iter().map(Capacity::bytes).max().unwrap();
+        assert!(most < 1 << 32, "{most} bytes for {image:?}, {options:?}");
+        largest = if most > largest { most } else { largest };
+    }
+    assert!(largest > 1 << 31, "the largest are considered: {largest}");
+}
