@@ -82,3 +82,41 @@ impl EgomotionConfig {
         require(problems, self.robust_px > 0.0 && self.robust_px <= 100.0, "egomotion.robust_px", "must be above 0 and at most 100");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    type Setting = (&'static str, fn(&mut EgomotionConfig, f64), &'static [f64], &'static [f64]);
+    const SHARE: (&[f64], &[f64]) = (&[0.0, 1.0], &[-0.01, 1.01, f64::NAN]);
+    const ABOVE_0: (&[f64], &[f64]) = (&[1e-9, 1e9], &[0.0, -1.0, f64::NAN, f64::INFINITY]);
+    const SETTINGS: [Setting; 12] = [
+        ("egomotion.samples", |config, value| config.samples = value as u16, &[1.0, 10_000.0], &[0.0, 10_001.0]),
+        ("egomotion.confidence", |config, value| config.confidence = value, &[0.5, 0.99], &[0.49, 1.0, f64::NAN]),
+        ("egomotion.inlier_px", |config, value| config.inlier_px = value as f32, ABOVE_0.0, ABOVE_0.1),
+        ("egomotion.refined_inlier_px", |config, value| config.refined_inlier_px = value as f32, ABOVE_0.0, ABOVE_0.1),
+        ("egomotion.matches_min", |config, value| config.matches_min = value as u16, &[3.0, 1_000.0], &[2.0, 1_001.0]),
+        ("egomotion.inlier_share_min", |config, value| config.inlier_share_min = value as f32, SHARE.0, SHARE.1),
+        ("egomotion.inlier_share_strong", |config, value| config.inlier_share_strong = value as f32, SHARE.0, SHARE.1),
+        ("egomotion.acceleration_max_m_s2", |config, value| config.acceleration_max_m_s2 = value, ABOVE_0.0, ABOVE_0.1),
+        ("egomotion.right_ahead_max_m", |config, value| config.right_ahead_max_m = value, ABOVE_0.0, ABOVE_0.1),
+        ("egomotion.sample_steps", |config, value| config.sample_steps = value as u8, &[1.0, 50.0], &[0.0, 51.0]),
+        ("egomotion.refine_steps", |config, value| config.refine_steps = value as u8, &[1.0, 250.0], &[0.0, 251.0]),
+        ("egomotion.side_knee", |config, value| config.side_knee = value, &[1e-9, 10.0], &[0.0, -1.0, 10.01, f64::NAN]),
+    ];
+
+    #[test]
+    fn settings_out_of_range_are_named_and_their_bounds_are_taken() {
+        for (key, change, good, bad) in SETTINGS {
+            let problems = |value: f64| {
+                let (mut problems, mut config) = (Problems::new(), EgomotionConfig::default());
+                change(&mut config, value);
+                config.validate(&mut problems);
+                problems.iter().map(|problem| problem.key).collect::<Vec<_>>()
+            };
+            good.iter().for_each(|&value| assert!(problems(value).is_empty(), "{key} = {value}"));
+            bad.iter().for_each(|&value| assert_eq!(problems(value), [key], "{key} = {value}"));
+        }
+    }
+}
