@@ -91,7 +91,7 @@ mod tests {
     type Setting = (&'static str, fn(&mut EgomotionConfig, f64), &'static [f64], &'static [f64]);
     const SHARE: (&[f64], &[f64]) = (&[0.0, 1.0], &[-0.01, 1.01, f64::NAN]);
     const ABOVE_0: (&[f64], &[f64]) = (&[1e-9, 1e9], &[0.0, -1.0, f64::NAN, f64::INFINITY]);
-    const SETTINGS: [Setting; 12] = [
+    const SETTINGS: [Setting; 13] = [
         ("egomotion.samples", |config, value| config.samples = value as u16, &[1.0, 10_000.0], &[0.0, 10_001.0]),
         ("egomotion.confidence", |config, value| config.confidence = value, &[0.5, 0.99], &[0.49, 1.0, f64::NAN]),
         ("egomotion.inlier_px", |config, value| config.inlier_px = value as f32, ABOVE_0.0, ABOVE_0.1),
@@ -104,6 +104,7 @@ mod tests {
         ("egomotion.sample_steps", |config, value| config.sample_steps = value as u8, &[1.0, 50.0], &[0.0, 51.0]),
         ("egomotion.refine_steps", |config, value| config.refine_steps = value as u8, &[1.0, 250.0], &[0.0, 251.0]),
         ("egomotion.side_knee", |config, value| config.side_knee = value, &[1e-9, 10.0], &[0.0, -1.0, 10.01, f64::NAN]),
+        ("egomotion.robust_px", |config, value| config.robust_px = value, &[1e-9, 100.0], &[0.0, -1.0, 100.1, f64::NAN]),
     ];
 
     #[test]
