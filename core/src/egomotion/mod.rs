@@ -2,9 +2,9 @@
 //!
 //! Each match's point in the previous camera follows from its disparity. Three matches drawn at random give a hypothesis by Gauss-Newton
 //! on the reprojection error of four coordinates (u and v in both current images); the one with most inliers is refined on them, with
-//! inliers chosen anew twice. Drawing stops as soon as one clean hypothesis is likely enough. The refinement weighs matches robustly (Geman,
-//! McClure: *Statistical Methods for Tomographic Image Reconstruction*, 1987), for an inlier of two pixels still pulls; and those far from
-//! the middle column less, because what rectification leaves of the lenses' errors grows steeply there.
+//! inliers chosen anew twice. Drawing stops as soon as one clean hypothesis is likely enough. The refinement gives
+//! matches robust weights (Geman, McClure: *Statistical Methods for Tomographic Image Reconstruction*, 1987), because an inlier may be two
+//! pixels off. Matches far from the middle column weigh less: what rectification leaves of the lenses' errors grows steeply there.
 //!
 //! [`Estimator`] owns the scratch memory and estimates any set of matches; [`Egomotion`] tracks the camera and repeats its last motion
 //! where the estimate fails. [`icp`] estimates motion from depth alone.
