@@ -145,7 +145,7 @@ fn cameras(run_folder: &Path) -> anyhow::Result<Vec<CameraPose>> {
 /// What became of a job, in words.
 fn state(folder: &Path, job: &Job) -> String {
     match (job.state(folder), left_out(folder, job)) {
-        (JobState::Done, 1..) => format!("done; {} after the camera was lost are left out", counted(left_out(folder, job), "frame")),
+        (JobState::Done, frames @ 1..) => format!("done; {} after the camera was lost are left out", counted(frames, "frame")),
         (state, _) => word(state).to_owned(),
     }
 }
