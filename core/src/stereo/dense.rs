@@ -102,9 +102,9 @@ impl DenseMatching<'_> {
         let size = self.config.grid_size.max(1);
         let sets = part(grid.cells, v / size * grid.columns..);
         let mut row = Row::<LEFT>::new(self.config, &self.cost, here, other);
-        let mut list = [0u8; 256];
+        let mut list = [0; 256];
         for (cell, (planes, set)) in planes.chunks_mut(size).zip(sets).enumerate() {
-            let listed = list_disparities(set, &mut list);
+            let listed = list_candidates(set, self.cost.elsewhere, &mut list);
             for (i, planes) in planes.chunks_mut(LANES).enumerate() {
                 row.match_eight(cell * size + i * LANES, listed, planes, kernels);
             }
@@ -112,15 +112,15 @@ impl DenseMatching<'_> {
     }
 }
 
-/// The members of a set, ascending.
-fn list_disparities<'l>(set: &DisparitySet, list: &'l mut [u8; 256]) -> &'l [u8] {
+/// The disparities of a set, ascending, each with the cost of leaving the plane in the bits from 8 on.
+fn list_candidates<'l>(set: &DisparitySet, cost: u32, list: &'l mut [u32; 256]) -> &'l [u32] {
     // As many members as bits, at most.
     let mut slots = list.iter_mut();
-    for (i, &word) in set.iter().enumerate() {
+    for (i, &word) in (0u32..).zip(set) {
         let mut rest = word;
         while rest != 0 {
             if let Some(slot) = slots.next() {
-                *slot = (i as u32 * 64 + rest.trailing_zeros()) as u8;
+                *slot = (cost << 8) + i * 64 + rest.trailing_zeros();
             }
             rest &= rest - 1;
         }

@@ -15,6 +15,9 @@ pub(super) const NO_PLANE: i16 = -1;
 /// Added to the plane's disparity where its triangle is too steep to be a surface.
 pub(super) const STEEP: i16 = 256;
 
+/// Disparities about a plane, at most.
+pub(super) const PLANE_WIDTH: usize = 2 * MAX_PLANE_RADIUS + 1;
+
 /// Rasterises the planes into image rows `first..` of `out`, `width` wide: the disparity in whole px, plus [`STEEP`], or [`NO_PLANE`].
 /// Triangles are rasterised to the pixels beyond their edges; the later one wins.
 pub(super) fn rasterise_planes(mesh: &Triangulation<'_>, slope_max: f32, first: usize, width: usize, out: &mut [i16]) {
@@ -140,9 +143,9 @@ pub(super) fn mark_cells(config: &StereoConfig, points: &[SupportPoint], columns
 /// lowered so that k = 0 costs nothing.
 pub(super) struct PlaneCost {
     /// At -radius..=radius px from the plane.
-    pub about_plane: [u32; 2 * MAX_PLANE_RADIUS + 1],
+    pub about_plane: [u32; PLANE_WIDTH],
     /// The same about a steep plane, which is not preferred.
-    pub about_steep: [u32; 2 * MAX_PLANE_RADIUS + 1],
+    pub about_steep: [u32; PLANE_WIDTH],
     /// Farther off.
     pub elsewhere: u32,
     /// Searched to each side, px.
@@ -163,15 +166,10 @@ impl PlaneCost {
         // Extreme parameters overflow to infinity or to nothing: both are clamped at what the energies can bear.
         let clamped = |cost: f32| if cost < Self::MOST { libm::roundf(cost) as u32 } else { Self::MOST as u32 };
         let (radius, elsewhere) = (config.plane_radius().min(MAX_PLANE_RADIUS), clamped(preference(0)));
-        let mut about_plane = [elsewhere; 2 * MAX_PLANE_RADIUS + 1];
+        let mut about_plane = [elsewhere; PLANE_WIDTH];
         for (i, cost) in about_plane.iter_mut().enumerate() {
             *cost = elsewhere - clamped(preference(i.abs_diff(radius))).min(elsewhere);
         }
-        Self {
-            about_plane,
-            about_steep: [elsewhere; 2 * MAX_PLANE_RADIUS + 1],
-            elsewhere,
-            radius,
-        }
+        Self { about_plane, about_steep: [elsewhere; PLANE_WIDTH], elsewhere, radius }
     }
 }

@@ -25,26 +25,38 @@ pub(super) trait Kernels {
     /// Sums of absolute differences of eight pairs, each at most 4,080.
     fn sums(&self, a: &Eight<Descriptor>, b: &Eight<Descriptor>) -> Eight<u32>;
 
-    /// The lesser of `best` and of what the pairs' sums make with `base` and `barred`, each positive as `i32`: `((sum << 12) + base) | barred`.
-    fn least(&self, best: Eight<u32>, pairs: [&Eight<Descriptor>; 2], base: u32, barred: &Eight<u32>) -> Eight<u32>;
+    /// The same with descriptors from anywhere.
+    fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32>;
 
-    /// Sums of absolute differences of four descriptors with those of eight columns, each at most 16,320.
-    fn costs(&self, point: &[Descriptor; 4], columns: [&Eight<Descriptor>; 4]) -> Eight<i16>;
+    /// The lesser of `best` and of what the pairs' sums make with `base`, each positive as `i32`: `(sum << 12) + base`. In the order in
+    /// which the sums come, which [`Kernels::ordered`] undoes.
+    fn least(&self, best: Eight<u32>, pairs: [&Eight<Descriptor>; 2], base: u32) -> Eight<u32>;
+
+    /// What [`Kernels::least`] made, in the order of the pairs.
+    fn ordered(&self, keys: Eight<u32>) -> Eight<u32>;
+
+    /// Sums of absolute differences of four descriptors with those of columns, eight at a time, each at most 16,320. As many as there are
+    /// of all four and room for.
+    fn costs(&self, point: &[Descriptor; 4], columns: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]);
 }
 
 /// Kernels as functions, so that each can be written where its instructions are safe.
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
-struct Functions<S, L, C> {
+struct Functions<S, F, L, O, C> {
     sums: S,
+    sums_of: F,
     least: L,
+    ordered: O,
     costs: C,
 }
 
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
-impl<S, L, C> Kernels for Functions<S, L, C>
+impl<S, F, L, O, C> Kernels for Functions<S, F, L, O, C>
 where
     S: Fn(&Eight<Descriptor>, &Eight<Descriptor>) -> Eight<u32>,
-    L: Fn(Eight<u32>, [&Eight<Descriptor>; 2], u32, &Eight<u32>) -> Eight<u32>,
+    F: Fn(&Eight<Descriptor>, Eight<&Descriptor>) -> Eight<u32>,
+    L: Fn(Eight<u32>, [&Eight<Descriptor>; 2], u32) -> Eight<u32>,
+    O: Fn(Eight<u32>) -> Eight<u32>,
     C: Fn(&[Descriptor; 4], [&Eight<Descriptor>; 4]) -> Eight<i16>,
 {
     #[inline(always)]
@@ -53,13 +65,31 @@ where
     }
 
     #[inline(always)]
-    fn least(&self, best: Eight<u32>, pairs: [&Eight<Descriptor>; 2], base: u32, barred: &Eight<u32>) -> Eight<u32> {
-        (self.least)(best, pairs, base, barred)
+    fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32> {
+        (self.sums_of)(a, b)
     }
 
     #[inline(always)]
-    fn costs(&self, point: &[Descriptor; 4], columns: [&Eight<Descriptor>; 4]) -> Eight<i16> {
-        (self.costs)(point, columns)
+    fn least(&self, best: Eight<u32>, pairs: [&Eight<Descriptor>; 2], base: u32) -> Eight<u32> {
+        (self.least)(best, pairs, base)
+    }
+
+    #[inline(always)]
+    fn ordered(&self, keys: Eight<u32>) -> Eight<u32> {
+        (self.ordered)(keys)
+    }
+
+    #[inline(always)]
+    fn costs(&self, point: &[Descriptor; 4], columns: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]) {
+        for_columns(columns, costs, |columns| (self.costs)(point, columns));
+    }
+}
+
+/// Fills in what columns cost, eight at a time.
+#[inline(always)]
+fn for_columns([a, b, c, d]: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>], cost: impl Fn([&Eight<Descriptor>; 4]) -> Eight<i16>) {
+    for ((costs, (a, b)), (c, d)) in costs.iter_mut().zip(a.iter().zip(b)).zip(c.iter().zip(d)) {
+        *costs = cost([a, b, c, d]);
     }
 }
 
@@ -86,26 +116,38 @@ struct Plain;
 impl Kernels for Plain {
     #[inline(always)]
     fn sums(&self, a: &Eight<Descriptor>, b: &Eight<Descriptor>) -> Eight<u32> {
+        self.sums_of(a, b.each_ref())
+    }
+
+    #[inline(always)]
+    fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32> {
         let mut sums = [0; LANES];
         sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum = distance(a, b));
         sums
     }
 
     #[inline(always)]
-    fn least(&self, mut best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32, barred: &Eight<u32>) -> Eight<u32> {
-        for ((best, (a, b)), barred) in best.iter_mut().zip(a.iter().zip(b)).zip(barred) {
-            *best = (((distance(a, b) << 12) + base) | barred).min(*best);
+    fn least(&self, mut best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32) -> Eight<u32> {
+        for (best, (a, b)) in best.iter_mut().zip(a.iter().zip(b)) {
+            *best = ((distance(a, b) << 12) + base).min(*best);
         }
         best
     }
 
     #[inline(always)]
-    fn costs(&self, point: &[Descriptor; 4], columns: [&Eight<Descriptor>; 4]) -> Eight<i16> {
-        let mut costs = [0; LANES];
-        for (corner, column) in point.iter().zip(columns) {
-            costs.iter_mut().zip(column).for_each(|(cost, other)| *cost += distance(corner, other) as i16);
-        }
-        costs
+    fn ordered(&self, keys: Eight<u32>) -> Eight<u32> {
+        keys
+    }
+
+    #[inline(always)]
+    fn costs(&self, point: &[Descriptor; 4], columns: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]) {
+        for_columns(columns, costs, |columns| {
+            let mut costs = [0; LANES];
+            for (corner, column) in point.iter().zip(columns) {
+                costs.iter_mut().zip(column).for_each(|(cost, other)| *cost += distance(corner, other) as i16);
+            }
+            costs
+        });
     }
 }
 
@@ -140,19 +182,33 @@ mod tests {
     struct Equal {
         a: Eight<Descriptor>,
         b: Eight<Descriptor>,
-        best: Eight<u32>,
-        barred: Eight<u32>,
+        /// The greatest key to begin with.
+        most: u32,
+    }
+
+    impl Equal {
+        /// The least keys of two candidates.
+        fn least(&self, base: u32, kernels: &impl Kernels) -> Eight<u32> {
+            let halved = self.a.map(|Descriptor(bytes)| Descriptor(bytes.map(|byte| byte / 2)));
+            let best = kernels.least([self.most; LANES], [&self.a, &self.b], base);
+            kernels.ordered(kernels.least(best, [&self.b, &halved], base + 1))
+        }
     }
 
     impl Comparison for Equal {
         fn run(self, kernels: &impl Kernels) {
-            let Self { a, b, best, barred } = self;
-            assert_eq!(kernels.sums(&a, &b), Plain.sums(&a, &b));
             for base in [0, 7, 65_280 << 8 | 255] {
-                assert_eq!(kernels.least(best, [&a, &b], base, &barred), Plain.least(best, [&a, &b], base, &barred));
+                assert_eq!(self.least(base, kernels), self.least(base, &Plain));
             }
-            let (point, columns) = ([a[0], a[3], b[5], b[7]], [&a, &b, &b, &a]);
-            assert_eq!(kernels.costs(&point, columns), Plain.costs(&point, columns));
+            let Self { a, b, .. } = self;
+            assert_eq!(kernels.sums(&a, &b), Plain.sums(&a, &b));
+            assert_eq!(kernels.sums_of(&a, b.each_ref()), Plain.sums(&a, &b));
+            let (point, columns) = ([a[0], a[3], b[5], b[7]], [&[a, b, b][..], &[b, a, a], &[b, b, a], &[a, b]]);
+            let [mut costs, mut twin] = [[[-1; LANES]; 3]; 2];
+            kernels.costs(&point, columns, &mut costs);
+            Plain.costs(&point, columns, &mut twin);
+            assert_eq!(costs, twin);
+            assert_eq!(costs[2], [-1; LANES], "one of the four has two");
         }
     }
 
@@ -163,20 +219,10 @@ mod tests {
             for bound in [2, 16, 256].repeat(50) {
                 let [a, b] =
                     [(); 2].map(|()| [(); LANES].map(|()| Descriptor([(); 16].map(|()| (random.below(bound) * 255 / (bound - 1)) as u8))));
-                let best = [(); LANES].map(|()| random.below(1 << 30));
-                let barred = [(); LANES].map(|()| random.below(2) << 30);
-                compare(vectors, Equal { a, b, best, barred });
+                compare(vectors, Equal { a, b, most: random.below(1 << 30) });
             }
             let extremes = [[0; 16], [255; 16]].map(Descriptor);
-            compare(
-                vectors,
-                Equal {
-                    a: [extremes[0]; LANES],
-                    b: [extremes[1]; LANES],
-                    best: [1 << 30; LANES],
-                    barred: [0; LANES],
-                },
-            );
+            compare(vectors, Equal { a: [extremes[0]; LANES], b: [extremes[1]; LANES], most: 1 << 30 });
         }
     }
 }

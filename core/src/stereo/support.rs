@@ -14,7 +14,7 @@ use super::{
     StereoConfig,
     config::DISPARITY_LIMIT,
     descriptor::{Descriptor, Gradients, MARGIN, texture},
-    sad::{Comparison, Kernels, LANES, UNTEXTURED, eight},
+    sad::{Comparison, Eight, Kernels, LANES, UNTEXTURED, eight},
 };
 
 /// No match at this candidate.
@@ -60,18 +60,20 @@ impl Rows<'_> {
 
     /// What each column from `first` on costs, eight at a time. Those beyond the row, which have no descriptors, mean nothing.
     #[inline(always)]
-    fn costs(&self, point: &[Descriptor; 4], first: usize, costs: &mut [i16], kernels: &impl Kernels) {
-        let mut spare = [UNTEXTURED; 4];
-        let [north_west, north_east, south_west, south_east] = &mut spare;
-        for (i, costs) in costs.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-            let (west, east) = (first - CORNER + i * LANES, first + CORNER + i * LANES);
-            let columns = [
-                eight(self.above, west, north_west),
-                eight(self.above, east, north_east),
-                eight(self.below, west, south_west),
-                eight(self.below, east, south_east),
-            ];
-            *costs = kernels.costs(point, columns);
+    fn costs(&self, point: &[Descriptor; 4], first: usize, costs: &mut [Eight<i16>], kernels: &impl Kernels) {
+        let (west, east) = (first - CORNER, first + CORNER);
+        let from = [(self.above, west), (self.above, east), (self.below, west), (self.below, east)];
+        let columns = from.map(|(row, at)| part(row, at..).as_chunks().0);
+        kernels.costs(point, columns, costs);
+        // The east ends first.
+        let whole = columns[1].len();
+        if let Some(last) = costs.get_mut(whole..) {
+            let mut spare = [UNTEXTURED; 4];
+            for (i, costs) in (whole..).zip(last) {
+                let mut from = from.iter().zip(&mut spare).map(|(&(row, at), spare)| [*eight(row, at + i * LANES, spare)]);
+                let columns = [(); 4].map(|()| from.next().unwrap_or([UNTEXTURED]));
+                kernels.costs(point, columns.each_ref().map(|columns| &columns[..]), core::slice::from_mut(costs));
+            }
         }
     }
 }
@@ -152,9 +154,9 @@ impl SupportMatching<'_> {
             return None;
         }
         // At most 64 x 255 = 16,320, so that costs fit i16, whose minimum is one instruction everywhere.
-        let mut costs = [i16::MAX; DISPARITY_LIMIT as usize + 1];
-        other.costs(&point, first, part_mut(&mut costs, ..count.next_multiple_of(LANES)), kernels);
-        self.distinct(part(&costs, ..count)).map(|i| first + i)
+        let mut costs = [[i16::MAX; LANES]; (DISPARITY_LIMIT as usize + 1) / LANES];
+        other.costs(&point, first, part_mut(&mut costs, ..count.div_ceil(LANES)), kernels);
+        self.distinct(part(costs.as_flattened(), ..count)).map(|i| first + i)
     }
 
     /// Position of the least cost, if it passes the ratio test.

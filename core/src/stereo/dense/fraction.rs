@@ -32,6 +32,7 @@ pub(super) fn refine_row(config: &StereoConfig, here: &[Descriptor], other: &[De
 
 /// The fractions of eight pixels from column `u` on, in working units; 0 for those whose disparity has no neighbours to compare it with.
 #[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "steps are below three")]
 fn find_fractions(
     config: &StereoConfig,
     points: &Eight<Descriptor>,
@@ -40,14 +41,14 @@ fn find_fractions(
     kernels: &impl Kernels,
 ) -> Eight<i32> {
     // In the right image disparity grows to the left.
-    let distances = |step: usize| {
-        let mut others = UNTEXTURED;
-        for (lane, (to, d)) in others.iter_mut().zip(px).enumerate() {
-            let column = (u + lane + step).wrapping_sub(usize::from(d.unsigned_abs()) + 1);
-            *to = other.get(column).copied().unwrap_or(Descriptor::UNTEXTURED);
+    let mut windows = [&[Descriptor::UNTEXTURED; 3]; LANES];
+    for ((column, window), d) in (u..).zip(&mut windows).zip(px) {
+        let after = column.wrapping_sub(usize::from(d.unsigned_abs()) + 1);
+        if let Some(three) = other.get(after..).and_then(|row| row.first_chunk()) {
+            *window = three;
         }
-        kernels.sums(points, &others)
-    };
+    }
+    let distances = |step: usize| kernels.sums_of(points, windows.map(|window| &window[step]));
     let (after, at, before) = (distances(0), distances(1), distances(2));
     let mut fractions = [0; LANES];
     let distances = before.into_iter().zip(at).zip(after);

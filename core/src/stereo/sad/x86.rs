@@ -7,32 +7,36 @@ use super::{Comparison, Descriptor, Eight, Functions, Kernels};
 use bytemuck::cast;
 use core::arch::x86_64::{
     __m128i, __m256i, _mm_add_epi32, _mm_and_si128, _mm_andnot_si128, _mm_cmplt_epi32, _mm_madd_epi16, _mm_or_si128, _mm_packs_epi32,
-    _mm_sad_epu8, _mm_set1_epi16, _mm_set1_epi32, _mm_slli_epi32, _mm256_add_epi32, _mm256_broadcastsi128_si256, _mm256_castsi256_si128,
-    _mm256_extracti128_si256, _mm256_madd_epi16, _mm256_min_epi32, _mm256_or_si256, _mm256_packs_epi32, _mm256_permutevar8x32_epi32,
-    _mm256_sad_epu8, _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setr_epi32, _mm256_slli_epi32,
+    _mm_sad_epu8, _mm_set1_epi16, _mm_set1_epi32, _mm256_add_epi32, _mm256_broadcastsi128_si256, _mm256_castsi256_si128,
+    _mm256_extracti128_si256, _mm256_madd_epi16, _mm256_min_epi32, _mm256_packs_epi32, _mm256_permutevar8x32_epi32, _mm256_sad_epu8,
+    _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setr_epi32,
 };
+
+/// The sums' place in a key, as a factor: the addition of halves multiplies by it for nothing.
+const KEY_SCALE: i16 = 1 << 12;
 
 /// Runs work with 128 bits.
 #[target_feature(enable = "sse2")]
 pub fn with_sse2(work: impl Comparison) {
-    let whole = |[a, b, c, d]: [__m128i; 4]| {
+    let scaled = |[a, b, c, d]: [__m128i; 4], scale: i16| {
         let halves = _mm_packs_epi32(_mm_packs_epi32(a, b), _mm_packs_epi32(c, d));
-        _mm_madd_epi16(halves, _mm_set1_epi16(1))
+        _mm_madd_epi16(halves, _mm_set1_epi16(scale))
     };
-    let sums = |a: &Eight<Descriptor>, b: &Eight<Descriptor>| {
+    let whole = |halves: [__m128i; 4]| scaled(halves, 1);
+    let sums = |a: &Eight<Descriptor>, b: &Eight<Descriptor>, scale: i16| {
         let ([a, b, c, d, e, f, g, h], [i, j, k, l, m, n, o, p]): (Eight<__m128i>, Eight<__m128i>) = (cast(*a), cast(*b));
-        let low = whole([_mm_sad_epu8(a, i), _mm_sad_epu8(b, j), _mm_sad_epu8(c, k), _mm_sad_epu8(d, l)]);
-        let high = whole([_mm_sad_epu8(e, m), _mm_sad_epu8(f, n), _mm_sad_epu8(g, o), _mm_sad_epu8(h, p)]);
+        let low = scaled([_mm_sad_epu8(a, i), _mm_sad_epu8(b, j), _mm_sad_epu8(c, k), _mm_sad_epu8(d, l)], scale);
+        let high = scaled([_mm_sad_epu8(e, m), _mm_sad_epu8(f, n), _mm_sad_epu8(g, o), _mm_sad_epu8(h, p)], scale);
         [low, high]
     };
-    let least = |best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32, barred: &Eight<u32>| {
-        let lesser = |sums: __m128i, best: __m128i, barred: __m128i| {
-            let key = _mm_or_si128(_mm_add_epi32(_mm_slli_epi32(sums, 12), _mm_set1_epi32(base as i32)), barred);
+    let least = |best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32| {
+        let lesser = |sums: __m128i, best: __m128i| {
+            let key = _mm_add_epi32(sums, _mm_set1_epi32(base as i32));
             let is_less = _mm_cmplt_epi32(key, best);
             _mm_or_si128(_mm_and_si128(is_less, key), _mm_andnot_si128(is_less, best))
         };
-        let ([low, high], [best_low, best_high], [barred_low, barred_high]) = (sums(a, b), cast(best), cast(*barred));
-        cast([lesser(low, best_low, barred_low), lesser(high, best_high, barred_high)])
+        let ([low, high], [best_low, best_high]) = (sums(a, b, KEY_SCALE), cast(best));
+        cast([lesser(low, best_low), lesser(high, best_high)])
     };
     let costs = |point: &[Descriptor; 4], [a, b, c, d]: [&Eight<Descriptor>; 4]| {
         let [p, q, r, s]: [__m128i; 4] = cast(*point);
@@ -51,8 +55,12 @@ pub fn with_sse2(work: impl Comparison) {
     run(
         work,
         &Functions {
-            sums: |a: &Eight<Descriptor>, b: &Eight<Descriptor>| cast(sums(a, b)),
+            sums: |a: &Eight<Descriptor>, b: &Eight<Descriptor>| cast(sums(a, b, 1)),
+            sums_of: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&Descriptor>| {
+                cast(sums(a, &[*b, *c, *d, *e, *f, *g, *h, *i], 1))
+            },
             least,
+            ordered: |keys: Eight<u32>| keys,
             costs,
         },
     );
@@ -61,19 +69,20 @@ pub fn with_sse2(work: impl Comparison) {
 /// Runs work with 256 bits: two descriptors in a register.
 #[target_feature(enable = "avx2")]
 pub fn with_avx2(work: impl Comparison) {
-    let whole = |[a, b, c, d]: [__m256i; 4]| {
+    // The even sums before the odd ones.
+    let scaled = |[a, b, c, d]: [__m256i; 4], scale: i16| {
         let halves = _mm256_packs_epi32(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
-        // The even sums before the odd ones.
-        let sums = _mm256_madd_epi16(halves, _mm256_set1_epi16(1));
-        _mm256_permutevar8x32_epi32(sums, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7))
+        _mm256_madd_epi16(halves, _mm256_set1_epi16(scale))
     };
-    let sums = |a: &Eight<Descriptor>, b: &Eight<Descriptor>| {
+    let ordered = |sums: __m256i| _mm256_permutevar8x32_epi32(sums, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7));
+    let whole = |halves: [__m256i; 4]| ordered(scaled(halves, 1));
+    let sads = |a: &Eight<Descriptor>, b: &Eight<Descriptor>| {
         let ([a, b, c, d], [e, f, g, h]): ([__m256i; 4], [__m256i; 4]) = (cast(*a), cast(*b));
-        whole([_mm256_sad_epu8(a, e), _mm256_sad_epu8(b, f), _mm256_sad_epu8(c, g), _mm256_sad_epu8(d, h)])
+        [_mm256_sad_epu8(a, e), _mm256_sad_epu8(b, f), _mm256_sad_epu8(c, g), _mm256_sad_epu8(d, h)]
     };
-    let least = |best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32, barred: &Eight<u32>| {
-        let key = _mm256_add_epi32(_mm256_slli_epi32(sums(a, b), 12), _mm256_set1_epi32(base as i32));
-        cast(_mm256_min_epi32(cast(best), _mm256_or_si256(key, cast(*barred))))
+    let least = |best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32| {
+        let key = _mm256_add_epi32(scaled(sads(a, b), KEY_SCALE), _mm256_set1_epi32(base as i32));
+        cast(_mm256_min_epi32(cast(best), key))
     };
     let costs = |point: &[Descriptor; 4], [a, b, c, d]: [&Eight<Descriptor>; 4]| {
         // Not by `map`, which compilers leave as a call.
@@ -91,8 +100,20 @@ pub fn with_avx2(work: impl Comparison) {
     run(
         work,
         &Functions {
-            sums: |a: &Eight<Descriptor>, b: &Eight<Descriptor>| cast(sums(a, b)),
+            sums: |a: &Eight<Descriptor>, b: &Eight<Descriptor>| cast(whole(sads(a, b))),
+            // Two descriptors from two places are not worth a register.
+            sums_of: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&Descriptor>| {
+                let a: Eight<__m128i> = cast(*a);
+                let sad = |a: __m128i, b: &Descriptor| _mm_sad_epu8(a, cast(*b));
+                let half = |[a, b, c, d]: [__m128i; 4]| {
+                    _mm_madd_epi16(_mm_packs_epi32(_mm_packs_epi32(a, b), _mm_packs_epi32(c, d)), _mm_set1_epi16(1))
+                };
+                let low = half([sad(a[0], b), sad(a[1], c), sad(a[2], d), sad(a[3], e)]);
+                let high = half([sad(a[4], f), sad(a[5], g), sad(a[6], h), sad(a[7], i)]);
+                cast([low, high])
+            },
             least,
+            ordered: |keys: Eight<u32>| cast(ordered(cast(keys))),
             costs,
         },
     );
