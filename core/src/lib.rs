@@ -28,6 +28,7 @@ pub mod planning;
 pub mod problem;
 pub mod random;
 pub mod rectify;
+mod sad;
 pub mod scene_flow;
 mod state;
 pub mod stereo;

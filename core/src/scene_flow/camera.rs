@@ -1,13 +1,14 @@
 //! What is kept of one camera: two frames, the previous and the current one, swapped by index.
 
 use super::{
-    features::{DESCRIPTOR, Features, table},
+    features::{Features, table},
     filter::{COLUMN_SUMS, Responses, filter},
     suppression::{Candidate, Field, SCRATCH_ROWS, suppress},
 };
 use crate::{
     image::{InvalidPixels, View},
     memory::{Capacity, Carver, region_bytes},
+    sad::Descriptor,
     state::Visitor,
 };
 
@@ -77,7 +78,7 @@ impl<'s> Camera<'s> {
         let features = 2 * (capacity.features + sparse(capacity));
         region_bytes::<u8>(2 * pixels)
             + region_bytes::<[u16; 2]>(features)
-            + region_bytes::<[u8; DESCRIPTOR]>(features)
+            + region_bytes::<[Descriptor; 2]>(features)
             + region_bytes::<u32>(4 * table(capacity))
             + region_bytes::<u16>(pixels)
             + 2 * region_bytes::<i16>(pixels)

@@ -6,7 +6,10 @@ use super::{
     features::{Features, Window},
     matches::Match,
 };
-use crate::parallel::{Bands, Executor, each, zip2};
+use crate::{
+    parallel::{Bands, Executor, each, zip2},
+    sad::{Comparison, Kernels, compare},
+};
 use bytemuck::{Pod, Zeroable};
 
 /// One side of the circle has no partner.
@@ -44,6 +47,24 @@ pub(super) struct Corners<'a, 's> {
     pub current_left: &'a Features<'s>,
 }
 
+/// The circles of some of the previous left features, as work that compares descriptors.
+struct TraceBand<'t, 'a, 's, R> {
+    corners: &'t Corners<'a, 's>,
+    reach: &'t R,
+    /// The first of them.
+    first: usize,
+    traced: &'t mut [[u32; 3]],
+}
+
+impl<R: Fn([u16; 2]) -> Reach> Comparison for TraceBand<'_, '_, '_, R> {
+    #[inline(always)]
+    fn run(self, kernels: &impl Kernels) {
+        for (index, partners) in (self.first..).zip(self.traced) {
+            *partners = self.corners.circle(index, self.reach, kernels).unwrap_or(NONE);
+        }
+    }
+}
+
 impl Corners<'_, '_> {
     /// Traces every circle. `traced[i]` becomes the partners of previous-left feature i, in the circle's order.
     pub(super) fn trace<E: Executor>(&self, reach: impl Fn([u16; 2]) -> Reach + Sync, traced: &mut [[u32; 3]], executor: &E) {
@@ -51,26 +72,30 @@ impl Corners<'_, '_> {
         let Some(traced) = traced.get_mut(..len) else { return };
         let bands = Bands::of(len);
         each(executor, zip2(bands.first(), bands.split_mut(traced, 1)), |(first, traced)| {
-            for (index, partners) in (first..).zip(traced) {
-                *partners = self.circle(index, &reach).unwrap_or(NONE);
-            }
+            compare(executor.vectors(), TraceBand { corners: self, reach: &reach, first, traced });
         });
     }
 
     /// The circle that begins with one feature, if it closes.
-    fn circle(&self, first: usize, reach: impl Fn([u16; 2]) -> Reach) -> Option<[u32; 3]> {
+    #[inline(always)]
+    fn circle(&self, first: usize, reach: impl Fn([u16; 2]) -> Reach, kernels: &impl Kernels) -> Option<[u32; 3]> {
         let class = self.previous_left.class(first);
         let reach = reach(self.previous_left.at(first)?);
-        let step = |from: &Features<'_>, index: usize, to: &Features<'_>, by: [i16; 4]| {
-            let [u, v] = from.at(index)?.map(i32::from);
-            let by = by.map(i32::from);
+        let sides = [
+            (self.previous_left, self.previous_right, reach.to_previous_right),
+            (self.previous_right, self.current_right, reach.to_current_right),
+            (self.current_right, self.current_left, reach.to_current_left),
+            (self.current_left, self.previous_left, reach.to_previous_left),
+        ];
+        let mut corners = [first; 5];
+        let mut index = first;
+        for ((from, to, by), corner) in sides.into_iter().zip(corners.iter_mut().skip(1)) {
+            let ([u, v], by) = (from.at(index)?.map(i32::from), by.map(i32::from));
             let window = Window { u_min: u + by[0], u_max: u + by[1], v_min: v + by[2], v_max: v + by[3] };
-            to.nearest(class, window, from.descriptor(index)?)
-        };
-        let previous_right = step(self.previous_left, first, self.previous_right, reach.to_previous_right)?;
-        let current_right = step(self.previous_right, previous_right, self.current_right, reach.to_current_right)?;
-        let current_left = step(self.current_right, current_right, self.current_left, reach.to_current_left)?;
-        let back = step(self.current_left, current_left, self.previous_left, reach.to_previous_left)?;
+            index = to.nearest(class, window, from.descriptor(index)?, kernels)?;
+            *corner = index;
+        }
+        let [_, previous_right, current_right, current_left, back] = corners;
         (back == first).then_some([previous_right as u32, current_right as u32, current_left as u32])
     }
 

@@ -6,14 +6,17 @@
 //! Memory: 36 bytes per feature, and 4 bytes per class and cell (16 / 256 bytes per pixel).
 
 use super::suppression::{CLASSES, Candidate};
-use crate::memory::Capacity;
+use crate::{
+    memory::Capacity,
+    sad::{Descriptor, Eight, Inside, Kernels, LANES, NO_FEATURE, OFFSET_BITS},
+};
 
 /// Columns of a cell.
 pub(super) const CELL_U: usize = 32;
 /// Rows of a cell.
 pub(super) const CELL_V: usize = 8;
 /// Bytes of a descriptor: 16 positions, two Sobel responses each.
-pub(super) const DESCRIPTOR: usize = 32;
+const DESCRIPTOR: usize = 32;
 
 /// Where a descriptor samples the gradients, relative to the feature: 16 positions within 11 x 11 px, finer towards the middle.
 const SAMPLES: [(isize, isize); DESCRIPTOR / 2] = [
@@ -39,7 +42,7 @@ const SAMPLES: [(isize, isize); DESCRIPTOR / 2] = [
 #[derive(Debug)]
 pub(super) struct Features<'s> {
     at: &'s mut [[u16; 2]],
-    descriptor: &'s mut [[u8; DESCRIPTOR]],
+    descriptor: &'s mut [[Descriptor; 2]],
     start: &'s mut [u32],
     len: usize,
     bands: usize,
@@ -53,7 +56,7 @@ pub(super) const fn table(capacity: &Capacity) -> usize {
 
 impl<'s> Features<'s> {
     /// An empty set with space for as many features as `at` and `descriptor` have entries, `start` has [`table`] of them.
-    pub(super) fn new(at: &'s mut [[u16; 2]], descriptor: &'s mut [[u8; DESCRIPTOR]], start: &'s mut [u32]) -> Self {
+    pub(super) fn new(at: &'s mut [[u16; 2]], descriptor: &'s mut [[Descriptor; 2]], start: &'s mut [u32]) -> Self {
         Self { at, descriptor, start, len: 0, bands: 0, cells: 0 }
     }
 
@@ -111,7 +114,7 @@ impl<'s> Features<'s> {
             *cursor += 1;
             if let (Some(at), Some(descriptor)) = (self.at.get_mut(slot), self.descriptor.get_mut(slot)) {
                 *at = [candidate.u, candidate.v];
-                describe(gradient, width, usize::from(candidate.u), usize::from(candidate.v), descriptor);
+                describe(gradient, width, usize::from(candidate.u), usize::from(candidate.v), bytemuck::cast_mut(descriptor));
             }
         }
         start.copy_within(..keys, 1);
@@ -128,12 +131,13 @@ impl<'s> Features<'s> {
     }
 
     /// Descriptor of a feature.
-    pub(super) fn descriptor(&self, index: usize) -> Option<&[u8; DESCRIPTOR]> {
+    pub(super) fn descriptor(&self, index: usize) -> Option<&[Descriptor; 2]> {
         self.descriptor.get(index)
     }
 
     /// The feature of `class` within the window whose descriptor is nearest; the first of equals in the set's order.
-    pub(super) fn nearest(&self, class: usize, window: Window, descriptor: &[u8; DESCRIPTOR]) -> Option<usize> {
+    #[inline(always)]
+    pub(super) fn nearest(&self, class: usize, window: Window, descriptor: &[Descriptor; 2], kernels: &impl Kernels) -> Option<usize> {
         if window.u_max < 0 || window.v_max < 0 || window.u_min > window.u_max || window.v_min > window.v_max || self.bands == 0 {
             return None;
         }
@@ -143,46 +147,50 @@ impl<'s> Features<'s> {
         if first_cell > last_cell {
             return None;
         }
-        // Positions are below 2^16, so that a position left of or above the window wraps to one far beyond it.
-        let low = [u_min, v_min].map(|x| x as u16);
+        let low = [u_min, v_min].map(|x| x.min(usize::from(u16::MAX)) as u16);
         let span = [u_max - u_min, v_max - v_min].map(|x| x.min(usize::from(u16::MAX)) as u16);
         let (mut best, mut best_difference) = (None, u32::MAX);
         for band in first_band..=last_band {
             let row = (class * self.bands + band) * self.cells;
             let (Some(&from), Some(&to)) = (self.start.get(row + first_cell), self.start.get(row + last_cell + 1)) else { continue };
-            let run = from as usize..to as usize;
-            let (Some(at), Some(descriptors)) = (self.at.get(run.clone()), self.descriptor.get(run)) else { continue };
-            if let Some((index, difference)) = closest(at, descriptors, low, span, descriptor, best_difference) {
-                (best, best_difference) = (Some(from as usize + index), difference);
+            // No 4 x 4 px hold two features of a class: a band's offsets fit.
+            let end = to.saturating_sub(from);
+            let mut keys = [NO_FEATURE; LANES];
+            for offset in (0..end).step_by(LANES) {
+                let start = (from + offset) as usize;
+                let inside = |at| Inside { at, low, span, offset, end };
+                keys = match (chunk(self.at, start), chunk(self.descriptor, start)) {
+                    (Some(at), Some(others)) => kernels.least_inside(keys, descriptor, others, &inside(at)),
+                    _ => {
+                        let (at, others) = self.last_eight(start);
+                        kernels.least_inside(keys, descriptor, &others, &inside(&at))
+                    }
+                };
+            }
+            let key = keys.into_iter().fold(NO_FEATURE, |a, b| a.min(b));
+            if key >> OFFSET_BITS < best_difference && key != NO_FEATURE {
+                best_difference = key >> OFFSET_BITS;
+                best = Some((from + (key & ((1 << OFFSET_BITS) - 1))) as usize);
             }
         }
         best
     }
+
+    /// The set's last features from `start` on, fewer than eight, and others that mean nothing.
+    #[cold]
+    #[inline(never)]
+    fn last_eight(&self, start: usize) -> (Eight<[u16; 2]>, Eight<[Descriptor; 2]>) {
+        let mut eight = ([[0; 2]; LANES], [[Descriptor([0; 16]); 2]; LANES]);
+        eight.0.iter_mut().zip(self.at.iter().skip(start)).for_each(|(to, at)| *to = *at);
+        eight.1.iter_mut().zip(self.descriptor.iter().skip(start)).for_each(|(to, descriptor)| *to = *descriptor);
+        eight
+    }
 }
 
-/// The first of a run's features that is inside the window and differs least, if it differs by less than `bound`.
-///
-/// Whether a feature is inside is a coin toss that no branch predictor wins: all are compared, and those outside lose. The descriptor
-/// sought is read anew each time because a compiler that may keep it in registers keeps it there widened, and then misses the one
-/// instruction for sums of absolute differences.
-#[inline(never)]
-fn closest(
-    at: &[[u16; 2]],
-    descriptors: &[[u8; DESCRIPTOR]],
-    low: [u16; 2],
-    span: [u16; 2],
-    sought: &[u8; DESCRIPTOR],
-    bound: u32,
-) -> Option<(usize, u32)> {
-    let (mut best, mut best_difference) = (usize::MAX, bound);
-    for (index, (at, other)) in at.iter().zip(descriptors).enumerate() {
-        let inside = (at[0].wrapping_sub(low[0]) <= span[0]) & (at[1].wrapping_sub(low[1]) <= span[1]);
-        let difference = difference(core::hint::black_box(sought), other) | if inside { 0 } else { u32::MAX };
-        if difference < best_difference {
-            (best, best_difference) = (index, difference);
-        }
-    }
-    (best != usize::MAX).then_some((best, best_difference))
+/// Eight values from `start` on.
+#[inline(always)]
+fn chunk<T>(values: &[T], start: usize) -> Option<&Eight<T>> {
+    values.get(start..)?.first_chunk()
 }
 
 /// A search window, px, ends included.
@@ -201,10 +209,4 @@ fn describe(gradient: &[u16], width: usize, u: usize, v: usize, out: &mut [u8; D
         let at = centre.wrapping_add_signed(dv * width as isize + du);
         pair.copy_from_slice(&gradient.get(at).copied().unwrap_or(0).to_le_bytes());
     }
-}
-
-/// Sum of absolute differences.
-#[inline(always)]
-fn difference(a: &[u8; DESCRIPTOR], b: &[u8; DESCRIPTOR]) -> u32 {
-    a.iter().zip(b).map(|(&a, &b)| u32::from(a.abs_diff(b))).sum()
 }

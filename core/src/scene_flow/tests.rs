@@ -3,7 +3,7 @@ use super::{
     bucket::select,
     cells::{Cells, Shape},
     circle::{Corners, Reach},
-    features::{DESCRIPTOR, Features, Window, table},
+    features::{Features, Window, table},
     prior::Prior,
     refine::{Images, Pixels, SMALL_STEP_PX, Template, middle, refine},
     support::support,
@@ -14,8 +14,9 @@ use crate::{
     geometry::Transform,
     image::View,
     memory::{Capacity, Carver, Slab},
-    parallel::{Serial, TwoThreads},
+    parallel::{Serial, TwoThreads, Vectors},
     random::Random,
+    sad::{Comparison, Descriptor, Kernels, compare, distance},
 };
 use nalgebra::Vector3;
 use std::{boxed::Box, vec, vec::Vec};
@@ -147,6 +148,21 @@ fn scatter<'s>(carver: &mut Carver<'s>, random: &mut Random, count: usize) -> (F
     (features, candidates)
 }
 
+/// That the search finds a feature.
+struct Finds<'f, 's> {
+    features: &'f Features<'s>,
+    class: usize,
+    window: Window,
+    sought: [Descriptor; 2],
+    expected: Option<usize>,
+}
+
+impl Comparison for Finds<'_, '_> {
+    fn run(self, kernels: &impl Kernels) {
+        assert_eq!(self.features.nearest(self.class, self.window, &self.sought, kernels), self.expected);
+    }
+}
+
 #[test]
 fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
     let mut slab = slab();
@@ -164,15 +180,16 @@ fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
                 v_min: v,
                 v_max: v + random.below(60) as i32,
             };
-            let sought: [u8; DESCRIPTOR] = std::array::from_fn(|_| random.next_u32() as u8);
+            let sought = [(); 2].map(|()| Descriptor(std::array::from_fn(|_| random.next_u32() as u8)));
             let inside = |i: &usize| {
                 let [u, v] = features.at(*i).unwrap().map(i32::from);
                 features.class(*i) == class && (window.u_min..=window.u_max).contains(&u) && (window.v_min..=window.v_max).contains(&v)
             };
-            let sad =
-                |i: &usize| -> u32 { sought.iter().zip(features.descriptor(*i).unwrap()).map(|(a, b)| u32::from(a.abs_diff(*b))).sum() };
+            let sad = |i: &usize| -> u32 { sought.iter().zip(features.descriptor(*i).unwrap()).map(|(a, b)| distance(a, b)).sum() };
             let expected = (0..features.len()).filter(inside).min_by_key(|i| (sad(i), *i));
-            assert_eq!(features.nearest(class, window, &sought), expected);
+            for vectors in Vectors::available() {
+                compare(vectors, Finds { features: &features, class, window, sought, expected });
+            }
         }
     }
 }

@@ -16,9 +16,11 @@ use super::{
     StereoConfig,
     descriptor::{Descriptor, Gradients, MARGIN},
     prior::{CellGrid, DisparitySet, NO_PLANE, PlaneCost},
+};
+use crate::{
+    part::{part, part_mut},
     sad::{Comparison, Kernels, LANES},
 };
-use crate::part::{part, part_mut};
 
 /// A disparity of the working images: 1/64 px.
 pub(super) const WORKING_ONE_PX: i16 = 64;

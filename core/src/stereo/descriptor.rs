@@ -2,12 +2,15 @@
 //!
 //! Descriptors are never kept for a whole image (16 bytes a pixel): a row of them is built from the gradients when it is matched.
 
-use crate::part::part;
-
 use super::gradient::FLAT;
-use bytemuck::{Pod, Zeroable};
+use crate::{
+    part::part,
+    sad::{Eight, LANES, distance},
+};
 
-/// Eleven samples of the horizontal gradient, which tells disparities apart, and five of the vertical one:
+pub(super) use crate::sad::Descriptor;
+
+/// Stereo's descriptors have eleven samples of the horizontal gradient, which tells disparities apart, and five of the vertical one:
 ///
 /// ```text
 /// horizontal: . . . . .   vertical: . . . . .
@@ -17,15 +20,14 @@ use bytemuck::{Pod, Zeroable};
 ///             . . . . .             . . . . .
 /// ```
 ///
-/// Neighbours lie together so that few loads fetch them all. Aligned, so that it is loaded as one itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub(super) struct Descriptor(pub [u8; 16]);
-
+/// Neighbours lie together so that few loads fetch them all.
 impl Descriptor {
     /// That of a pixel amid no gradients.
     pub const UNTEXTURED: Self = Self([FLAT; 16]);
 }
+
+/// Eight descriptors without texture.
+pub(super) const UNTEXTURED: Eight<Descriptor> = [Descriptor::UNTEXTURED; LANES];
 
 /// Columns and rows at the image's rim that have no descriptor: two for the window, one because the outermost pixels have no gradient.
 pub(super) const MARGIN: usize = 3;
@@ -117,23 +119,29 @@ impl<'a> SampledRows<'a> {
     }
 }
 
-/// Sum of absolute differences of two descriptors, at most 4,080.
-///
-/// Written as larger less smaller in bytes: where one descriptor stays the same throughout a loop, the compiler would widen it once
-/// before the loop and so lose the one instruction that x86 has for such sums.
-#[inline(always)]
-pub(super) fn distance(a: &Descriptor, b: &Descriptor) -> u32 {
-    let mut differences = [0u8; 16];
-    for (difference, (&a, &b)) in differences.iter_mut().zip(a.0.iter().zip(&b.0)) {
-        *difference = a.max(b) - a.min(b);
-    }
-    differences.iter().map(|&difference| u32::from(difference)).sum()
-}
-
 /// Texture of a descriptor: the sum of its gradients' magnitudes.
 #[inline(never)]
 pub(super) fn texture(a: &Descriptor) -> u32 {
     distance(a, &Descriptor::UNTEXTURED)
+}
+
+/// Eight descriptors from column `at` on. Those beyond the row are taken from `spare`, which is filled for the purpose.
+#[inline(always)]
+pub(super) fn eight<'r>(row: &'r [Descriptor], at: usize, spare: &'r mut Eight<Descriptor>) -> &'r Eight<Descriptor> {
+    match row.get(at..).and_then(|row| row.first_chunk()) {
+        Some(all) => all,
+        None => copy_within(row, at, spare),
+    }
+}
+
+/// Copies those of the columns from `at` on that are within the row; a column left of it has wrapped around.
+#[cold]
+#[inline(never)]
+fn copy_within<'r>(row: &[Descriptor], at: usize, spare: &'r mut Eight<Descriptor>) -> &'r Eight<Descriptor> {
+    for (lane, to) in spare.iter_mut().enumerate() {
+        *to = row.get(at.wrapping_add(lane)).copied().unwrap_or(Descriptor::UNTEXTURED);
+    }
+    spare
 }
 
 #[cfg(test)]

@@ -61,7 +61,6 @@ mod matcher;
 mod median;
 mod prior;
 mod report;
-mod sad;
 mod smooth;
 mod speckle;
 mod support;

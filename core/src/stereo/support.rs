@@ -7,14 +7,16 @@
 //! Memory: two bytes a candidate, four rows of descriptors. Time: candidates x disparities x 4 descriptor distances, and once more for
 //! those that pass the other tests.
 
-use crate::part::{part, part_mut};
+use crate::{
+    part::{part, part_mut},
+    sad::{Comparison, Eight, Kernels, LANES},
+};
 use core::ops::RangeInclusive;
 
 use super::{
     StereoConfig,
     config::DISPARITY_LIMIT,
-    descriptor::{Descriptor, Gradients, MARGIN, texture},
-    sad::{Comparison, Eight, Kernels, LANES, UNTEXTURED, eight},
+    descriptor::{Descriptor, Gradients, MARGIN, UNTEXTURED, eight, texture},
 };
 
 /// No match at this candidate.

@@ -6,11 +6,11 @@
 
 use crate::{
     part::part,
+    sad::{Eight, Kernels, LANES},
     stereo::{
         StereoConfig,
-        descriptor::{Descriptor, MARGIN},
+        descriptor::{Descriptor, MARGIN, UNTEXTURED, eight},
         prior::{NO_PLANE, PLANE_WIDTH, PlaneCost, STEEP},
-        sad::{Eight, Kernels, LANES, UNTEXTURED, eight},
     },
 };
 

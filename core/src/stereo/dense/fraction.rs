@@ -2,11 +2,13 @@
 //! slope.
 
 use super::{NONE, WORKING_ONE_PX};
-use crate::stereo::{
-    StereoConfig,
-    descriptor::{Descriptor, MARGIN},
-    prior::NO_PLANE,
-    sad::{Eight, Kernels, LANES, UNTEXTURED, eight},
+use crate::{
+    sad::{Eight, Kernels, LANES},
+    stereo::{
+        StereoConfig,
+        descriptor::{Descriptor, MARGIN, UNTEXTURED, eight},
+        prior::NO_PLANE,
+    },
 };
 
 /// Less than half a pixel, so that what it is added to still rounds to the same.

@@ -4,7 +4,8 @@ use super::*;
 use crate::{
     parallel::Vectors,
     random::Random,
-    stereo::{descriptor::distance, prior::STEEP, sad::compare},
+    sad::{compare, distance},
+    stereo::prior::STEEP,
 };
 use std::{vec, vec::Vec};
 

@@ -5,6 +5,7 @@ use crate::{
     image::{DISPARITY_FILLED, DISPARITY_ONE_PX, InvalidPair, View},
     parallel::{BANDS, Bands, Executor, each, zip3},
     part::{part, part_mut},
+    sad::compare,
     stereo::{
         StereoConfig, StereoReport,
         config::DISPARITY_LIMIT,
@@ -15,7 +16,6 @@ use crate::{
         gaps::Filling,
         gradient, invalid, median, prior,
         prior::{CellGrid, DisparitySet, PlaneCost},
-        sad::compare,
         smooth, speckle,
         speckle::Scratch,
         support,

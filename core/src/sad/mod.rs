@@ -3,30 +3,68 @@
 //! x86 has one instruction for such sums, which compilers find in a loop over one pair at most. Work that compares descriptors is
 //! therefore written once, over [`Eight`] pairs, and compiled for each level of instructions (docs/decisions/0023-vector-kernels.md).
 
-use super::descriptor::{Descriptor, distance};
 use crate::parallel::{Level, Vectors};
+use bytemuck::{Pod, Zeroable};
 
 /// Pairs compared at once: neighbours in a row.
-pub(super) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 /// One value for each of them.
-pub(super) type Eight<T> = [T; LANES];
+pub(crate) type Eight<T> = [T; LANES];
 
-/// Eight descriptors without texture.
-pub(super) const UNTEXTURED: Eight<Descriptor> = [Descriptor::UNTEXTURED; LANES];
+/// Sixteen samples of an image around a pixel. Aligned, so that they are loaded as one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub(crate) struct Descriptor(pub [u8; 16]);
+
+/// Sum of absolute differences of two descriptors, at most 4,080.
+///
+/// Written as larger less smaller in bytes: where one descriptor stays the same throughout a loop, the compiler would widen it once
+/// before the loop and so lose the one instruction that x86 has for such sums.
+#[inline(always)]
+pub(crate) fn distance(a: &Descriptor, b: &Descriptor) -> u32 {
+    let mut differences = [0u8; 16];
+    for (difference, (&a, &b)) in differences.iter_mut().zip(a.0.iter().zip(&b.0)) {
+        *difference = a.max(b) - a.min(b);
+    }
+    differences.iter().map(|&difference| u32::from(difference)).sum()
+}
 
 /// Work that compares descriptors.
-pub(super) trait Comparison {
+pub(crate) trait Comparison {
     /// Does the work. To be inlined, with all it calls, so that it is compiled for the level of the kernels.
     fn run(self, kernels: &impl Kernels);
 }
 
+/// Bits of a key that tell which feature it is.
+pub(crate) const OFFSET_BITS: u32 = 18;
+/// The key of no feature.
+pub(crate) const NO_FEATURE: u32 = i32::MAX as u32;
+
+/// Eight features, and which of them count.
+pub(crate) struct Inside<'a> {
+    /// Their columns and rows.
+    pub at: &'a Eight<[u16; 2]>,
+    /// The first column and row of those that count.
+    pub low: [u16; 2],
+    /// How far the last ones are from there.
+    pub span: [u16; 2],
+    /// Of the first of the eight; the others' follow.
+    pub offset: u32,
+    /// Those from here on do not count.
+    pub end: u32,
+}
+
 /// What there is a kernel for.
-pub(super) trait Kernels {
+pub(crate) trait Kernels {
     /// Sums of absolute differences of eight pairs, each at most 4,080.
     fn sums(&self, a: &Eight<Descriptor>, b: &Eight<Descriptor>) -> Eight<u32>;
 
     /// The same with descriptors from anywhere.
     fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32>;
+
+    /// The lesser of `best` and of the keys of eight features that are compared with one: the sum of absolute differences of their two
+    /// descriptors, at most 8,160, above [`OFFSET_BITS`] for their offsets. Features outside do not count.
+    fn least_inside(&self, best: Eight<u32>, sought: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>) -> Eight<u32>;
 
     /// The lesser of `best` and of what the pairs' sums make with `base`, each positive as `i32`: `(sum << 12) + base`. In the order in
     /// which the sums come, which [`Kernels::ordered`] undoes.
@@ -42,19 +80,21 @@ pub(super) trait Kernels {
 
 /// Kernels as functions, so that each can be written where its instructions are safe.
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
-struct Functions<S, F, L, O, C> {
+struct Functions<S, F, W, L, O, C> {
     sums: S,
     sums_of: F,
+    least_inside: W,
     least: L,
     ordered: O,
     costs: C,
 }
 
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
-impl<S, F, L, O, C> Kernels for Functions<S, F, L, O, C>
+impl<S, F, W, L, O, C> Kernels for Functions<S, F, W, L, O, C>
 where
     S: Fn(&Eight<Descriptor>, &Eight<Descriptor>) -> Eight<u32>,
     F: Fn(&Eight<Descriptor>, Eight<&Descriptor>) -> Eight<u32>,
+    W: Fn(Eight<u32>, &[Descriptor; 2], &Eight<[Descriptor; 2]>, &Inside<'_>) -> Eight<u32>,
     L: Fn(Eight<u32>, [&Eight<Descriptor>; 2], u32) -> Eight<u32>,
     O: Fn(Eight<u32>) -> Eight<u32>,
     C: Fn(&[Descriptor; 4], [&Eight<Descriptor>; 4]) -> Eight<i16>,
@@ -67,6 +107,11 @@ where
     #[inline(always)]
     fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32> {
         (self.sums_of)(a, b)
+    }
+
+    #[inline(always)]
+    fn least_inside(&self, best: Eight<u32>, sought: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>) -> Eight<u32> {
+        (self.least_inside)(best, sought, others, inside)
     }
 
     #[inline(always)]
@@ -98,7 +143,7 @@ fn for_columns([a, b, c, d]: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]
     all(target_arch = "x86_64", target_feature = "sse2"),
     expect(unsafe_code, reason = "calls code compiled for what the processor has")
 )]
-pub(super) fn compare(vectors: Vectors, work: impl Comparison) {
+pub(crate) fn compare(vectors: Vectors, work: impl Comparison) {
     match vectors.level() {
         Level::Plain => work.run(&Plain),
         // SAFETY: all of the target's machines have SSE2.
@@ -111,7 +156,7 @@ pub(super) fn compare(vectors: Vectors, work: impl Comparison) {
 }
 
 /// The twins of the kernels, and the kernels of machines without any.
-struct Plain;
+pub(crate) struct Plain;
 
 impl Kernels for Plain {
     #[inline(always)]
@@ -124,6 +169,24 @@ impl Kernels for Plain {
         let mut sums = [0; LANES];
         sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum = distance(a, b));
         sums
+    }
+
+    #[inline(always)]
+    fn least_inside(
+        &self,
+        mut best: Eight<u32>,
+        [first, second]: &[Descriptor; 2],
+        others: &Eight<[Descriptor; 2]>,
+        inside: &Inside<'_>,
+    ) -> Eight<u32> {
+        let Inside { at, low, span, offset, end } = *inside;
+        for ((best, offset), ([u, v], [a, b])) in best.iter_mut().zip(offset..).zip(at.iter().zip(others)) {
+            // Left of the first column, or above the first row, differences wrap to far beyond the last.
+            let counts = (u.wrapping_sub(low[0]) <= span[0]) & (v.wrapping_sub(low[1]) <= span[1]) & (offset < end);
+            let key = (distance(first, a) + distance(second, b)) << OFFSET_BITS | offset;
+            *best = if counts { key.min(*best) } else { *best };
+        }
+        best
     }
 
     #[inline(always)]
@@ -154,25 +217,6 @@ impl Kernels for Plain {
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
 mod x86;
 
-/// Eight descriptors from column `at` on. Those beyond the row are taken from `spare`, which is filled for the purpose.
-#[inline(always)]
-pub(super) fn eight<'r>(row: &'r [Descriptor], at: usize, spare: &'r mut Eight<Descriptor>) -> &'r Eight<Descriptor> {
-    match row.get(at..).and_then(|row| row.first_chunk()) {
-        Some(all) => all,
-        None => copy_within(row, at, spare),
-    }
-}
-
-/// Copies those of the columns from `at` on that are within the row; a column left of it has wrapped around.
-#[cold]
-#[inline(never)]
-fn copy_within<'r>(row: &[Descriptor], at: usize, spare: &'r mut Eight<Descriptor>) -> &'r Eight<Descriptor> {
-    for (lane, to) in spare.iter_mut().enumerate() {
-        *to = row.get(at.wrapping_add(lane)).copied().unwrap_or(Descriptor::UNTEXTURED);
-    }
-    spare
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,9 +244,20 @@ mod tests {
             for base in [0, 7, 65_280 << 8 | 255] {
                 assert_eq!(self.least(base, kernels), self.least(base, &Plain));
             }
-            let Self { a, b, .. } = self;
+            let Self { a, b, most } = self;
             assert_eq!(kernels.sums(&a, &b), Plain.sums(&a, &b));
             assert_eq!(kernels.sums_of(&a, b.each_ref()), Plain.sums(&a, &b));
+            let (sought, others) = ([a[5], b[2]], bytemuck::cast([a, b]));
+            for (at, offset) in [[[7u16, 9]; LANES], [[8, 65_535], [9, 0], [8, 0], [65_535, 65_535], [0, 0], [7, 9], [107, 9], [108, 12]]]
+                .iter()
+                .zip([0, 1_000])
+            {
+                for (low, span) in [([0, 0], [65_535, 65_535]), ([8, 0], [99, 9]), ([7, 9], [100, 3]), ([0, 65_535], [65_535, 0])] {
+                    let inside = Inside { at, low, span, offset, end: 1_005 };
+                    let best = [NO_FEATURE.min(most); LANES];
+                    assert_eq!(kernels.least_inside(best, &sought, &others, &inside), Plain.least_inside(best, &sought, &others, &inside));
+                }
+            }
             let (point, columns) = ([a[0], a[3], b[5], b[7]], [&[a, b, b][..], &[b, a, a], &[b, b, a], &[a, b]]);
             let [mut costs, mut twin] = [[[-1; LANES]; 3]; 2];
             kernels.costs(&point, columns, &mut costs);

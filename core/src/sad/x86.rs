@@ -3,13 +3,15 @@
 //! A sum of absolute differences of 16 bytes comes in two halves of 64 bits. Packing those of four pairs twice leaves 16 bits a half, and
 //! adding neighbours leaves 32 bits a sum.
 
-use super::{Comparison, Descriptor, Eight, Functions, Kernels};
+use super::{Comparison, Descriptor, Eight, Functions, Inside, Kernels, NO_FEATURE, OFFSET_BITS};
 use bytemuck::cast;
 use core::arch::x86_64::{
-    __m128i, __m256i, _mm_add_epi32, _mm_and_si128, _mm_andnot_si128, _mm_cmplt_epi32, _mm_madd_epi16, _mm_or_si128, _mm_packs_epi32,
-    _mm_sad_epu8, _mm_set1_epi16, _mm_set1_epi32, _mm256_add_epi32, _mm256_broadcastsi128_si256, _mm256_castsi256_si128,
-    _mm256_extracti128_si256, _mm256_madd_epi16, _mm256_min_epi32, _mm256_packs_epi32, _mm256_permutevar8x32_epi32, _mm256_sad_epu8,
-    _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setr_epi32,
+    __m128i, __m256i, _mm_add_epi32, _mm_and_si128, _mm_andnot_si128, _mm_cmpeq_epi32, _mm_cmplt_epi32, _mm_madd_epi16, _mm_or_si128,
+    _mm_packs_epi32, _mm_sad_epu8, _mm_set1_epi16, _mm_set1_epi32, _mm_setr_epi32, _mm_setzero_si128, _mm_slli_epi32, _mm_sub_epi16,
+    _mm_subs_epu16, _mm256_add_epi32, _mm256_and_si256, _mm256_andnot_si256, _mm256_broadcastsi128_si256, _mm256_castsi256_si128,
+    _mm256_cmpeq_epi32, _mm256_cmpgt_epi32, _mm256_extracti128_si256, _mm256_madd_epi16, _mm256_min_epi32, _mm256_or_si256,
+    _mm256_packs_epi32, _mm256_permute2x128_si256, _mm256_permutevar8x32_epi32, _mm256_sad_epu8, _mm256_set1_epi16, _mm256_set1_epi32,
+    _mm256_setr_epi32, _mm256_setzero_si256, _mm256_slli_epi32, _mm256_sub_epi16, _mm256_subs_epu16,
 };
 
 /// The sums' place in a key, as a factor: the addition of halves multiplies by it for nothing.
@@ -29,14 +31,14 @@ pub fn with_sse2(work: impl Comparison) {
         let high = scaled([_mm_sad_epu8(e, m), _mm_sad_epu8(f, n), _mm_sad_epu8(g, o), _mm_sad_epu8(h, p)], scale);
         [low, high]
     };
+    let lesser = |key: __m128i, best: __m128i| {
+        let is_less = _mm_cmplt_epi32(key, best);
+        _mm_or_si128(_mm_and_si128(is_less, key), _mm_andnot_si128(is_less, best))
+    };
     let least = |best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32| {
-        let lesser = |sums: __m128i, best: __m128i| {
-            let key = _mm_add_epi32(sums, _mm_set1_epi32(base as i32));
-            let is_less = _mm_cmplt_epi32(key, best);
-            _mm_or_si128(_mm_and_si128(is_less, key), _mm_andnot_si128(is_less, best))
-        };
+        let key = |sums: __m128i| _mm_add_epi32(sums, _mm_set1_epi32(base as i32));
         let ([low, high], [best_low, best_high]) = (sums(a, b, KEY_SCALE), cast(best));
-        cast([lesser(low, best_low), lesser(high, best_high)])
+        cast([lesser(key(low), best_low), lesser(key(high), best_high)])
     };
     let costs = |point: &[Descriptor; 4], [a, b, c, d]: [&Eight<Descriptor>; 4]| {
         let [p, q, r, s]: [__m128i; 4] = cast(*point);
@@ -58,6 +60,29 @@ pub fn with_sse2(work: impl Comparison) {
             sums: |a: &Eight<Descriptor>, b: &Eight<Descriptor>| cast(sums(a, b, 1)),
             sums_of: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&Descriptor>| {
                 cast(sums(a, &[*b, *c, *d, *e, *f, *g, *h, *i], 1))
+            },
+            least_inside: |best: Eight<u32>, [first, second]: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>| {
+                let (first, second): (__m128i, __m128i) = (cast(*first), cast(*second));
+                let others: [[__m128i; 2]; 8] = cast(*others);
+                let sad = |[a, b]: [__m128i; 2]| _mm_add_epi32(_mm_sad_epu8(first, a), _mm_sad_epu8(second, b));
+                let low = whole([sad(others[0]), sad(others[1]), sad(others[2]), sad(others[3])]);
+                let high = whole([sad(others[4]), sad(others[5]), sad(others[6]), sad(others[7])]);
+                let offset = _mm_add_epi32(_mm_set1_epi32(inside.offset as i32), _mm_setr_epi32(0, 1, 2, 3));
+                let key = |sums: __m128i, at: __m128i, offset: __m128i| {
+                    let beyond = _mm_subs_epu16(_mm_sub_epi16(at, _mm_set1_epi32(both(inside.low))), _mm_set1_epi32(both(inside.span)));
+                    let is_inside = _mm_and_si128(
+                        _mm_cmpeq_epi32(beyond, _mm_setzero_si128()),
+                        _mm_cmplt_epi32(offset, _mm_set1_epi32(inside.end as i32)),
+                    );
+                    let key = _mm_or_si128(_mm_slli_epi32(sums, OFFSET_BITS as i32), offset);
+                    _mm_or_si128(key, _mm_andnot_si128(is_inside, _mm_set1_epi32(NO_FEATURE as i32)))
+                };
+                let [at_low, at_high]: [__m128i; 2] = cast(*inside.at);
+                let [best_low, best_high] = cast(best);
+                cast([
+                    lesser(key(low, at_low, offset), best_low),
+                    lesser(key(high, at_high, _mm_add_epi32(offset, _mm_set1_epi32(4))), best_high),
+                ])
             },
             least,
             ordered: |keys: Eight<u32>| keys,
@@ -112,11 +137,34 @@ pub fn with_avx2(work: impl Comparison) {
                 let high = half([sad(a[4], f), sad(a[5], g), sad(a[6], h), sad(a[7], i)]);
                 cast([low, high])
             },
+            least_inside: |best: Eight<u32>, sought: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>| {
+                let (sought, others): (__m256i, Eight<__m256i>) = (cast(*sought), cast(*others));
+                let sad = |other: __m256i| _mm256_sad_epu8(sought, other);
+                // Sums of the first descriptors below those of the second.
+                let low = scaled([sad(others[0]), sad(others[1]), sad(others[2]), sad(others[3])], 1);
+                let high = scaled([sad(others[4]), sad(others[5]), sad(others[6]), sad(others[7])], 1);
+                let sums = _mm256_add_epi32(_mm256_permute2x128_si256(low, high, 0x20), _mm256_permute2x128_si256(low, high, 0x31));
+                let offset = _mm256_add_epi32(_mm256_set1_epi32(inside.offset as i32), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+                let at = _mm256_sub_epi16(cast(*inside.at), _mm256_set1_epi32(both(inside.low)));
+                let beyond = _mm256_subs_epu16(at, _mm256_set1_epi32(both(inside.span)));
+                let is_inside = _mm256_and_si256(
+                    _mm256_cmpeq_epi32(beyond, _mm256_setzero_si256()),
+                    _mm256_cmpgt_epi32(_mm256_set1_epi32(inside.end as i32), offset),
+                );
+                let key = _mm256_or_si256(_mm256_slli_epi32(sums, OFFSET_BITS as i32), offset);
+                let key = _mm256_or_si256(key, _mm256_andnot_si256(is_inside, _mm256_set1_epi32(NO_FEATURE as i32)));
+                cast(_mm256_min_epi32(cast(best), key))
+            },
             least,
             ordered: |keys: Eight<u32>| cast(ordered(cast(keys))),
             costs,
         },
     );
+}
+
+/// A column and a row as they lie in a position.
+fn both([column, row]: [u16; 2]) -> i32 {
+    i32::from(row) << 16 | i32::from(column)
 }
 
 /// Closures compiled for a level are known to compilers by the traits they implement.
