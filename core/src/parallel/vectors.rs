@@ -25,6 +25,9 @@ pub(crate) enum Level {
     /// 256 bits.
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     Avx2,
+    /// 128 bits of 64-bit Arm.
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+    Neon,
 }
 
 impl Vectors {
@@ -34,7 +37,13 @@ impl Vectors {
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     pub const BASELINE: Self = Self(Level::Sse2);
     /// What every machine of the target has.
-    #[cfg(not(all(target_arch = "x86_64", target_feature = "sse2")))]
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+    pub const BASELINE: Self = Self(Level::Neon);
+    /// What every machine of the target has.
+    #[cfg(not(any(
+        all(target_arch = "x86_64", target_feature = "sse2"),
+        all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")
+    )))]
     pub const BASELINE: Self = Self::PLAIN;
 
     /// The most this machine has: asks the processor, on x86-64.
@@ -60,6 +69,8 @@ impl Vectors {
             Level::Sse2 => "SSE2",
             #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
             Level::Avx2 => "AVX2",
+            #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+            Level::Neon => "NEON",
         }
     }
 

@@ -35,6 +35,8 @@ pub(crate) trait Comparison {
     fn run(self, kernels: &impl Kernels);
 }
 
+/// Bits of a key below the sum, for energies and disparities.
+const KEY_SCALE_BITS: i32 = 12;
 /// Bits of a key that tell which feature it is.
 pub(crate) const OFFSET_BITS: u32 = 18;
 /// The key of no feature.
@@ -79,7 +81,10 @@ pub(crate) trait Kernels {
 }
 
 /// Kernels as functions, so that each can be written where its instructions are safe.
-#[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
+#[cfg(any(
+    all(target_arch = "x86_64", target_feature = "sse2"),
+    all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")
+))]
 struct Functions<S, F, W, L, O, C> {
     sums: S,
     sums_of: F,
@@ -89,7 +94,10 @@ struct Functions<S, F, W, L, O, C> {
     costs: C,
 }
 
-#[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
+#[cfg(any(
+    all(target_arch = "x86_64", target_feature = "sse2"),
+    all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")
+))]
 impl<S, F, W, L, O, C> Kernels for Functions<S, F, W, L, O, C>
 where
     S: Fn(&Eight<Descriptor>, &Eight<Descriptor>) -> Eight<u32>,
@@ -140,7 +148,10 @@ fn for_columns([a, b, c, d]: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]
 
 /// Runs work with the instructions that there are.
 #[cfg_attr(
-    all(target_arch = "x86_64", target_feature = "sse2"),
+    any(
+        all(target_arch = "x86_64", target_feature = "sse2"),
+        all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")
+    ),
     expect(unsafe_code, reason = "calls code compiled for what the processor has")
 )]
 pub(crate) fn compare(vectors: Vectors, work: impl Comparison) {
@@ -152,6 +163,9 @@ pub(crate) fn compare(vectors: Vectors, work: impl Comparison) {
         // SAFETY: this level exists only where the processor says that it has AVX2.
         #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
         Level::Avx2 => unsafe { x86::with_avx2(work) },
+        // SAFETY: this level exists only for targets whose machines all have it.
+        #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+        Level::Neon => unsafe { aarch64::with_neon(work) },
     }
 }
 
@@ -192,7 +206,7 @@ impl Kernels for Plain {
     #[inline(always)]
     fn least(&self, mut best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32) -> Eight<u32> {
         for (best, (a, b)) in best.iter_mut().zip(a.iter().zip(b)) {
-            *best = ((distance(a, b) << 12) + base).min(*best);
+            *best = ((distance(a, b) << KEY_SCALE_BITS) + base).min(*best);
         }
         best
     }
@@ -214,6 +228,8 @@ impl Kernels for Plain {
     }
 }
 
+#[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+mod aarch64;
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
 mod x86;
 

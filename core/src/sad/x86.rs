@@ -3,7 +3,7 @@
 //! A sum of absolute differences of 16 bytes comes in two halves of 64 bits. Packing those of four pairs twice leaves 16 bits a half, and
 //! adding neighbours leaves 32 bits a sum.
 
-use super::{Comparison, Descriptor, Eight, Functions, Inside, Kernels, NO_FEATURE, OFFSET_BITS};
+use super::{Comparison, Descriptor, Eight, Functions, Inside, KEY_SCALE_BITS, Kernels, NO_FEATURE, OFFSET_BITS};
 use bytemuck::cast;
 use core::arch::x86_64::{
     __m128i, __m256i, _mm_add_epi32, _mm_and_si128, _mm_andnot_si128, _mm_cmpeq_epi32, _mm_cmplt_epi32, _mm_madd_epi16, _mm_or_si128,
@@ -15,7 +15,7 @@ use core::arch::x86_64::{
 };
 
 /// The sums' place in a key, as a factor: the addition of halves multiplies by it for nothing.
-const KEY_SCALE: i16 = 1 << 12;
+const KEY_SCALE: i16 = 1 << KEY_SCALE_BITS;
 
 /// Runs work with 128 bits.
 #[target_feature(enable = "sse2")]
