@@ -286,3 +286,20 @@ fn a_window_that_cannot_be_is_refused_with_a_sentence() {
     let refused = dynvox(root.path(), &["run", "--planning", "80x60", "--out", "a"]);
     assert!(output_text(&refused).contains("write 200x200x20") && names(root.path()).is_empty(), "{}", output_text(&refused));
 }
+
+#[test]
+fn what_the_map_shows_is_saved_as_disparities_that_a_run_takes() {
+    let root = TempDir::new().unwrap();
+    let street = [&STREET[..], &["--frames", "6", "--depth", "exact"]].concat();
+    run(root.path(), &[&street[..], &["--out", "one", "--save-map-disparity", "seen"]].concat());
+    assert_eq!(names(&root.path().join("seen")), (0..6).map(|frame| format!("{frame:06}.png")).collect::<Vec<_>>());
+    let again = [&STREET[..], &["--frames", "6", "--depth", "disparity:seen", "--evaluate", "exact", "--json"]].concat();
+    let again = dynvox(root.path(), &again);
+    let summary: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+    let input = &summary["lidar"]["static"]["input"];
+    let share = |key: &str| input[key].as_f64().unwrap();
+    assert!(share("accuracy_alone") > 0.97 && share("completeness") > 0.4, "{input}");
+    let refused = dynvox(root.path(), &[&street[..], &["--out", "two", "--save-map-disparity", "seen"]].concat());
+    assert!(output_text(&refused).contains("seen exists"), "{}", output_text(&refused));
+    assert!(!root.path().join("two").exists(), "nothing half-written stays");
+}

@@ -5,6 +5,7 @@ mod instances;
 mod plan;
 mod results;
 mod resume;
+mod saved;
 mod stream;
 
 use super::capacity::CapacityArgs;
@@ -28,6 +29,7 @@ use anyhow::bail;
 use instances::InstancesArgs;
 use plan::plan;
 pub use plan::{MapperPlan, check_options, mapper_of, plan_of};
+use saved::Saved;
 use std::path::{Path, PathBuf};
 
 /// Where run folders go unless `--out` says otherwise.
@@ -124,6 +126,9 @@ pub struct RunArgs {
     /// Evaluate the map at a frame's pose N frames later, after pruning
     #[arg(long, default_value_t = 0, value_name = "N", requires = "evaluate", help_heading = "Evaluation")]
     evaluation_delay: usize,
+    /// Save what the finished map shows at every frame's pose to a new folder: 16-bit PNG named as the images, disparity in 1/256 px, 0 none
+    #[arg(long, value_name = "DIR", conflicts_with = "snapshot_every", help_heading = "Evaluation")]
+    save_map_disparity: Option<PathBuf>,
     /// End at the first frame that affects the map: an extrapolated pose, anything refused or lost
     #[arg(long, help_heading = "Limits")]
     strict: bool,
@@ -259,8 +264,11 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     plan.checkpoints = args.snapshot_every.map(|every| resume::checkpoints(&plan, every)).transpose()?;
     let target = args.out.clone().unwrap_or_else(|| RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name()));
     let folder = RunFolder::begin(&target, args.overwrite)?;
-    let saved = args.masks.save_instances.as_deref().map(instances::begin).transpose()?;
-    plan.save_instances = saved.as_ref().map(|saved| saved.path().to_path_buf());
+    let saved = [
+        Saved::begin(args.masks.save_instances.as_deref(), "--save-instances")?,
+        Saved::begin(args.save_map_disparity.as_deref(), "--save-map-disparity")?,
+    ];
+    [plan.save_instances, plan.save_map_disparity] = saved.each_ref().map(Saved::path);
     if !args.silent() {
         print_header(&plan);
         if plan.checkpoints.is_some() {
@@ -268,9 +276,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         }
     }
     finish(args, &plan, folder, None)?;
-    if let Some(saved) = saved {
-        saved.commit(&[])?;
-    }
+    saved.into_iter().try_for_each(Saved::commit)?;
     Ok(())
 }
 
@@ -309,6 +315,11 @@ fn finish(args: &RunArgs, plan: &Plan, mut folder: RunFolder, checkpoint: Option
         outln!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {
         out!("{}", report::summary_lines(&record, &target));
+    }
+    if plan.save_map_disparity.is_some() && record.sections.blocks.totals.stored > 0 {
+        eprintln!(
+            "warning: a part of the map was on disk in the end, and --save-map-disparity shows what was in memory: choose a larger --profile"
+        );
     }
     record.incomplete.map_or(Ok(()), |incomplete| Err(IncompleteRun::new(&incomplete, target).into()))
 }

@@ -35,8 +35,8 @@ impl Observer for InstancesObserver {
     }
 }
 
-/// Name of a frame's masks.
-fn stem(dataset: &dyn FrameSource, index: usize) -> String {
+/// Name of a frame's files.
+pub(super) fn stem(dataset: &dyn FrameSource, index: usize) -> String {
     dataset.stem(index).unwrap_or_else(|| format!("{index:06}"))
 }
 

@@ -12,6 +12,7 @@ mod growing_file;
 mod health;
 mod instances;
 mod keyframes;
+mod map_disparity;
 mod objects;
 pub mod pictures;
 mod planning;
@@ -37,6 +38,7 @@ pub use growing_file::GrowingFile;
 pub use health::{HealthObserver, HealthSection};
 pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
+pub use map_disparity::MapDisparityObserver;
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
 pub use planning::{BoxDescription, PlanningObserver, write_folder as write_planning};
 pub use planning_layers::PlanningLayers;
@@ -105,6 +107,8 @@ pub struct Setup<'p> {
     pub axes: Axes,
     /// Folder that every frame's instances are saved to, if they are.
     pub save_instances: Option<&'p Path>,
+    /// Folder that what the finished map shows at every frame's pose is saved to, if it is.
+    pub save_map_disparity: Option<&'p Path>,
     /// What the map is evaluated against, and when.
     pub reference: Option<ReferencePlan>,
 }
@@ -236,6 +240,7 @@ pub struct Observers {
     bounds: BoundsObserver,
     health: HealthObserver,
     instances: InstancesObserver,
+    map_disparity: MapDisparityObserver,
     planning: PlanningObserver,
 }
 
@@ -300,6 +305,7 @@ impl Observer for Observers {
         self.bounds.frame(setup, frame)?;
         self.health.frame(setup, frame)?;
         self.instances.frame(setup, frame)?;
+        self.map_disparity.frame(setup, frame)?;
         self.planning.frame(setup, frame)
     }
 
@@ -309,6 +315,7 @@ impl Observer for Observers {
         self.recording.end(setup, end)?;
         self.objects.end(setup, end)?;
         self.block_history.end(setup, end)?;
+        self.map_disparity.end(setup, end)?;
         self.planning.end(setup, end)
     }
 

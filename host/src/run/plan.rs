@@ -58,6 +58,8 @@ pub struct Plan {
     pub evaluation_delay: usize,
     /// Folder that every frame's instances are saved to, if they are.
     pub save_instances: Option<PathBuf>,
+    /// Folder that what the finished map shows at every frame's pose is saved to, if it is.
+    pub save_map_disparity: Option<PathBuf>,
     /// What is doubtful about the images.
     pub warnings: Vec<String>,
     /// Whether to show no progress.
@@ -80,6 +82,7 @@ impl Plan {
                 (None, MotionSource::Icp) => "icp",
             },
             save_instances: self.save_instances.as_deref(),
+            save_map_disparity: self.save_map_disparity.as_deref(),
             axes: self.export.axes,
             record: self.export.record,
             reference: match self.evaluate {

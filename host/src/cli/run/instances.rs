@@ -2,10 +2,8 @@
 
 use crate::input::masks::{self, MaskChoice};
 use crate::input::{FrameSource, InputError};
-use crate::run::RunFolder;
-use anyhow::bail;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct InstancesArgs {
@@ -37,12 +35,4 @@ impl InstancesArgs {
     pub fn fits_stream(&self) -> bool {
         matches!(self.instances, MaskChoice::Auto | MaskChoice::None | MaskChoice::Motion | MaskChoice::Networks(_))
     }
-}
-
-/// The folder that instances are saved to, which takes its name when the run is complete.
-pub fn begin(target: &Path) -> anyhow::Result<RunFolder> {
-    if target.exists() {
-        bail!("{} exists. Give another --save-instances, or remove it", target.display());
-    }
-    Ok(RunFolder::begin(target, false)?)
 }

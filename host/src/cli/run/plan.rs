@@ -54,6 +54,7 @@ pub fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
         evaluate: args.evaluate,
         evaluation_delay: args.evaluation_delay,
         save_instances: None,
+        save_map_disparity: None,
         rss_limit_bytes: args.rss_limit_mib.map_or(run::resident_limit_bytes(&capacity, dataset.size()), |mib| mib.saturating_mul(MIB)),
         quiet: args.silent(),
         dataset,

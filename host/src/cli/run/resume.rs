@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use std::path::Path;
 
 /// Arguments that are fixed when a run is resumed. The others do not change the result.
-pub const FIXED_ARGUMENTS: [&str; 45] = [
+pub const FIXED_ARGUMENTS: [&str; 46] = [
     "path",
     "sequence",
     "dataset",
@@ -34,6 +34,7 @@ pub const FIXED_ARGUMENTS: [&str; 45] = [
     "instances",
     "instances_every",
     "save_instances",
+    "save_map_disparity",
     "dynamic",
     "egomotion",
     "fuse_every",
