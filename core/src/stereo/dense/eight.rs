@@ -9,6 +9,7 @@ use crate::{
     sad::{Eight, Kernels, LANES},
     stereo::{
         StereoConfig,
+        config::DISPARITY_LIMIT,
         descriptor::{Descriptor, MARGIN, UNTEXTURED, eight},
         prior::{NO_PLANE, PLANE_WIDTH, PlaneCost, STEEP},
     },
@@ -175,7 +176,9 @@ impl Candidates<'_> {
                 let costs = if plane >= i32::from(STEEP) { &cost.about_steep } else { &cost.about_plane };
                 let costs = part(costs, ..2 * cost.radius + 1);
                 let outside = usize::try_from(-first).unwrap_or_default();
-                let bases = (first.max(0) as u32..).zip(part(costs, outside..)).map(|(d, &cost)| (cost << 8) + d);
+                // A key holds no greater disparity.
+                let within = first.max(0) as u32..=u32::from(DISPARITY_LIMIT);
+                let bases = within.zip(part(costs, outside..)).map(|(d, &cost)| (cost << 8) + d);
                 let mut keys = [BARRED; LANES];
                 self.consider::<LEFT>(other, bases, &mut keys, spare, kernels);
                 best.iter_mut().zip(keys).skip(start).take(run).for_each(|(best, key)| *best = key.min(*best));

@@ -30,7 +30,9 @@ impl Scene {
             let mut plane = NO_PLANE;
             let mut next = |random: &mut Random| {
                 if random.below(5) == 0 {
-                    plane = if random.below(6) == 0 { NO_PLANE } else { random.below(60) as i16 + [0, STEEP][random.below(2) as usize] };
+                    let disparity =
+                        [random.below(60), u32::from(config.disparity_max - 8) + random.below(9)][usize::from(random.below(4) == 0)];
+                    plane = if random.below(6) == 0 { NO_PLANE } else { disparity as i16 + [0, STEEP][random.below(2) as usize] };
                 }
                 plane
             };
@@ -150,7 +152,7 @@ fn every_level_of_vector_instructions_gives_what_one_pixel_at_a_time_gives() {
         StereoConfig { grid_size: 11, subpixel: false, match_texture: 0, ..preset },
         StereoConfig { plane_radius_sigmas: 6.0, disparity_max: 255, consistency_threshold: 0, ..preset },
     ];
-    for (width, config) in [16, 61, 96, 130, 301].into_iter().zip(configs.into_iter().cycle()) {
+    for (width, config) in [16, 61, 96, 130, 301, 330].into_iter().zip(configs.into_iter().cycle()) {
         for _ in 0..4 {
             let scene = Scene::random(&mut random, width, config);
             let (plain, counts) = scene.plain();
