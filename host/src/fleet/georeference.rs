@@ -33,7 +33,9 @@ const SIGMA_MIN_M: f64 = 0.01;
 const MEDIAN_LENGTH: f64 = 1.538;
 /// Cauchy's limit, in standard deviations.
 const LIMIT: f64 = 2.385;
-const ROUNDS: usize = 50;
+const ROUNDS_MAX: usize = 50;
+/// A round that changes no number of the motion by more ends them, m and rad.
+const STEP_MIN: f64 = 1e-9;
 
 /// Where a recording's map lies as given, and how far that may be off where it is known.
 #[derive(Clone, Copy, Debug)]
@@ -131,7 +133,16 @@ impl Estimate {
             sigma_m: 1.0,
             weights: vec![1.0; points.len()],
         };
-        (0..ROUNDS).try_fold(start, |estimate, _| estimate.next(points, axes))
+        let mut estimate = start.next(points, axes)?;
+        for _ in 1..ROUNDS_MAX {
+            let next = estimate.next(points, axes)?;
+            let change = (next.rotation - estimate.rotation).amax().max((next.shift_m - estimate.shift_m).amax());
+            estimate = next;
+            if change < STEP_MIN {
+                break;
+            }
+        }
+        Some(estimate)
     }
 
     /// The motion that fits best with some weights, and the weights that follow from it.
@@ -169,8 +180,8 @@ fn information_of(sigma_m: f64) -> f64 {
     sigma_m * sigma_m * CORRELATED_FIXES
 }
 
-fn angle_rad(rotation: &Matrix3<f64>) -> f64 {
-    ((rotation.trace() - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
+fn transform_of(rotation: &Matrix3<f64>, shift_m: &Vector3<f64>) -> Transform {
+    Transform::from_rotation_matrix(&rotation.transpose().into(), (*shift_m).into()).normalized()
 }
 
 fn centres(points: &[PointPair], weights: &[f64]) -> PointPair {
@@ -192,7 +203,7 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
     let unclear = || "its positions are not finite".to_owned();
     let by_positions = Estimate::of(&points, None).ok_or_else(unclear)?;
     let estimate = Estimate::of(&points, axes.as_ref()).ok_or_else(unclear)?;
-    let off_rad = axes.map_or(0.0, |axes| angle_rad(&(axes.transpose() * by_positions.rotation)));
+    let off_rad = axes.map_or(0.0, |axes| transform_of(&(axes.transpose() * by_positions.rotation), &Vector3::zeros()).angle_rad());
     if off_rad > CONTRADICTION_MAX_RAD && by_positions.turn_sigma_rad(&points, false) < TURN_MAX_RAD {
         return Err(format!(
             "its angles contradict its positions by {:.0} degrees. The camera must look along the vehicle",
@@ -212,10 +223,8 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
              fixes are noisy. Give roll, pitch and yaw with the fixes, or t_world_camera"
         ));
     }
-    let rows = estimate.rotation.transpose().into();
-    let t_world_map = Transform::from_rotation_matrix(&rows, estimate.shift_m.into()).normalized();
     Ok(Prior {
-        t_world_map,
+        t_world_map: transform_of(&estimate.rotation, &estimate.shift_m),
         // The error of a receiver lasts longer than a recording: its mean over the path is no surer than one fix.
         uncertainty: Some(Uncertainty { position_m, rotation_rad }),
     })

@@ -2,10 +2,9 @@
 //! decides its result, so that what is done is known by its folder.
 
 use super::{FleetError, Recording, Recordings, submap, tile_file};
-use crate::run::write_whole;
+use crate::run::{self, write_whole};
 use dynvox_core::digest::Digest;
 use dynvox_core::geometry::Transform;
-use dynvox_core::mapper::snapshot;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -80,10 +79,9 @@ pub struct Manifest {
     pub jobs: Vec<Job>,
 }
 
-/// The program's version, and those of what it keeps: the core's state, maps in their own lattice, sums.
+/// The program's version, and those of what fleet keeps: maps in their own lattice, sums.
 fn program() -> String {
-    let [core, maps, sums] = [snapshot::VERSION, submap::VERSION, tile_file::VERSION];
-    format!("dynvox {}, core {core}, maps {maps}, sums {sums}", env!("CARGO_PKG_VERSION"))
+    format!("{}, maps {}, sums {}", run::program(), submap::VERSION, tile_file::VERSION)
 }
 
 impl Manifest {

@@ -1,4 +1,5 @@
-//! Files as they are defined elsewhere, read and written. Nothing here knows of frames, runs or the map.
+//! Files as they are defined elsewhere, read and written. Nothing here knows of frames, runs or the map; of a run's files only names are here, for
+//! who reads them need not know runs.
 //!
 //! A reader takes a path and gives numbers, images or poses; what it cannot use is a [`FormatError`] that says what is wrong and what to do.
 //! Readers of images are told the size that is expected where a header could ask for any amount of memory.
@@ -18,6 +19,7 @@ mod png_numbers;
 mod poses;
 pub mod rle;
 mod rows;
+mod run_files;
 #[cfg(test)]
 mod tests;
 
@@ -36,3 +38,4 @@ pub use ply::{Axes, Mesh, MeshVertex, PlyMesh, PlyVertex, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};
 pub use poses::{Trajectory, kitti_line, read_numbered, read_poses, tum_line, write_numbered};
 pub use rows::{parse_seconds, read_stamped_names, read_times};
+pub use run_files::{FRAMES_FILE, TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE};

@@ -3,6 +3,7 @@
 use super::tables::frame_row;
 use super::{ChartValues, FrameRow, GrowingFile, STAGES, StageTime};
 use crate::evaluate::histogram::Histogram;
+use crate::formats::FRAMES_FILE;
 use dynvox_core::Stage;
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -57,7 +58,7 @@ pub struct FrameLog {
 impl Default for FrameLog {
     fn default() -> Self {
         Self {
-            file: GrowingFile::new("frames.csv"),
+            file: GrowingFile::new(FRAMES_FILE),
             frames: 0,
             last: None,
             step: StageTimes::default(),

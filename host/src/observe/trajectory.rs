@@ -3,7 +3,7 @@
 
 use super::{Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
 use crate::evaluate::trajectory::{TrajectoryErrors, errors};
-use crate::formats::{kitti_line, tum_line};
+use crate::formats::{TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE, kitti_line, tum_line};
 use dynvox_core::egomotion::icp::IcpStatus;
 use dynvox_core::geometry::Transform;
 use serde::{Deserialize, Serialize};
@@ -96,8 +96,8 @@ pub struct TrajectoryObserver {
 impl Default for TrajectoryObserver {
     fn default() -> Self {
         Self {
-            kitti: GrowingFile::new("trajectory_kitti.txt"),
-            tum: GrowingFile::new("trajectory_tum.txt"),
+            kitti: GrowingFile::new(TRAJECTORY_FILE),
+            tum: GrowingFile::new(TIMED_TRAJECTORY_FILE),
             path: ThinnedPath::default(),
             compared: Vec::new(),
             held_frames: 0,

@@ -19,6 +19,7 @@ mod spans;
 mod state;
 pub mod store;
 mod threads;
+mod version;
 mod view;
 
 pub use bench::{Bench, StageBench, bench};
@@ -36,3 +37,4 @@ pub use record::{RunHeader, RunRecord, StageStatistics};
 pub use resident::resident_bytes;
 pub use spans::{Cost, Spans};
 pub use threads::Threads;
+pub use version::program;

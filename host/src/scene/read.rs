@@ -5,7 +5,7 @@ use super::{
     BlockHistory, IndexedMesh, OBJECTS_FOLDER, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PlanningWindow, Scene, SceneFrame,
     SceneObject, SurfaceErrorMap, VertexClustering,
 };
-use crate::formats::{FormatError, MeshVertex, PlyMesh, PlyVertex, read_numbered, read_poses, read_text};
+use crate::formats::{FRAMES_FILE, FormatError, MeshVertex, PlyMesh, PlyVertex, TRAJECTORY_FILE, read_numbered, read_poses, read_text};
 use dynvox_core::geometry::Transform;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -97,8 +97,8 @@ fn objects(folder: &Path, most_triangles: usize) -> Result<Vec<SceneObject>, For
 /// The frames that are shown, and the true poses of the same.
 fn frames(folder: &Path) -> Result<(Vec<SceneFrame>, Vec<Transform>), FormatError> {
     let mut rows: Vec<FrameColumns> = Vec::new();
-    read_rows(&folder.join("frames.csv"), |row| rows.push(row))?;
-    let poses = read_poses(&folder.join("trajectory_kitti.txt"))?.poses;
+    read_rows(&folder.join(FRAMES_FILE), |row| rows.push(row))?;
+    let poses = read_poses(&folder.join(TRAJECTORY_FILE))?.poses;
     let truth_file = folder.join("trajectory_truth_kitti.txt");
     let truth = if truth_file.is_file() { read_poses(&truth_file)?.poses } else { Vec::new() };
     let every = rows.len().div_ceil(MOST_FRAMES).max(1);

@@ -1,7 +1,7 @@
 //! Which runs a sweep is made of. Points of different sweeps that mean the same run share it.
 
+use crate::run::program;
 use dynvox_core::digest::Digest;
-use dynvox_core::mapper::snapshot;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -145,8 +145,7 @@ impl Plan {
                     let label = data.label();
                     let mut digest = Digest::default();
                     // Figures of another version are not taken over.
-                    digest.bytes(env!("CARGO_PKG_VERSION").as_bytes());
-                    digest.u64(snapshot::VERSION.into());
+                    digest.bytes(program().as_bytes());
                     arguments.iter().for_each(|argument| digest.bytes(argument.as_bytes()));
                     let run = format!("{label}-{:016x}", digest.finish());
                     plan.points.push(Point { kind, data: label, value, run: run.clone() });

@@ -3,7 +3,7 @@
 use super::{Shard, each};
 use crate::cli::{run::plan_of, sweep};
 use crate::fleet::{self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap};
-use crate::formats::read_poses;
+use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses};
 use crate::observe::tables::read_frame_digests;
 use crate::report::text::counted;
 use crate::run::store::BlockFile;
@@ -12,11 +12,6 @@ use anyhow::{Context, bail};
 use dynvox_core::digest::Digest;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
-/// The camera's path in a run folder.
-const TRAJECTORY_FILE: &str = "trajectory_kitti.txt";
-/// Its frames.
-const FRAMES_FILE: &str = "frames.csv";
 
 /// The plan of a run's arguments.
 fn planned(arguments: &[String]) -> anyhow::Result<Plan> {

@@ -1,16 +1,11 @@
 //! Two trajectories, matched: by time, or row by row.
 
-use crate::formats::{FormatError, Trajectory, read_poses};
+use crate::formats::{FRAMES_FILE, FormatError, TIMED_TRAJECTORY_FILE, Trajectory, read_poses};
 use dynvox_core::geometry::Transform;
 use std::path::{Path, PathBuf};
 
 /// Two poses are of the same frame when their times differ by at most this, s (as `evo` has it).
 const SAME_TIME_S: f64 = 0.01;
-/// File of a run folder that is read when a folder is given.
-const OF_A_RUN: &str = "trajectory_tum.txt";
-
-/// Table of a run folder that numbers its frames.
-const FRAMES_OF_A_RUN: &str = "frames.csv";
 
 #[derive(serde::Deserialize)]
 struct FrameNumber {
@@ -66,7 +61,7 @@ pub enum TrajectoryError {
 /// # Errors
 /// Its table of frames cannot be read.
 pub fn frames_of_run(path: &Path) -> Result<Option<Vec<usize>>, TrajectoryError> {
-    let table = path.join(FRAMES_OF_A_RUN);
+    let table = path.join(FRAMES_FILE);
     if !table.is_file() {
         return Ok(None);
     }
@@ -94,7 +89,7 @@ pub fn truth_of_frames(truth: Trajectory, frames: &[usize]) -> Result<Trajectory
 /// # Errors
 /// The file cannot be read, or a line is not a pose.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let path = if path.is_dir() { path.join(OF_A_RUN) } else { path.to_path_buf() };
+    let path = if path.is_dir() { path.join(TIMED_TRAJECTORY_FILE) } else { path.to_path_buf() };
     Ok(read_poses(&path)?)
 }
 

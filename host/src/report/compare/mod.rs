@@ -4,7 +4,7 @@ mod distance;
 
 pub use distance::{Distance, Outcome};
 
-use crate::formats::read_poses;
+use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses};
 use crate::observe::tables::{FrameDigests, read_frame_digests};
 use crate::run::settings::{Setting, differing, settings};
 use dynvox_core::StageDigests;
@@ -123,7 +123,7 @@ impl RunDigests {
         let text = |file: &'static str| {
             std::fs::read_to_string(folder.join(file)).map_err(|source| CompareError::NoRun { path: folder.to_path_buf(), file, source })
         };
-        let (frames, config, summary) = (text("frames.csv")?, text("config.toml")?, text("summary.json")?);
+        let (frames, config, summary) = (text(FRAMES_FILE)?, text("config.toml")?, text("summary.json")?);
         let damaged = |file: &str, reason: String| CompareError::Damaged { path: folder.join(file), reason };
         let mut settings = settings(&config).map_err(|error| damaged("config.toml", error.message().to_owned()))?;
         let summary: serde_json::Value = serde_json::from_str(&summary).map_err(|error| damaged("summary.json", error.to_string()))?;
@@ -132,8 +132,8 @@ impl RunDigests {
                 settings.insert(format!("({key})"), value.to_owned());
             }
         }
-        let mut rows = read_rows(&frames, &folder.join("frames.csv"))?;
-        let poses = read_poses(&folder.join("trajectory_kitti.txt")).map(|trajectory| trajectory.poses).unwrap_or_default();
+        let mut rows = read_rows(&frames, &folder.join(FRAMES_FILE))?;
+        let poses = read_poses(&folder.join(TRAJECTORY_FILE)).map(|trajectory| trajectory.poses).unwrap_or_default();
         if poses.len() == rows.len() {
             rows.values_mut().zip(poses).for_each(|(row, pose)| row.outcome.pose = Some(pose));
         }
