@@ -5,7 +5,7 @@
 use super::distance_field::{DistanceField, SurfacePoint};
 use super::georeference::{Prior, prior};
 use super::manifest::{rows_of, transform};
-use super::pose_graph::{Edge, Node, solve};
+use super::pose_graph::{Edge, Node, solve, with_drift};
 use super::register::{Fit, RegisteredMap, Registration, Uncertainty, register};
 use super::submap::Submap;
 use super::{FleetError, Job, Manifest, distance_m};
@@ -21,7 +21,8 @@ pub const ALIGNMENT_FILE: &str = "alignment.json";
 const POINTS_MAX: usize = 200_000;
 /// Weight of a voxel that takes part.
 const MIN_WEIGHT: u8 = 3;
-/// How much surer the first recording is than the others.
+/// How much surer the first recording is than the others: its given pose is the world's, so that what is known of the world, a map or a plan, goes on
+/// to fit. Were it as unsure as the others, all would move by the mean of their errors.
 const FIRST_SHARE: f64 = 1e-4;
 /// Registrations of all pairs, each from the poses that the last one gave.
 const ROUNDS: usize = 3;
@@ -78,7 +79,6 @@ impl Alignment {
         let priors = manifest.jobs.iter().map(|job| prior(job, folder)).collect::<Result<Vec<_>, _>>()?;
         let sampled = manifest.jobs.iter().map(|job| Sampled::of(job, folder)).collect::<Result<Vec<_>, _>>()?;
         let node = |(at, (prior, of)): (usize, (&Prior, &Sampled))| {
-            // Without fixes the world is where the first recording says.
             let share = if at == 0 { FIRST_SHARE } else { 1.0 };
             Node {
                 given: prior.t_world_map,
@@ -92,7 +92,8 @@ impl Alignment {
         let mut pairs: Vec<([usize; 2], AlignedPair)> = Vec::new();
         for _ in 0..ROUNDS {
             let found = register_all(manifest, folder, (&sampled, &nodes, &poses, &allowed))?;
-            let edges: Vec<Edge> = found.iter().filter(|(_, of)| of.fit.refused.is_none()).map(|(nodes, of)| edge(*nodes, of)).collect();
+            let edges: Vec<Edge> =
+                found.iter().filter(|(_, of)| of.fit.refused.is_none()).map(|(nodes, of)| edge(*nodes, of, &sampled)).collect();
             poses = solve(&nodes, &edges, &poses);
             pairs = found.iter().map(|(nodes, of)| (*nodes, pair(manifest, *nodes, of, &pairs))).collect();
         }
@@ -187,8 +188,16 @@ fn register_all(
     Ok(found)
 }
 
-fn edge(nodes: [usize; 2], of: &Registration) -> Edge {
-    Edge { nodes, t_b_a: of.t_b_a, information: of.information, centre_m: of.centre_m }
+/// A registration: where maps overlap, it says how they lie; how their centres lie follows as far as the maps have no drift from there.
+fn edge([a, b]: [usize; 2], of: &Registration, sampled: &[Sampled]) -> Edge {
+    let in_a_m = of.t_b_a.inverse().transform_point(of.centre_m);
+    let way_m = distance_m(&of.centre_m, &sampled[b].centre_m).hypot(distance_m(&in_a_m, &sampled[a].centre_m));
+    Edge {
+        nodes: [a, b],
+        t_b_a: of.t_b_a,
+        information: with_drift(&of.information, way_m),
+        centre_m: of.centre_m,
+    }
 }
 
 fn pair(manifest: &Manifest, [a, b]: [usize; 2], of: &Registration, before: &[([usize; 2], AlignedPair)]) -> AlignedPair {

@@ -1,7 +1,8 @@
 //! Poses of recordings from what was given and how their maps lie to one another: weighted least squares.
 //!
 //! Each recording's map is rigid. Given poses are weak observations, registrations strong ones. A recording without a registration stays where it
-//! was given.
+//! was given. A map's drift stays in it, so a registration at its end is as sure about its centre as the way between the two is short: without that
+//! ([`with_drift`]) the drift of all maps of a chain adds up, and given poses count for nothing.
 //!
 //! **Memory.** A matrix of 36 x 36 numbers for each two recordings.
 
@@ -10,6 +11,10 @@ use dynvox_core::geometry::Transform;
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
 const ITERATIONS_MAX: usize = 20;
+/// Drift of a map, one standard deviation: of its length, as stereo odometry has it over 5 to 50 m.
+const DRIFT_SHARE: f64 = 0.005;
+/// And of its rotation, rad/m: 0.01 degrees.
+const DRIFT_RAD_PER_M: f64 = 1.75e-4;
 /// A step that changes no pose by more ends them, m and rad.
 const STEP_MIN: f64 = 1e-10;
 
@@ -35,6 +40,13 @@ pub struct Edge {
     pub information: Matrix6<f64>,
     /// The centre, in the second map.
     pub centre_m: [f64; 3],
+}
+
+/// What a registration says of maps whose centres are some way off.
+pub fn with_drift(information: &Matrix6<f64>, way_m: f64) -> Matrix6<f64> {
+    let (turn, shift) = ((DRIFT_RAD_PER_M * way_m).powi(2), (DRIFT_SHARE * way_m).powi(2));
+    let drift = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift));
+    information.try_inverse().and_then(|own| (own + drift).try_inverse()).unwrap_or(*information)
 }
 
 /// Where the maps lie in the world, from `start` on.
@@ -148,6 +160,30 @@ mod tests {
         }
         assert!(apart(&solved[3], &given[3], centre_m) < 1e-9);
         assert_eq!(solved, solve(&nodes, &[edge(0, 1), edge(1, 2)], &given));
+    }
+
+    #[test]
+    fn the_drift_of_a_chain_of_maps_does_not_add_up() {
+        // Each map is 30 m long and .1 m too short, and every other one was given .2 m beside its place.
+        let truth: Vec<Transform> = (0..24).map(|nth| Transform::from_translation([0.0, 0.0, 30.0 * f64::from(nth)])).collect();
+        let beside = |at: usize| Transform::from_translation([if at.is_multiple_of(2) { 0.0 } else { 0.2 }, 0.0, 0.0]);
+        let node =
+            |(at, pose): (usize, &Transform)| Node { given: beside(at) * *pose, uncertainty: UNCERTAINTY, centre_m: [0.0, 0.0, 15.0] };
+        let nodes: Vec<Node> = truth.iter().enumerate().map(node).collect();
+        let given: Vec<Transform> = nodes.iter().map(|node| node.given).collect();
+        let errors = |way_m: f64| -> Vec<f64> {
+            let edge = |a: usize| Edge {
+                nodes: [a, a - 1],
+                t_b_a: Transform::from_translation([0.0, 0.0, 29.9]),
+                information: with_drift(&(Matrix6::identity() * 1e6), way_m),
+                centre_m: [0.0, 0.0, 30.0],
+            };
+            let solved = solve(&nodes, &(1..24).map(edge).collect::<Vec<_>>(), &given);
+            solved.iter().zip(&truth).map(|(found, truth)| apart(found, truth, [0.0, 0.0, 15.0])).collect()
+        };
+        let (rigid, drifting) = (errors(0.0), errors(20.0));
+        let worst = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
+        assert!(worst(&rigid) > 1.0 && worst(&drifting) < 0.35, "{} m, {} m", worst(&rigid), worst(&drifting));
     }
 
     #[test]
