@@ -1,4 +1,8 @@
 //! What has changed between epochs: blocks that changed alike and touch one another are one change.
+//!
+//! Of a surface that only lies elsewhere, for depth or pose were off, the epoch with free space has one as well, half a truncation away or more.
+//! Where an object came or went, that epoch has none near, at least about what stands out by more than the truncation. So a change is listed when
+//! that is said of [`CLEAR_MIN`] of its voxels.
 
 use super::resolve::BlockChange;
 use super::tile_file::Lattice;
@@ -45,6 +49,9 @@ pub struct Change {
     pub volume_m3: f64,
 }
 
+/// Least share of a change's voxels without a surface near in the epoch with free space.
+const CLEAR_MIN: f64 = 0.3;
+
 type Kind = (ChangeKind, u32, u32);
 
 /// Changes of at least `least_m3`, the largest first.
@@ -58,8 +65,11 @@ pub fn changes(blocks: &[BlockChange], lattice: &Lattice, least_m3: f64) -> Vec<
     let mut changes: Vec<Change> = Vec::new();
     for (kind, mut left) in kinds {
         while let Some((_, first)) = left.pop_first() {
-            let change = summed(kind, &connected(first, &mut left), lattice);
-            changes.extend((change.volume_m3 >= least_m3).then_some(change));
+            let blocks = connected(first, &mut left);
+            let total = |of: fn(&BlockChange) -> u32| blocks.iter().map(|block| f64::from(of(block))).sum::<f64>();
+            let is_clear = total(|block| block.clear) >= CLEAR_MIN * total(|block| block.voxels);
+            let change = summed(kind, &blocks, lattice);
+            changes.extend((is_clear && change.volume_m3 >= least_m3).then_some(change));
         }
     }
     changes.sort_by(|a, b| b.volume_m3.total_cmp(&a.volume_m3));
@@ -127,8 +137,12 @@ mod tests {
         if has_box { ground.min(side) } else { ground }
     }
 
-    /// A map of four by two by four blocks.
     fn write(folder: &Path, epoch: u32, has_box: bool, weight: u8) {
+        write_of(folder, epoch, weight, |at| distance(at, has_box));
+    }
+
+    /// A map of four by two by four blocks.
+    fn write_of(folder: &Path, epoch: u32, weight: u8, distance: impl Fn([i32; 3]) -> f64) {
         std::fs::create_dir_all(folder).unwrap();
         let mut coords = Vec::new();
         for x in 0..4 {
@@ -141,7 +155,7 @@ mod tests {
             for voxel in 0..BLOCK_VOXELS {
                 let offset = [voxel % 8, voxel / 8 % 8, voxel / 64];
                 let at = std::array::from_fn(|axis| i32::from([coord.x, coord.y, coord.z][axis]) * 8 + offset[axis] as i32);
-                let units = (distance(at, has_box) / 5.0).clamp(-1.0, 1.0) * 32_767.0;
+                let units = (distance(at) / 5.0).clamp(-1.0, 1.0) * 32_767.0;
                 sums.observe(voxel, units as i16, weight, [0; 3]);
             }
             (coord, sums)
@@ -198,6 +212,18 @@ mod tests {
         let (blocks, changes) = resolved(root.path());
         assert!(!shows_box(&blocks));
         assert_eq!((changes.len(), changes[0].kind, changes[0].believed_epoch), (1, ChangeKind::Appeared, 0));
+    }
+
+    #[test]
+    fn a_surface_that_lies_elsewhere_is_no_change() {
+        let root = tempfile::TempDir::new().unwrap();
+        let map = |epoch: u32, shift: i32| write_of(root.path(), epoch, 6, |[x, y, z]| distance([x, y - shift, z], true));
+        map(1, 0);
+        map(2, 4);
+        let found = resolve(root.path(), |_| Ok(())).unwrap();
+        let volume_m3 = found.changes.iter().map(|block| f64::from(block.voxels) * 1e-3).sum::<f64>();
+        assert!(volume_m3 > 0.5, "ground and box are .4 m higher: {volume_m3}");
+        assert_eq!(changes(&found.changes, &LATTICE, 0.05), []);
     }
 
     #[test]

@@ -24,6 +24,8 @@ pub const SEEN_OFTEN: u64 = 4;
 const BEHIND_MAX: f64 = 0.4;
 /// Nearest in front of a surface that is free space.
 const FREE_MIN: f64 = 0.5;
+/// From here on there is no surface within the truncation: less than 1, for values are averages and interpolated.
+const CLEAR_MIN: f64 = 0.95;
 /// The value of a truncation.
 const TRUNCATION: f64 = 32_767.0;
 
@@ -40,6 +42,8 @@ pub struct BlockChange {
     pub believed: u32,
     /// Voxels that contradict.
     pub voxels: u32,
+    /// Those of them where the epoch with free space has no surface within its truncation.
+    pub clear: u32,
 }
 
 /// One block of the map that all epochs make.
@@ -138,6 +142,7 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
                     free: blocks[free].0,
                     believed: blocks[believed].0,
                     voxels: voxels.len() as u32,
+                    clear: voxels.iter().filter(|&&voxel| share(&blocks[free].1, voxel) >= CLEAR_MIN).count() as u32,
                 };
                 (0..BLOCK_VOXELS)
                     .filter(|&v| contradicts(statements[other][v], statements[believed][v]))
@@ -154,13 +159,17 @@ fn statement(sums: &BlockSums, voxel: usize) -> Statement {
     if weight == 0 || weight > WEIGHT_MAX {
         return Statement::Nothing;
     }
-    let share = f64::from(sums.distance[voxel]) / f64::from(weight) / TRUNCATION;
-    match share {
-        _ if share >= FREE_MIN => Statement::Free,
-        _ if share > 0.0 => Statement::Nothing,
-        _ if share >= -BEHIND_MAX => Statement::Surface,
+    match share(sums, voxel) {
+        share if share >= FREE_MIN => Statement::Free,
+        share if share > 0.0 => Statement::Nothing,
+        share if share >= -BEHIND_MAX => Statement::Surface,
         _ => Statement::Behind,
     }
+}
+
+/// Mean distance of a voxel that was seen, as a share of the truncation.
+fn share(sums: &BlockSums, voxel: usize) -> f64 {
+    f64::from(sums.distance[voxel]) / f64::from(sums.weight[voxel]) / TRUNCATION
 }
 
 fn contradicts(one: Statement, other: Statement) -> bool {
