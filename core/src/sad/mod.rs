@@ -76,7 +76,7 @@ pub(crate) trait Kernels {
     fn ordered(&self, keys: Eight<u32>) -> Eight<u32>;
 
     /// Sums of absolute differences of four descriptors with those of columns, eight at a time, each at most 16,320. As many as there are
-    /// of all four and room for.
+    /// of all four and space for.
     fn costs(&self, point: &[Descriptor; 4], columns: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]);
 }
 

@@ -31,10 +31,6 @@ pub fn with_sse2(work: impl Comparison) {
         let high = scaled([_mm_sad_epu8(e, m), _mm_sad_epu8(f, n), _mm_sad_epu8(g, o), _mm_sad_epu8(h, p)], scale);
         [low, high]
     };
-    let lesser = |key: __m128i, best: __m128i| {
-        let is_less = _mm_cmplt_epi32(key, best);
-        _mm_or_si128(_mm_and_si128(is_less, key), _mm_andnot_si128(is_less, best))
-    };
     let least = |best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32| {
         let key = |sums: __m128i| _mm_add_epi32(sums, _mm_set1_epi32(base as i32));
         let ([low, high], [best_low, best_high]) = (sums(a, b, KEY_SCALE), cast(best));
@@ -67,22 +63,7 @@ pub fn with_sse2(work: impl Comparison) {
                 let sad = |[a, b]: [__m128i; 2]| _mm_add_epi32(_mm_sad_epu8(first, a), _mm_sad_epu8(second, b));
                 let low = whole([sad(others[0]), sad(others[1]), sad(others[2]), sad(others[3])]);
                 let high = whole([sad(others[4]), sad(others[5]), sad(others[6]), sad(others[7])]);
-                let offset = _mm_add_epi32(_mm_set1_epi32(inside.offset as i32), _mm_setr_epi32(0, 1, 2, 3));
-                let key = |sums: __m128i, at: __m128i, offset: __m128i| {
-                    let beyond = _mm_subs_epu16(_mm_sub_epi16(at, _mm_set1_epi32(both(inside.low))), _mm_set1_epi32(both(inside.span)));
-                    let is_inside = _mm_and_si128(
-                        _mm_cmpeq_epi32(beyond, _mm_setzero_si128()),
-                        _mm_cmplt_epi32(offset, _mm_set1_epi32(inside.end as i32)),
-                    );
-                    let key = _mm_or_si128(_mm_slli_epi32(sums, OFFSET_BITS as i32), offset);
-                    _mm_or_si128(key, _mm_andnot_si128(is_inside, _mm_set1_epi32(NO_FEATURE as i32)))
-                };
-                let [at_low, at_high]: [__m128i; 2] = cast(*inside.at);
-                let [best_low, best_high] = cast(best);
-                cast([
-                    lesser(key(low, at_low, offset), best_low),
-                    lesser(key(high, at_high, _mm_add_epi32(offset, _mm_set1_epi32(4))), best_high),
-                ])
+                inside_sse2(best, [low, high], inside)
             },
             least,
             ordered: |keys: Eight<u32>| keys,
@@ -144,22 +125,49 @@ pub fn with_avx2(work: impl Comparison) {
                 let low = scaled([sad(others[0]), sad(others[1]), sad(others[2]), sad(others[3])], 1);
                 let high = scaled([sad(others[4]), sad(others[5]), sad(others[6]), sad(others[7])], 1);
                 let sums = _mm256_add_epi32(_mm256_permute2x128_si256(low, high, 0x20), _mm256_permute2x128_si256(low, high, 0x31));
-                let offset = _mm256_add_epi32(_mm256_set1_epi32(inside.offset as i32), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
-                let at = _mm256_sub_epi16(cast(*inside.at), _mm256_set1_epi32(both(inside.low)));
-                let beyond = _mm256_subs_epu16(at, _mm256_set1_epi32(both(inside.span)));
-                let is_inside = _mm256_and_si256(
-                    _mm256_cmpeq_epi32(beyond, _mm256_setzero_si256()),
-                    _mm256_cmpgt_epi32(_mm256_set1_epi32(inside.end as i32), offset),
-                );
-                let key = _mm256_or_si256(_mm256_slli_epi32(sums, OFFSET_BITS as i32), offset);
-                let key = _mm256_or_si256(key, _mm256_andnot_si256(is_inside, _mm256_set1_epi32(NO_FEATURE as i32)));
-                cast(_mm256_min_epi32(cast(best), key))
+                inside_avx2(best, sums, inside)
             },
             least,
             ordered: |keys: Eight<u32>| cast(ordered(cast(keys))),
             costs,
         },
     );
+}
+
+/// The lesser of each two.
+#[target_feature(enable = "sse2")]
+fn lesser(key: __m128i, best: __m128i) -> __m128i {
+    let is_less = _mm_cmplt_epi32(key, best);
+    _mm_or_si128(_mm_and_si128(is_less, key), _mm_andnot_si128(is_less, best))
+}
+
+/// Lowers keys to those of the features that count, by their sums.
+#[target_feature(enable = "sse2")]
+fn inside_sse2(best: Eight<u32>, [low, high]: [__m128i; 2], inside: &Inside<'_>) -> Eight<u32> {
+    let key = |sums: __m128i, at: __m128i, offset: __m128i| {
+        let beyond = _mm_subs_epu16(_mm_sub_epi16(at, _mm_set1_epi32(both(inside.low))), _mm_set1_epi32(both(inside.span)));
+        let is_inside =
+            _mm_and_si128(_mm_cmpeq_epi32(beyond, _mm_setzero_si128()), _mm_cmplt_epi32(offset, _mm_set1_epi32(inside.end as i32)));
+        let key = _mm_or_si128(_mm_slli_epi32(sums, OFFSET_BITS as i32), offset);
+        _mm_or_si128(key, _mm_andnot_si128(is_inside, _mm_set1_epi32(NO_FEATURE as i32)))
+    };
+    let offset = _mm_add_epi32(_mm_set1_epi32(inside.offset as i32), _mm_setr_epi32(0, 1, 2, 3));
+    let next = _mm_add_epi32(offset, _mm_set1_epi32(4));
+    let ([at_low, at_high], [best_low, best_high]): ([__m128i; 2], [__m128i; 2]) = (cast(*inside.at), cast(best));
+    cast([lesser(key(low, at_low, offset), best_low), lesser(key(high, at_high, next), best_high)])
+}
+
+/// The same.
+#[target_feature(enable = "avx2")]
+fn inside_avx2(best: Eight<u32>, sums: __m256i, inside: &Inside<'_>) -> Eight<u32> {
+    let offset = _mm256_add_epi32(_mm256_set1_epi32(inside.offset as i32), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+    let at = _mm256_sub_epi16(cast(*inside.at), _mm256_set1_epi32(both(inside.low)));
+    let beyond = _mm256_subs_epu16(at, _mm256_set1_epi32(both(inside.span)));
+    let is_within = _mm256_cmpgt_epi32(_mm256_set1_epi32(inside.end as i32), offset);
+    let is_inside = _mm256_and_si256(_mm256_cmpeq_epi32(beyond, _mm256_setzero_si256()), is_within);
+    let key = _mm256_or_si256(_mm256_slli_epi32(sums, OFFSET_BITS as i32), offset);
+    let key = _mm256_or_si256(key, _mm256_andnot_si256(is_inside, _mm256_set1_epi32(NO_FEATURE as i32)));
+    cast(_mm256_min_epi32(cast(best), key))
 }
 
 /// A column and a row as they lie in a position.

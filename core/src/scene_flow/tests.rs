@@ -148,18 +148,13 @@ fn scatter<'s>(carver: &mut Carver<'s>, random: &mut Random, count: usize) -> (F
     (features, candidates)
 }
 
-/// That the search finds a feature.
-struct Finds<'f, 's> {
-    features: &'f Features<'s>,
-    class: usize,
-    window: Window,
-    sought: [Descriptor; 2],
-    expected: Option<usize>,
-}
+/// That the search for a feature of a class in a window finds the one expected.
+struct Finds<'f, 's>(&'f Features<'s>, usize, Window, [Descriptor; 2], Option<usize>);
 
 impl Comparison for Finds<'_, '_> {
     fn run(self, kernels: &impl Kernels) {
-        assert_eq!(self.features.nearest(self.class, self.window, &self.sought, kernels), self.expected);
+        let Self(features, class, window, sought, expected) = self;
+        assert_eq!(features.nearest(class, window, &sought, kernels), expected);
     }
 }
 
@@ -174,12 +169,8 @@ fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
         assert_eq!((0..features.len()).filter(|&i| features.class(i) == class).count(), members);
         for _ in 0..100 {
             let [u, v] = [random.below(500) as i32 - 50, random.below(250) as i32 - 50];
-            let window = Window {
-                u_min: u,
-                u_max: u + random.below(90) as i32,
-                v_min: v,
-                v_max: v + random.below(60) as i32,
-            };
+            let [u_max, v_max] = [u + random.below(90) as i32, v + random.below(60) as i32];
+            let window = Window { u_min: u, u_max, v_min: v, v_max };
             let sought = [(); 2].map(|()| Descriptor(std::array::from_fn(|_| random.next_u32() as u8)));
             let inside = |i: &usize| {
                 let [u, v] = features.at(*i).unwrap().map(i32::from);
@@ -188,7 +179,7 @@ fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
             let sad = |i: &usize| -> u32 { sought.iter().zip(features.descriptor(*i).unwrap()).map(|(a, b)| distance(a, b)).sum() };
             let expected = (0..features.len()).filter(inside).min_by_key(|i| (sad(i), *i));
             for vectors in Vectors::available() {
-                compare(vectors, Finds { features: &features, class, window, sought, expected });
+                compare(vectors, Finds(&features, class, window, sought, expected));
             }
         }
     }

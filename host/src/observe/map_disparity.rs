@@ -1,4 +1,4 @@
-//! Saves what the finished map shows at every frame's pose, as disparities: what a matcher that was never fused can be held against.
+//! Saves what the finished map shows at every frame's pose, as disparities, to be compared with a matcher that was never fused.
 
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, instances::stem};
 use crate::formats::{Image, write_png_deep};
