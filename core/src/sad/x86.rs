@@ -135,6 +135,7 @@ pub fn with_avx2(work: impl Comparison) {
 }
 
 /// The lesser of each two.
+#[inline]
 #[target_feature(enable = "sse2")]
 fn lesser(key: __m128i, best: __m128i) -> __m128i {
     let is_less = _mm_cmplt_epi32(key, best);
@@ -142,6 +143,7 @@ fn lesser(key: __m128i, best: __m128i) -> __m128i {
 }
 
 /// Lowers keys to those of the features that count, by their sums.
+#[inline]
 #[target_feature(enable = "sse2")]
 fn inside_sse2(best: Eight<u32>, [low, high]: [__m128i; 2], inside: &Inside<'_>) -> Eight<u32> {
     let key = |sums: __m128i, at: __m128i, offset: __m128i| {
@@ -158,6 +160,7 @@ fn inside_sse2(best: Eight<u32>, [low, high]: [__m128i; 2], inside: &Inside<'_>)
 }
 
 /// The same.
+#[inline]
 #[target_feature(enable = "avx2")]
 fn inside_avx2(best: Eight<u32>, sums: __m256i, inside: &Inside<'_>) -> Eight<u32> {
     let offset = _mm256_add_epi32(_mm256_set1_epi32(inside.offset as i32), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
