@@ -36,7 +36,7 @@ pub(crate) trait Comparison {
 }
 
 /// Bits of a key below the sum, for energies and disparities.
-const KEY_SCALE_BITS: i32 = 12;
+pub(crate) const KEY_SCALE_BITS: i32 = 12;
 /// Bits of a key that tell which feature it is.
 pub(crate) const OFFSET_BITS: u32 = 18;
 /// The key of no feature.

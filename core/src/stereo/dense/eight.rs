@@ -6,7 +6,7 @@
 
 use crate::{
     part::part,
-    sad::{Eight, Kernels, LANES},
+    sad::{Eight, KEY_SCALE_BITS, Kernels, LANES},
     stereo::{
         StereoConfig,
         config::DISPARITY_LIMIT,
@@ -150,7 +150,7 @@ impl Candidates<'_> {
             let [about, elsewhere] = [about, cost.elsewhere].map(|cost| (cost << 8) + d);
             for lane in 0..LANES {
                 let base = if is_steep[lane] { elsewhere } else { about } + firsts[lane] as u32;
-                best[lane] = ((sums[lane] << 12) + base).min(best[lane]);
+                best[lane] = ((sums[lane] << KEY_SCALE_BITS) + base).min(best[lane]);
             }
         }
         Some(best)
