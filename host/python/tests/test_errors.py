@@ -61,7 +61,7 @@ def test_options_that_are_none_are_named():
 
 def test_every_option_of_a_run_is_taken_or_left_out_on_purpose(binary):
     """An option that the command line gains is added to the package, or to this list."""
-    of_files = "out overwrite json quiet mcap map-objects axes snapshot-every resume save-instances keep-blocks report help version".split()
+    of_files = "out overwrite json quiet mcap map-objects axes snapshot-every resume save-instances save-map-disparity keep-blocks report help version".split()
     of_a_run = "rate when-late no-stream stream-mib evaluate evaluation-delay strict skip-bad-frames rss-limit-mib".split()
     with pytest.raises(dynvox.Error) as error:
         dynvox.Dataset(nonsense=1)
