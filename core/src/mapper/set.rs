@@ -177,7 +177,7 @@ section!(icp: IcpConfig {
 section!(mapper: MapperConfig { egomotion, fuse_every });
 section!(tracking: TrackingConfig {
     dynamic, frame_interval_s, score_min, area_min_px, track_area_min_px, delete_permille, small_permille, overlap, association_min,
-    forget_frames, large_share,
+    extent_frames, forget_frames, large_share,
 } and { motion, state, segmentation });
 section!(motion: MotionConfig {
     matches_min, matches_again, matches_enough, samples, inlier_px, noise_px, extent_m, independent_matches, yaw_rad_s, tilt_rad_s, speed_m_s,

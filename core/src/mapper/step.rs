@@ -85,7 +85,8 @@ impl Mapper<'_> {
         // (B) Detections, associated with tracks, and the matches assigned to them.
         let interval_s = self.clock.advance(frame.time_ns, config.tracking.frame_interval_s);
         self.tracker.set_frame_interval_s(interval_s);
-        let assigned = executor.stage(Stage::Instances, || self.tracker.detect(self.frame, frame.detections, size).assign_matches(matches));
+        let assigned =
+            executor.stage(Stage::Instances, || self.tracker.detect(self.frame, frame.detections, size, matches).assign_matches());
         // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
         let mut localization = Localization {
             config,

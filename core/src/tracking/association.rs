@@ -1,16 +1,24 @@
 //! Association: which instance of a frame continues which track.
 //!
-//! Every pair of an instance and a track of agreeing class gets a score: overlap (of masks, the track's moved by its box's velocity, or
+//! Every pair of an instance and a track of agreeing class gets a score: overlap (of masks, the track's moved by its velocity in the image, or
 //! of boxes) times the geometric mean of the two detector scores times a discount for frames missed: 1, 1/2, 1/4 (Section III-B of the
 //! paper). The best pair is joined, then the best of the rest, down to `association_min`; between equals the instance of higher
-//! score, then the older track comes first. An instance without a track begins one.
+//! score, then the older track comes first. Of the rest those are joined that something passed in front of (`occlusion`). An instance
+//! without a track begins one.
 //!
 //! When the table is full the track undetected for longest is evicted, between equals the older one; a track detected in the last frame
 //! or this one stays, and the new instance is refused, and counted.
 //!
 //! Memory: [`Track`] a track and 4 bytes for each pair.
 
-use super::{TrackingConfig, config::Overlap, index::OptionalIndex, instance::Instance, track::Track};
+use super::{
+    TrackingConfig,
+    config::Overlap,
+    index::OptionalIndex,
+    instance::Instance,
+    occlusion::{extent_affinity, next_extent},
+    track::Track,
+};
 use crate::{
     audit::Audit,
     masks::{MaskStore, TwoFrames},
@@ -116,11 +124,9 @@ impl<'s> TrackTable<'s> {
         masks: &TwoFrames<MaskStore<'_>>,
         count: &mut TrackCount,
     ) {
-        self.score(first, config, frame, instances, masks);
-        while let Some((instance, track)) = self.best_pair(config, instances.len()) {
-            self.join(instance, track, instances, frame);
-            count.detected += 1;
-        }
+        let by_overlap = |instance: &Instance, track: &Track| affinity(config, frame, instance, track, masks);
+        count.detected += self.join_best(first, config.association_min, frame, instances, by_overlap);
+        count.detected += self.join_best(first, 0.0, frame, instances, |instance, track| extent_affinity(config, frame, instance, track));
         for index in first..instances.len() {
             let Some(instance) = instances.get(index).copied().filter(|instance| !instance.track.is_some()) else { continue };
             if !self.free_entry(frame, instances, count) {
@@ -140,21 +146,39 @@ impl<'s> TrackTable<'s> {
         count.tracks = self.len as u32;
     }
 
+    /// Joins the best pair, then the best of the rest, while its score is above `score_min`. Returns how many it joined.
+    fn join_best(
+        &mut self,
+        first: usize,
+        score_min: f32,
+        frame: u32,
+        instances: &mut [Instance],
+        affinity: impl Fn(&Instance, &Track) -> f32,
+    ) -> u32 {
+        let mut joined = 0;
+        self.score(first, instances, affinity);
+        while let Some((instance, track)) = self.best_pair(score_min, instances.len()) {
+            self.join(instance, track, instances, frame);
+            joined += 1;
+        }
+        joined
+    }
+
     /// Fills the table of scores, a row for each instance; 0 where either is associated already.
-    fn score(&mut self, first: usize, config: &TrackingConfig, frame: u32, instances: &[Instance], masks: &TwoFrames<MaskStore<'_>>) {
+    fn score(&mut self, first: usize, instances: &[Instance], affinity: impl Fn(&Instance, &Track) -> f32) {
         let tracks = part(self.tracks, ..self.len);
         let rows = self.scores.chunks_exact_mut(self.tracks.len().max(1)).zip(instances).enumerate();
         for (at, (row, instance)) in rows {
             for (score, track) in row.iter_mut().zip(tracks) {
-                let is_free = at >= first && !track.instance.is_some();
-                *score = if is_free { affinity(config, frame, instance, track, masks) } else { 0.0 };
+                let is_free = at >= first && !instance.track.is_some() && !track.instance.is_some();
+                *score = if is_free { affinity(instance, track) } else { 0.0 };
             }
         }
     }
 
     /// The best pair left, by position of the instance and of the track.
-    fn best_pair(&self, config: &TrackingConfig, instances: usize) -> Option<(usize, usize)> {
-        let mut best = (config.association_min, None);
+    fn best_pair(&self, score_min: f32, instances: usize) -> Option<(usize, usize)> {
+        let mut best = (score_min, None);
         for (d, row) in self.scores.chunks_exact(self.tracks.len().max(1)).take(instances).enumerate() {
             for (t, &score) in row.iter().take(self.len).enumerate() {
                 if score > best.0 {
@@ -219,10 +243,12 @@ impl<'s> TrackTable<'s> {
     }
 
     /// Ends a frame: detected tracks take over their instance's mask, the masks of the others move to this frame's store.
-    pub fn commit(&mut self, instances: &[Instance], masks: &mut TwoFrames<MaskStore<'_>>, count: &mut TrackCount) {
+    pub fn commit(&mut self, instances: &[Instance], size: [usize; 2], masks: &mut TwoFrames<MaskStore<'_>>, count: &mut TrackCount) {
         let (current, previous) = masks.split_mut();
         for track in self.all_mut() {
-            if let Some(instance) = track.instance.get().and_then(|index| instances.get(index)) {
+            let instance = track.instance.get().and_then(|index| instances.get(index));
+            track.extent = next_extent(track, instance.map(|instance| instance.mask.pixels), size);
+            if let Some(instance) = instance {
                 track.mask = instance.mask;
             } else {
                 let (mask, is_whole) = current.copy(track.mask, previous);

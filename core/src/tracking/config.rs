@@ -45,6 +45,9 @@ pub struct TrackingConfig {
     pub overlap: Overlap,
     /// Overlap times the geometric mean of both scores times the discount for frames missed must be above this; 0 to 1; 0.1.
     pub association_min: f32,
+    /// Frames without a detection over which a track is found again by how far it reached when it was last seen whole; at most 1000; 0
+    /// never; 10. The original: 0.
+    pub extent_frames: u16,
     /// Frames after which a track not detected again is forgotten; 1 to 10000; 50.
     pub forget_frames: u16,
     /// Share of the image beyond which an object of unknown state is kept out of the camera's egomotion; 0 to 1; 0.05. The original: 1.
@@ -69,6 +72,7 @@ impl Default for TrackingConfig {
             small_permille: 1375,
             overlap: Overlap::Mask,
             association_min: 0.1,
+            extent_frames: 10,
             forget_frames: 50,
             large_share: 0.05,
             motion: MotionConfig::default(),
@@ -108,6 +112,7 @@ impl TrackingConfig {
         require(problems, tracked, "tracking.track_area_min_px", "must be at most 1048576");
         require(problems, (1000..=4000).contains(&self.delete_permille), "tracking.delete_permille", "must be in 1000..=4000");
         require(problems, share(self.association_min), "tracking.association_min", "must be from 0 to 1");
+        require(problems, self.extent_frames <= 1000, "tracking.extent_frames", "must be at most 1000");
         require(problems, (1..=10_000).contains(&self.forget_frames), "tracking.forget_frames", "must be in 1..=10000");
         require(problems, share(self.large_share), "tracking.large_share", "must be from 0 to 1");
         self.motion.validate(problems);
@@ -125,7 +130,7 @@ fn least(area_px: u32, width: usize) -> u64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct MotionConfig {
-    /// Fewest matches for a first motion; 6 to 1000; 18.
+    /// Fewest matches for a first motion; 6 to 1000; 12 (the original: 18).
     pub matches_min: u16,
     /// Fewest matches once a motion is known; 6 to 1000; 9 (the original: 18 always).
     pub matches_again: u16,
@@ -166,7 +171,7 @@ pub struct MotionConfig {
 impl Default for MotionConfig {
     fn default() -> Self {
         Self {
-            matches_min: 18,
+            matches_min: 12,
             matches_again: 9,
             matches_enough: 60,
             samples: 200,

@@ -31,7 +31,7 @@ impl Tracker<'_> {
     }
 }
 
-/// The delete mask of a track last detected `gap` frames ago, where its box's velocity predicts it.
+/// The delete mask of a track last detected `gap` frames ago, where its velocity in the image predicts it.
 fn predicted_delete_mask<'m, 's>(
     config: &TrackingConfig,
     track: &Track,

@@ -3,7 +3,8 @@
 //!
 //! A frame passes through these values, each made from the one before:
 //!
-//! 1. `Tracker::detect` -> `Detected`: detections are validated, their masks packed, and associated with tracks;
+//! 1. `Tracker::detect` -> `Detected`: detections are validated, their masks packed, and associated with tracks,
+//!    which move in the image as the matches of the scene flow say;
 //! 2. `Detected::assign_matches` -> `Assigned`: each match of the scene flow is assigned to the instance it lies on;
 //!    `Assigned::egomotion_mask` then tells which matches the camera's egomotion may use, and with its motion
 //!    `Assigned::segment_motion` adds instances of what moves and no detector found;
@@ -47,6 +48,7 @@ mod detection;
 mod dynamic_depth;
 mod egomotion_mask;
 mod guided_matching;
+mod image_velocity;
 mod index;
 mod instance;
 mod instance_at;
@@ -56,6 +58,7 @@ mod motion_filter;
 mod motion_segmentation;
 mod motion_state;
 mod motions;
+mod occlusion;
 mod report;
 mod stages;
 #[cfg(test)]
@@ -88,6 +91,7 @@ use crate::{
 };
 use association::TrackTable;
 use guided_matching::GUIDED_MATCHES_MAX;
+use image_velocity::measure_image_velocities;
 use instance::Instances;
 use match_assignment::OwnerCode;
 use motion_segmentation::MotionSegmenter;
@@ -145,7 +149,7 @@ impl<'s> Tracker<'s> {
     }
 
     /// Begins frame `frame` of images of that size: validates its detections and associates them with tracks.
-    fn ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) {
+    fn ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2], matches: &FrameMatches<'_>) {
         (self.frame, self.size) = (frame, size);
         self.report = TrackingReport::default();
         let given = if self.config.dynamic { detections } else { &[] };
@@ -153,12 +157,13 @@ impl<'s> Tracker<'s> {
         let current = self.masks.current_mut();
         current.clear();
         self.report.detections = self.instances.ingest(&self.config, given, size, current);
+        measure_image_velocities(self.tracks.all_mut(), frame, matches, self.masks.previous());
         self.report.tracks = self.tracks.associate(&self.config, frame, self.instances.all_mut(), &self.masks);
     }
 
     /// Ends a frame: masks are kept for the next one.
     fn commit(&mut self) {
-        self.tracks.commit(self.instances.all(), &mut self.masks, &mut self.report.tracks);
+        self.tracks.commit(self.instances.all(), self.size, &mut self.masks, &mut self.report.tracks);
     }
 
     /// Sets the time from the frame before to the one that comes next, s.

@@ -25,8 +25,8 @@ pub struct TrackReport {
     pub sightings: u32,
     /// Box in the left image, where it was last detected.
     pub pixels: PixelBox,
-    /// Speed over ground and its error, one sigma, m/s; `None` while no motion was ever measured. For a static object it is what was
-    /// measured, although its motion is taken to be the identity.
+    /// Speed over ground and its error, one sigma, m/s; `None` while no motion was ever measured, and once the last one is too old to
+    /// tell a state. For a static object it is what was measured, although its motion is taken to be the identity.
     pub speed_m_s: Option<[f32; 2]>,
     /// Whether the motion was measured in this frame; if not it is extrapolated.
     pub measured: bool,
@@ -77,7 +77,7 @@ impl Tracker<'_> {
             last_frame: track.last_frame,
             sightings: track.sightings,
             pixels: track.mask.pixels,
-            speed_m_s: track.filter.is_known().then(|| [track.filter.speed()[0] as f32, track.sigma_m_s]),
+            speed_m_s: track.has_speed().then(|| [track.filter.speed()[0] as f32, track.sigma_m_s]),
             measured: track.measured.get(),
             center_world_m: track.filter.center_world().coords.into(),
             motion_world: motion_world(track, interval_s),

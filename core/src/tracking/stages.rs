@@ -8,25 +8,34 @@ use crate::{
 };
 
 impl<'s> Tracker<'s> {
-    /// Begins frame `frame` of images of that size: validates its detections and associates them with tracks.
-    pub(crate) fn detect(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) -> Detected<'_, 's> {
-        self.ingest(frame, detections, size);
-        Detected { tracker: self }
+    /// Begins frame `frame` of images of that size: validates its detections and associates them with tracks, which move in the image
+    /// as the matches of the scene flow say.
+    pub(crate) fn detect<'m>(
+        &mut self,
+        frame: u32,
+        detections: &[Detection<'_>],
+        size: [usize; 2],
+        matches: FrameMatches<'m>,
+    ) -> Detected<'_, 'm, 's> {
+        self.ingest(frame, detections, size, &matches);
+        Detected { tracker: self, matches }
     }
 }
 
 /// A frame's detections are associated with tracks.
 #[derive(Debug)]
 #[must_use]
-pub(crate) struct Detected<'t, 's> {
+pub(crate) struct Detected<'t, 'm, 's> {
     tracker: &'t mut Tracker<'s>,
+    matches: FrameMatches<'m>,
 }
 
-impl<'t, 's> Detected<'t, 's> {
-    /// Assigns the matches of the scene flow to instances.
-    pub(crate) fn assign_matches<'m>(self, matches: FrameMatches<'m>) -> Assigned<'t, 'm, 's> {
-        self.tracker.assign_matches(&matches);
-        Assigned { tracker: self.tracker, matches }
+impl<'t, 'm, 's> Detected<'t, 'm, 's> {
+    /// Assigns the matches to instances.
+    pub(crate) fn assign_matches(self) -> Assigned<'t, 'm, 's> {
+        let Self { tracker, matches } = self;
+        tracker.assign_matches(&matches);
+        Assigned { tracker, matches }
     }
 }
 

@@ -9,8 +9,8 @@ pub(crate) use motion_filter::{MotionFilter, Observation};
 
 /// The stages one by one, so that what lies between two of them can be looked at.
 impl<'s> Tracker<'s> {
-    pub(crate) fn test_ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) {
-        self.ingest(frame, detections, size);
+    pub(crate) fn test_ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2], matches: FrameMatches<'_>) {
+        self.ingest(frame, detections, size, &matches);
     }
 
     pub(crate) fn test_assign_matches(&mut self, matches: FrameMatches<'_>) {

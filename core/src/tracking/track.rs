@@ -6,8 +6,13 @@ use super::{
     instance::Instance,
     motion_filter::MotionFilter,
     motion_state::MotionHysteresis,
+    occlusion::is_cut,
 };
-use crate::{geometry::Transform, masks::MaskHandle, state::Visitor};
+use crate::{
+    geometry::Transform,
+    masks::{MaskHandle, PixelBox},
+    state::Visitor,
+};
 use bytemuck::{Pod, Zeroable};
 
 /// An object over time.
@@ -22,8 +27,11 @@ pub(crate) struct Track {
     pub t_world_origin: Transform,
     /// Its last mask.
     pub mask: MaskHandle,
-    /// Velocity of the box's centre between the last two sightings, px a frame.
-    pub box_velocity_px: [i32; 2],
+    /// How far it reached in the image when it was last seen whole, moved since with its velocity.
+    pub extent: PixelBox,
+    /// Velocity in the image between the last two sightings, px a frame: of its matches or, where these are few, of its box's centre
+    /// unless that is cut.
+    pub velocity_px: [i32; 2],
     pub motion_state: MotionHysteresis,
     /// From 1, never used again.
     pub id: u32,
@@ -51,8 +59,8 @@ pub(crate) struct Track {
     pub sigma_m_s: f32,
     /// Whether its last instance was too small to be reconstructed.
     pub tracked_only: Flag,
-    /// Unused.
-    pub padding: u32,
+    /// Whether its matches say its velocity in this frame.
+    pub velocity_measured: Flag,
 }
 
 impl Track {
@@ -60,6 +68,7 @@ impl Track {
     pub fn begun(id: u32, frame: u32, index: usize, instance: &Instance) -> Self {
         Self {
             mask: instance.mask,
+            extent: instance.mask.pixels,
             id,
             class: instance.class,
             class_margin: 1,
@@ -77,9 +86,12 @@ impl Track {
     /// committed.
     pub fn continue_with(&mut self, frame: u32, index: usize, instance: &Instance) {
         let gap = frame.wrapping_sub(self.last_frame).clamp(1, 1 << 16) as i32;
-        let twice_center = |mask: &MaskHandle| [2 * mask.pixels.left + mask.pixels.width, 2 * mask.pixels.top + mask.pixels.height];
-        let ([u, v], [u_before, v_before]) = (twice_center(&instance.mask), twice_center(&self.mask));
-        self.box_velocity_px = [(u - u_before) / (2 * gap), (v - v_before) / (2 * gap)];
+        // The middle of what is left of a box does not move with the object.
+        if !self.velocity_measured.get() && !is_cut(&instance.mask.pixels, &self.extent.moved(self.velocity_px)) {
+            let twice_center = |mask: &MaskHandle| [2 * mask.pixels.left + mask.pixels.width, 2 * mask.pixels.top + mask.pixels.height];
+            let ([u, v], [u_before, v_before]) = (twice_center(&instance.mask), twice_center(&self.mask));
+            self.velocity_px = [(u - u_before) / (2 * gap), (v - v_before) / (2 * gap)];
+        }
         self.vote_class(instance.class);
         self.score = instance.score;
         self.last_frame = frame;
@@ -97,10 +109,15 @@ impl Track {
         self.tracked_only.get() && !self.filter.is_known()
     }
 
-    /// How far its box's velocity moves its mask within `gap` frames, px.
+    /// Whether its speed is known: measured in this frame, or lately enough for a state.
+    pub fn has_speed(&self) -> bool {
+        self.filter.is_known() && (self.measured.get() || self.motion_state.state() != MotionState::Uncertain)
+    }
+
+    /// How far its velocity moves its mask within `gap` frames, px.
     pub fn predicted_shift_px(&self, gap: u32) -> [i32; 2] {
         let frames = gap.min(4) as i32;
-        self.box_velocity_px.map(|px| px.clamp(-4096, 4096) * frames)
+        self.velocity_px.map(|px| px.clamp(-4096, 4096) * frames)
     }
 
     /// Whether it is known to move.
@@ -131,7 +148,8 @@ impl Track {
             t_world_object,
             t_world_origin,
             mask,
-            box_velocity_px,
+            extent,
+            velocity_px,
             motion_state,
             id,
             class,
@@ -148,18 +166,27 @@ impl Track {
             measured,
             sigma_m_s,
             tracked_only,
-            padding: _,
+            velocity_measured,
         } = self;
         filter.visit(visitor);
         visitor.transform(t_world_object);
         visitor.transform(t_world_origin);
         mask.visit(visitor);
-        visitor.i32s(box_velocity_px);
+        extent.visit(visitor);
+        visitor.i32s(velocity_px);
         motion_state.visit(visitor);
         visitor.f32(score);
         visitor.f32(sigma_m_s);
         visitor.u32s([id, class, class_margin, first_frame, last_frame, sightings]);
         visitor.code(instance, OptionalIndex::to_bits, OptionalIndex::from_bits);
-        visitor.u32s([segment_len, segment_id, matches, inliers, measured.bits_mut(), tracked_only.bits_mut()]);
+        visitor.u32s([
+            segment_len,
+            segment_id,
+            matches,
+            inliers,
+            measured.bits_mut(),
+            tracked_only.bits_mut(),
+            velocity_measured.bits_mut(),
+        ]);
     }
 }

@@ -75,7 +75,11 @@ impl<'s> Instances<'s> {
     }
 
     pub fn ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2]) {
-        self.tracker.test_ingest(frame, detections, size);
+        self.ingest_with(frame, detections, size, [&[], &[]]);
+    }
+
+    pub fn ingest_with(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2], [refined, sparse]: [&[Match]; 2]) {
+        self.tracker.test_ingest(frame, detections, size, FrameMatches { refined, sparse });
     }
 
     pub fn assign_matches(&mut self, refined: &[Match], sparse: &[Match]) {
@@ -274,7 +278,7 @@ pub(super) fn take_frame(
         t_world_camera: Transform::IDENTITY,
         t_current_previous: (frame > 0).then_some(Transform::IDENTITY),
     };
-    instances.ingest(frame, detections, [WIDTH, HEIGHT]);
+    instances.ingest_with(frame, detections, [WIDTH, HEIGHT], [refined, sparse]);
     instances.assign_matches(refined, sparse);
     instances.tracker.test_estimate_motions(&RIG, &camera, FrameMatches { refined, sparse }, None, estimator);
     let (grey, nothing) = (vec![128u8; WIDTH * HEIGHT], vec![0u16; WIDTH * HEIGHT]);

@@ -47,9 +47,9 @@ fn a_parked_car_follows_the_camera_and_stays_where_it_is_in_the_world() {
 }
 
 #[test]
-fn seventeen_matches_make_no_first_motion_and_eighteen_do() {
+fn eleven_matches_make_no_first_motion_and_twelve_do() {
     let measured = |points| run(&Board { points, ..Board::CAR }, 2, ahead)[1].measured;
-    assert_eq!([measured(17), measured(18)], [false, true]);
+    assert_eq!([measured(11), measured(12)], [false, true]);
 }
 
 #[test]

@@ -16,13 +16,14 @@ fn each_setting_out_of_its_range_is_named() {
         problems.iter().map(|problem| problem.key.strip_prefix("tracking.").unwrap()).collect::<Vec<_>>()
     };
     assert_eq!(named(|_| {}), [""; 0]);
-    let spoilt: [(Spoil, &str); 33] = [
+    let spoilt: [(Spoil, &str); 34] = [
         (|c| c.frame_interval_s = 0.0, "frame_interval_s"),
         (|c| c.score_min = f32::NAN, "score_min"),
         (|c| c.area_min_px = 1 << 21, "area_min_px"),
         (|c| c.track_area_min_px = 1 << 21, "track_area_min_px"),
         (|c| c.delete_permille = 999, "delete_permille"),
         (|c| c.association_min = -0.1, "association_min"),
+        (|c| c.extent_frames = 1001, "extent_frames"),
         (|c| c.forget_frames = 0, "forget_frames"),
         (|c| c.large_share = 1.1, "large_share"),
         (|c| c.motion.matches_min = 5, "motion.matches_min"),

@@ -45,7 +45,7 @@ fn frames_missed_cost_a_half_then_three_quarters() {
     let score = 48.0 / 72.0 * 0.9;
     for (gap, discount) in [(1, 1.0), (2, 0.5), (3, 0.25), (9, 0.25)] {
         for (margin, expected) in [(0.99, 1), (1.01, 2)] {
-            let config = TrackingConfig { association_min: score * discount * margin, ..any_size() };
+            let config = TrackingConfig { association_min: score * discount * margin, extent_frames: 0, ..any_size() };
             with(&CAPACITY, &config, |instances, _| {
                 take(instances, 0, &[car(100)]);
                 assert_eq!(take(instances, gap, &[car(112)]), [expected], "gap {gap}");
@@ -119,8 +119,9 @@ fn a_car_that_speeds_up_is_looked_for_where_it_goes() {
 
 #[test]
 fn a_movement_goes_on_over_a_gap_by_its_frames_up_to_four_of_them() {
+    let config = TrackingConfig { extent_frames: 0, ..any_size() };
     let found = |gap: u32, left: i32| {
-        with(&CAPACITY, &any_size(), |instances, _| {
+        with(&CAPACITY, &config, |instances, _| {
             take(instances, 0, &[car(20)]);
             take(instances, 1, &[car(40)]);
             take(instances, 1 + gap, &[car(left)]) == [1]
@@ -135,7 +136,7 @@ fn a_movement_over_a_gap_is_shared_among_its_frames() {
     with(&CAPACITY, &TrackingConfig { association_min: 0.01, ..any_size() }, |instances, _| {
         take(instances, 0, &[car(100)]);
         assert_eq!(take(instances, 3, &[car(130)]), [1]);
-        assert_eq!(instances.tracker.test_tracks()[0].box_velocity_px, [10, 0]);
+        assert_eq!(instances.tracker.test_tracks()[0].velocity_px, [10, 0]);
     });
 }
 
@@ -229,5 +230,44 @@ fn what_was_seen_once_and_never_again_is_not_kept_out_longer_nor_what_is_too_sma
     with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         (0..3).for_each(|frame| drop(take(instances, frame, &[small])));
         assert_eq!(cleared(instances, 3, &[]), None);
+    });
+}
+
+/// A match under the mask of `car(left)` that moves to the right.
+fn moving_right(left: i32, n: u32, by_px: f32) -> Match {
+    let previous_left = [left as f32 + 6.0 + 10.0 * (n % 5) as f32, 40.0 + 8.0 * (n / 5) as f32];
+    Match {
+        previous_left,
+        current_left: [previous_left[0] + by_px, previous_left[1]],
+        ..Match::default()
+    }
+}
+
+#[test]
+fn a_car_is_looked_for_where_its_matches_went() {
+    let found = |count: u32| {
+        with(&CAPACITY, &any_size(), |instances, _| {
+            take(instances, 0, &[car(100)]);
+            let matches: Vec<Match> = (0..count).map(|n| moving_right(100, n, 58.0)).collect();
+            instances.ingest_with(1, &[car(158)], [WIDTH, HEIGHT], [&matches, &[]]);
+            instances.tracker.test_tracked().commit();
+            instances.tracks().filter(|track| track.detected).map(|track| track.id).collect::<Vec<_>>()
+        })
+    };
+    assert_eq!([found(5), found(4)], [vec![1], vec![2]], "its box alone lies beside the last one");
+}
+
+#[test]
+fn a_car_that_something_passes_in_front_of_stays_one_track() {
+    let seen =
+        |left: i32, width: i32| detection(Class::Car, 0.9, &PixelBox { left, top: 30, width, height: 60 }, &MASK[..(60 * width) as usize]);
+    with(&CAPACITY, &any_size(), |instances, _| {
+        // Seen whole, cut on the right, not at all, cut on the left, whole.
+        for (frame, detections) in [vec![car(100)], vec![seen(100, 15)], vec![], vec![seen(145, 15)], vec![car(100)]].iter().enumerate() {
+            let tracks = take(instances, frame as u32, detections);
+            assert_eq!(tracks, vec![1; detections.len()], "frame {frame}");
+        }
+        // A sliver beside it is another car.
+        assert_eq!(take(instances, 5, &[car(100), seen(165, 15)]), [1, 2]);
     });
 }

@@ -5,7 +5,7 @@ use crate::{
     geometry::Transform,
     memory::SLAB_ALIGN,
     random::Random,
-    tracking::{Detection, FrameMatches, TrackReport, TrackingConfig, stages::Detected},
+    tracking::{Detection, FrameMatches, TrackReport, TrackingConfig},
 };
 use std::{vec, vec::Vec};
 
@@ -127,8 +127,8 @@ impl World {
                     })
                     .collect();
                 let camera = self.camera(frame);
-                let detected: Detected<'_, '_> = tracker.detect(frame, &detections, [WIDTH, HEIGHT]);
-                let assigned = detected.assign_matches(FrameMatches { refined: &matches, sparse: &[] });
+                let matches = FrameMatches { refined: &matches, sparse: &[] };
+                let assigned = tracker.detect(frame, &detections, [WIDTH, HEIGHT], matches).assign_matches();
                 let tracked =
                     assigned.segment_motion(&RIG, &camera, disparity_q8, None).estimate_motions(&RIG, &camera, None, &mut estimator);
                 let report = tracked.commit().segmentation;
