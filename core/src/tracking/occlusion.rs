@@ -16,7 +16,7 @@ const EDGE_PART: i32 = 6;
 
 /// How well an instance continues a track that was cut, or is cut now, by its extent: the overlap of both; 0 where it does not.
 pub(super) fn extent_affinity(config: &TrackingConfig, frame: u32, instance: &Instance, track: &Track) -> f32 {
-    let (seen, extent) = (instance.mask.pixels, track.extent.moved(track.predicted_shift_px(1)));
+    let (seen, extent) = (instance.mask.pixels, track.expected_extent());
     let gap = frame.wrapping_sub(track.last_frame);
     let was_cut = gap > 1 || track.extent != track.mask.pixels;
     let edge = extent.height / EDGE_PART;
@@ -31,7 +31,7 @@ pub(super) fn extent_affinity(config: &TrackingConfig, frame: u32, instance: &In
 
 /// The extent of a track after a frame of images of that size, in which its object was seen in the box `seen` or not at all.
 pub(super) fn next_extent(track: &Track, seen: Option<PixelBox>, [width, height]: [usize; 2]) -> PixelBox {
-    let expected = track.extent.moved(track.predicted_shift_px(1));
+    let expected = track.expected_extent();
     let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
     match seen {
         Some(seen) if is_cut(&seen, &expected.intersection(&image)) && is_within(&seen, &expected) => expected,

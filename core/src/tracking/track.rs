@@ -87,7 +87,7 @@ impl Track {
     pub fn continue_with(&mut self, frame: u32, index: usize, instance: &Instance) {
         let gap = frame.wrapping_sub(self.last_frame).clamp(1, 1 << 16) as i32;
         // The middle of what is left of a box does not move with the object.
-        if !self.velocity_measured.get() && !is_cut(&instance.mask.pixels, &self.extent.moved(self.predicted_shift_px(1))) {
+        if !self.velocity_measured.get() && !is_cut(&instance.mask.pixels, &self.expected_extent()) {
             let twice_center = |mask: &MaskHandle| [2 * mask.pixels.left + mask.pixels.width, 2 * mask.pixels.top + mask.pixels.height];
             let ([u, v], [u_before, v_before]) = (twice_center(&instance.mask), twice_center(&self.mask));
             self.velocity_px = [(u - u_before) / (2 * gap), (v - v_before) / (2 * gap)];
@@ -118,6 +118,11 @@ impl Track {
     pub fn predicted_shift_px(&self, gap: u32) -> [i32; 2] {
         let frames = gap.min(4) as i32;
         self.velocity_px.map(|px| px.clamp(-4096, 4096) * frames)
+    }
+
+    /// Its extent where its velocity takes it within a frame.
+    pub fn expected_extent(&self) -> PixelBox {
+        self.extent.moved(self.predicted_shift_px(1))
     }
 
     /// Whether it is known to move.

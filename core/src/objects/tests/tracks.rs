@@ -267,7 +267,7 @@ fn a_car_that_something_passes_in_front_of_stays_one_track() {
             let tracks = take(instances, frame as u32, detections);
             assert_eq!(tracks, vec![1; detections.len()], "frame {frame}");
         }
-        // A sliver beside it is another car.
+        // What is seen beside it is another car.
         assert_eq!(take(instances, 5, &[car(100), seen(165, 15)]), [1, 2]);
     });
 }
