@@ -2,6 +2,7 @@
 
 mod correction;
 mod depth;
+pub(crate) mod histogram;
 mod oriented_box;
 mod rig;
 pub mod scalar;

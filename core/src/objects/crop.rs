@@ -10,7 +10,7 @@
 use crate::{
     audit::Audit,
     digest::Digest,
-    geometry::{StereoRig, Transform},
+    geometry::{StereoRig, Transform, histogram::Histogram},
     image::View,
     masks::{MaskHandle, MaskStore, PixelBox},
     memory::{Capacity, Carver, region_bytes},
@@ -21,9 +21,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// Most crops kept for later.
 pub(crate) const CROPS_MAX: usize = 128;
-/// Half pixels of disparity the median is searched among: up to 256 px.
-const BINS: usize = 512;
-/// Disparity units in a half pixel.
+/// Disparity units in a half pixel: the median is found to that, up to 256 px.
 const BIN: u16 = 128;
 
 /// How far an edge spoils what is behind it, px.
@@ -53,24 +51,17 @@ pub(super) fn crop(
 ) -> u32 {
     let PixelBox { left, top, width, height } = mask.pixels;
     let (Ok(left_u), Ok(top_v)) = (usize::try_from(left), usize::try_from(top)) else { return 0 };
-    let mut counts = [0u32; BINS];
-    let mut total = 0;
+    let mut found = Histogram::new();
     for (v, row) in (0..height.max(0) as usize).zip(disparities.chunks_exact_mut(width.max(1) as usize)) {
         let from = disparity_q8.row(top_v + v).get(left_u..).unwrap_or(&[]);
         for ((u, to), &disparity) in (left..).zip(row.iter_mut()).zip(from) {
             *to = if masks.contains(mask, u, top + v as i32) { disparity } else { 0 };
-            if let (true, Some(count)) = (*to > 0, counts.get_mut(usize::from(*to / BIN))) {
-                *count += 1;
-                total += 1;
+            if *to > 0 {
+                found.add(usize::from(*to / BIN));
             }
         }
     }
-    let mut below = 0;
-    let median = counts.iter().position(|&count| {
-        below += count;
-        2 * below > total
-    });
-    let depth = rig.focal_baseline_px_m() / ((median.unwrap_or(0) as f64 + 0.5) * 0.5);
+    let depth = rig.focal_baseline_px_m() / ((found.median().unwrap_or(0) as f64 + 0.5) * 0.5);
     let [low, high] = [depth + f64::from(extent_m), depth - f64::from(extent_m)].map(|depth_m| {
         let disparity = rig.focal_baseline_px_m() / depth_m * 256.0;
         if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }

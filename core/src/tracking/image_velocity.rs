@@ -3,17 +3,21 @@
 //! The middle of a box says it badly: the box jumps by a cell of the network's grid, is cut at the image's border, and shrinks where
 //! something passes in front. Matches are of what is seen in both frames.
 //!
-//! Time: one look at each match for each track. Memory: 2 KiB of the stack.
+//! Time: one look at each match for each track. Memory: 4 KiB of the stack.
 
 use super::{FrameMatches, match_assignment::pixel, track::Track};
-use crate::{geometry::scalar::floor_i32, masks::MaskStore};
+use crate::{
+    geometry::{
+        histogram::{BINS, Histogram},
+        scalar::floor_i32,
+    },
+    masks::MaskStore,
+};
 
 /// Fewest matches whose median is taken.
 const MATCHES_MIN: u32 = 5;
 /// Largest movement, px a frame: what moves farther is counted as moving that far.
-const MOVEMENT_MAX_PX: i32 = 255;
-/// A bin for each pixel of movement.
-const BINS: usize = 2 * MOVEMENT_MAX_PX as usize + 1;
+const MOVEMENT_MAX_PX: i32 = BINS as i32 / 2 - 1;
 
 /// Measures the velocity of each track that was detected in the frame before `frame` and has matches enough.
 pub(super) fn measure_image_velocities(tracks: &mut [Track], frame: u32, matches: &FrameMatches<'_>, previous: &MaskStore<'_>) {
@@ -37,34 +41,24 @@ pub(super) fn measure_image_velocities(tracks: &mut [Track], frame: u32, matches
     }
 }
 
-/// Movements along one axis, counted by the pixel.
-struct Movements {
-    counts: [u16; BINS],
-    total: u32,
-}
+/// Movements along one axis, a bin for each pixel.
+struct Movements(Histogram);
 
 impl Movements {
     const fn new() -> Self {
-        Self { counts: [0; BINS], total: 0 }
+        Self(Histogram::new())
     }
 
     /// Counts a movement; what is not a number is left out.
     fn add(&mut self, px: f32) {
-        let bin = floor_i32(px + 0.5).clamp(-MOVEMENT_MAX_PX, MOVEMENT_MAX_PX) + MOVEMENT_MAX_PX;
-        if let Some(count) = self.counts.get_mut(bin as usize).filter(|_| px.is_finite()) {
-            *count = count.saturating_add(1);
-            self.total += 1;
+        if px.is_finite() {
+            self.0.add((floor_i32(px + 0.5).clamp(-MOVEMENT_MAX_PX, MOVEMENT_MAX_PX) + MOVEMENT_MAX_PX) as usize);
         }
     }
 
     /// The median, to the pixel; `None` of fewer than [`MATCHES_MIN`].
     fn median_px(&self) -> Option<i32> {
-        let mut below = 0;
-        let median = self.counts.iter().position(|&count| {
-            below += u32::from(count);
-            2 * below > self.total
-        });
-        median.filter(|_| self.total >= MATCHES_MIN).map(|bin| bin as i32 - MOVEMENT_MAX_PX)
+        self.0.median().filter(|_| self.0.total() >= MATCHES_MIN).map(|bin| bin as i32 - MOVEMENT_MAX_PX)
     }
 }
 

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     egomotion::Estimator,
-    geometry::{StereoRig, Transform},
+    geometry::{StereoRig, Transform, histogram::Histogram},
     part::part,
     random::Random,
     scene_flow::Match,
@@ -41,10 +41,7 @@ pub(super) struct ObjectMotion {
     pub measured: bool,
 }
 
-/// Half pixels of disparity the median is searched among: up to 256 px.
-const BINS: usize = 512;
-
-/// The disparities matches of one object can have.
+/// The disparities matches of one object can have. Their median is found to half a pixel, up to 256 px.
 #[derive(Clone, Copy)]
 struct DisparityRange {
     least_px: f64,
@@ -54,21 +51,12 @@ struct DisparityRange {
 impl DisparityRange {
     /// Those no more than `config.extent_m` and three sigmas nearer or farther than the median.
     fn of<'m>(config: &MotionConfig, rig: &StereoRig, matches: impl Iterator<Item = &'m Match> + Clone) -> Self {
-        let mut counts = [0u32; BINS];
-        let mut total = 0;
+        let mut disparities = Histogram::new();
         for m in matches {
             // What is not a number counts as 0.
-            if let Some(count) = counts.get_mut((2.0 * disparity(m)) as usize) {
-                *count += 1;
-                total += 1;
-            }
+            disparities.add((2.0 * disparity(m)) as usize);
         }
-        let mut below = 0;
-        let median = counts.iter().position(|&count| {
-            below += count;
-            2 * below > total
-        });
-        let median_px = (median.unwrap_or(0) as f64 + 0.5) * 0.5;
+        let median_px = (disparities.median().unwrap_or(0) as f64 + 0.5) * 0.5;
         let slack_px = 3.0 * core::f64::consts::SQRT_2 * f64::from(config.noise_px) + 0.5;
         let depth_m = rig.focal_baseline_px_m() / median_px;
         let nearest_m = depth_m - f64::from(config.extent_m);
