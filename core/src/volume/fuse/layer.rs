@@ -8,14 +8,12 @@ use crate::{
     geometry::scalar::clamp_f32,
     volume::{
         BLOCK_SIDE,
-        block::{LAYER_VOXELS, Layer, packed},
-        observed::{is_spoiled, obliqueness},
+        block::{LAYER_VOXELS, Layer},
+        observed::obliqueness,
     },
 };
 use nalgebra::Vector3;
 
-/// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
-const COLOUR_WEIGHT: usize = 5;
 /// No pixel of the image.
 const OUTSIDE: u32 = u32::MAX;
 
@@ -25,21 +23,22 @@ pub(super) struct Shares {
     units: [i32; SHARES],
     /// Share of one observation, times -32,768: so it fits its type even where it is all.
     ones: [i16; SHARES],
-    /// Share of a new colour, times 32,768.
-    colour: [i32; COLOUR_WEIGHT + 2],
 }
 
 impl Shares {
     pub fn new() -> Self {
-        let mut shares = Self { units: [0; SHARES], ones: [0; SHARES], colour: [0; COLOUR_WEIGHT + 2] };
+        let mut shares = Self { units: [0; SHARES], ones: [0; SHARES] };
         for (sum, (unit, one)) in (0i32..).zip(shares.units.iter_mut().zip(&mut shares.ones)) {
             *unit = ((1i32 << 23) + sum / 2).checked_div(sum).unwrap_or(0);
             *one = -((*unit + 128) >> 8) as i16;
         }
-        for (colour, unit) in shares.colour.iter_mut().zip(&shares.units) {
-            *colour = (unit + 128) >> 8;
-        }
         shares
+    }
+
+    /// Shares of one observation where the sum of weights is 1 to `N`, times -32,768.
+    #[inline]
+    pub fn of_one<const N: usize>(&self) -> [i16; N] {
+        core::array::from_fn(|past| self.ones.get(past + 1).copied().unwrap_or(0))
     }
 
     /// Share of an observation of weight `gain`, times -32,768.
@@ -64,20 +63,20 @@ pub(super) struct Scratch {
     y_m: Layer<f32>,
     z_m: Layer<f32>,
     /// The pixel it falls on.
-    column: Layer<i32>,
-    row: Layer<i32>,
+    pub(super) column: Layer<i32>,
+    pub(super) row: Layer<i32>,
     /// The same as an index into the depth image, or [`OUTSIDE`].
     pixel: Layer<u32>,
     /// Depth observed there, m; 0 none.
-    observed_m: Layer<f32>,
+    pub(super) observed_m: Layer<f32>,
     /// How far the voxel lies before what is observed, m.
-    distance_m: Layer<f32>,
+    pub(super) distance_m: Layer<f32>,
     /// That, limited to the truncation, in its units.
     target: Layer<i16>,
     /// -1 where the voxel is observed, else 0.
-    hit: Layer<i16>,
+    pub(super) hit: Layer<i16>,
     /// Weight of the observation.
-    gain: Layer<i16>,
+    pub(super) gain: Layer<i16>,
     /// Its share of the average, times -32,768.
     share: Layer<i16>,
 }
@@ -205,35 +204,6 @@ impl Fusion<'_> {
         for (weight, (gain, hit)) in weight.iter_mut().zip(scratch.gain.iter().zip(&scratch.hit)) {
             let sum = i16::from(*weight) + (gain & hit);
             *weight = if sum < most { sum } else { most } as u8;
-        }
-    }
-
-    /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is that after this observation.
-    #[expect(clippy::indexing_slicing, reason = "masks keep voxels below 64; sums are at most COLOUR_WEIGHT + 1")]
-    pub(super) fn colour_layer(&self, scratch: &Scratch, planes: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
-        let mut flags = [0u8; LAYER_VOXELS];
-        let band_m = self.colour_band_m;
-        for (flag, ((distance_m, hit), gain)) in flags.iter_mut().zip(scratch.distance_m.iter().zip(&scratch.hit).zip(&scratch.gain)) {
-            let is_near = (*distance_m <= band_m) & (*distance_m >= -band_m);
-            *flag = u8::from(is_near & (hit & gain != 0));
-        }
-        let mut near = packed(&flags);
-        let [red, green, blue] = planes;
-        while near != 0 {
-            let i = near.trailing_zeros() as usize & (LAYER_VOXELS - 1);
-            near &= near - 1;
-            let target = self.seen.colour_at(scratch.column[i] as usize, scratch.row[i] as usize);
-            let current = [red[i], green[i], blue[i]];
-            if self.seen.noted && current != [0; 3] && is_spoiled(scratch.observed_m[i]) {
-                continue;
-            }
-            let sum = if current == [0; 3] { 1 } else { usize::from(weight[i]).clamp(2, COLOUR_WEIGHT + 1) };
-            let share = self.shares.colour[sum];
-            let blend = |c: usize| {
-                let (current, target) = (i32::from(current[c]), i32::from(target[c]));
-                (current + (((target - current) * share + (1 << 14)) >> 15)) as u8
-            };
-            (red[i], green[i], blue[i]) = (blend(0), blend(1), blend(2));
         }
     }
 }

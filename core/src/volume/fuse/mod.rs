@@ -15,6 +15,7 @@
 //! Time: linear in visible blocks. Blocks are taken in slot order in four fixed bands; no block's result depends on another's.
 
 mod band;
+mod colour;
 mod horizon;
 mod layer;
 
@@ -54,19 +55,6 @@ pub struct Observation<'a> {
     pub class: Option<View<'a, u8>>,
     /// Whether the lowest bits of the depths are notes, as the mapper writes them.
     pub noted: bool,
-}
-
-impl Observation<'_> {
-    /// The colour to fuse at a pixel.
-    #[inline]
-    fn colour_at(&self, u: usize, v: usize) -> [u8; 3] {
-        let colour = match self.colour {
-            Some(image) => image.get(u, v).unwrap_or_default(),
-            None => [self.grey.get(u, v).unwrap_or_default(); 3],
-        };
-        // All 0 is "no colour yet".
-        colour.map(|channel| if channel == 0 { 1 } else { channel })
-    }
 }
 
 /// Everything about a frame that blocks share.

@@ -1,0 +1,93 @@
+//! Colours of a layer's voxels: read where there is one to average in, averaged 64 at a time.
+
+use super::{Fusion, layer::Scratch};
+use crate::volume::{
+    block::{LAYER_VOXELS, Layer, packed},
+    observed::is_spoiled,
+};
+
+/// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
+const PAST_MAX: usize = 5;
+
+impl Fusion<'_> {
+    /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is that after this observation.
+    #[expect(clippy::indexing_slicing, reason = "masks keep voxels below LAYER_VOXELS, the length of every layer")]
+    pub(super) fn colour_layer(&self, scratch: &Scratch, [red, green, blue]: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
+        let near = self.near_surface(scratch);
+        let mut bits = packed(&near);
+        if bits == 0 {
+            return;
+        }
+        let share = self.colour_shares(scratch, &near, [red, green, blue], weight);
+        let (mut reds, mut greens, mut blues) = ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize & (LAYER_VOXELS - 1);
+            bits &= bits - 1;
+            let (u, v) = (scratch.column[i] as usize, scratch.row[i] as usize);
+            match self.seen.colour {
+                Some(image) => [reds[i], greens[i], blues[i]] = image.get(u, v).unwrap_or_default(),
+                None => reds[i] = self.seen.grey.get(u, v).unwrap_or_default(),
+            }
+        }
+        if self.seen.colour.is_none() {
+            if red == green && green == blue {
+                // What was grey stays grey: one plane is the others.
+                average(red, &reds, &share);
+                (*green, *blue) = (*red, *red);
+                return;
+            }
+            (greens, blues) = (reds, reds);
+        }
+        for (plane, seen) in [(red, &reds), (green, &greens), (blue, &blues)] {
+            average(plane, seen, &share);
+        }
+    }
+
+    /// 1 for each voxel that is observed within the band about the surface, else 0.
+    #[inline]
+    fn near_surface(&self, scratch: &Scratch) -> Layer<u8> {
+        let mut near = [0; LAYER_VOXELS];
+        let band_m = self.colour_band_m;
+        for (near, ((distance_m, hit), gain)) in near.iter_mut().zip(scratch.distance_m.iter().zip(&scratch.hit).zip(&scratch.gain)) {
+            let is_near = (*distance_m <= band_m) & (*distance_m >= -band_m);
+            *near = u8::from(is_near & (hit & gain != 0));
+        }
+        near
+    }
+
+    /// The share of the colours seen, times -32,768: all where there is no colour yet, none away from the surface and where another
+    /// surface's may be seen.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
+    fn colour_shares(&self, scratch: &Scratch, near: &Layer<u8>, planes: [&Layer<u8>; 3], weight: &Layer<u8>) -> Layer<i16> {
+        let [all, second, third, fourth, fifth, sixth]: [i16; PAST_MAX + 1] = self.shares.of_one();
+        let noted = self.seen.noted;
+        let mut share = [0; LAYER_VOXELS];
+        for (share, &weight) in share.iter_mut().zip(weight) {
+            // By masks: a choice among five becomes branches.
+            let from = |sum: i16, change: i16| change & -i16::from(i16::from(weight) >= sum);
+            *share = second + from(3, third - second) + from(4, fourth - third) + from(5, fifth - fourth) + from(6, sixth - fifth);
+        }
+        for (share, &observed_m) in share.iter_mut().zip(&scratch.observed_m) {
+            *share &= -i16::from(!noted | !is_spoiled(observed_m));
+        }
+        for i in 0..LAYER_VOXELS {
+            let colourless = -i16::from(planes[0][i] | planes[1][i] | planes[2][i] == 0);
+            share[i] = (all & colourless | share[i] & !colourless) & -i16::from(near[i]);
+        }
+        share
+    }
+}
+
+/// Moves colours towards those seen: `old + round((seen - old) * share)`, as a sum of two products of 16 bits.
+// Never inlined: one copy serves all planes.
+#[inline(never)]
+fn average(plane: &mut Layer<u8>, seen: &Layer<u8>, share: &Layer<i16>) {
+    for ((colour, &seen), &share) in plane.iter_mut().zip(seen).zip(share) {
+        // All 0 is "no colour yet".
+        let seen = if seen == 0 { 1 } else { seen };
+        let rest = i16::MIN.wrapping_sub(share);
+        let sum = i32::from(*colour) * i32::from(rest) + i32::from(seen) * i32::from(share);
+        *colour = (((1 << 14) - sum) >> 15) as u8;
+    }
+}
