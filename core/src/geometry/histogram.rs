@@ -1,4 +1,4 @@
-//! The median of many values by their counts: exact to a bin, whatever the order they come in.
+//! The median of many values by their counts, exact to a bin. The order of the values does not matter.
 
 /// Bins of a [`Histogram`].
 pub(crate) const BINS: usize = 512;
