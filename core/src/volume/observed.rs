@@ -96,8 +96,14 @@ impl ObservedDepth<'_> {
         let Some(v) = v.checked_add_signed(dv).filter(|&v| v < self.disparity_q8.height()) else { return tap };
         let outside = du.min(0).unsigned_abs().saturating_sub(first).min(BLOCK);
         let start = first.saturating_add_signed(du);
-        part_mut(&mut tap, outside..).iter_mut().zip(part(self.disparity_q8.row(v), start..)).for_each(|(to, from)| *to = *from);
-        tap
+        let row = part(self.disparity_q8.row(v), start..);
+        match row.first_chunk() {
+            Some(all) if outside == 0 => *all,
+            _ => {
+                part_mut(&mut tap, outside..).iter_mut().zip(row).for_each(|(to, from)| *to = *from);
+                tap
+            }
+        }
     }
 
     /// The least disparity about each pixel of a block: of what has one within the reach of edges, and of all, none being 0, within that of colours.
@@ -129,15 +135,21 @@ impl ObservedDepth<'_> {
         let focal = self.rig.focal_px as f32;
         let y = (v as f64 - self.rig.center_v_px) as f32;
         let x_first = (first as f64 - self.rig.center_u_px) as f32;
-        let mut levels = [LEVELS - 1; BLOCK];
+        // A root has no vectors everywhere: the loops before and after it do.
+        let mut normals = [0.0; BLOCK];
         let slopes = along_u.iter().zip(along_v);
-        for (i, ((level, &disparity), (&a, &b))) in (0u16..).zip(levels.iter_mut().zip(here).zip(slopes)) {
+        for (i, ((normal, &disparity), (&a, &b))) in (0u16..).zip(normals.iter_mut().zip(here).zip(slopes)) {
             let (d, x) = (f32::from(disparity) * (1.0 / 256.0), x_first + f32::from(i));
             let (nu, nv, nz) = (focal * a, focal * b, d - x * a - y * b);
-            let share = d / libm::sqrtf(nu * nu + nv * nv + nz * nz);
+            *normal = nu * nu + nv * nv + nz * nz;
+        }
+        normals.iter_mut().for_each(|normal| *normal = libm::sqrtf(*normal));
+        let mut levels = [0; BLOCK];
+        for (level, (&normal, &disparity)) in levels.iter_mut().zip(normals.iter().zip(here)) {
+            let share = f32::from(disparity) * (1.0 / 256.0) / normal;
             // Without a disparity it is no number, which becomes 0.
-            let rounded = (share * LEVELS as f32 + 0.5) as u32;
-            *level = if rounded > LEVELS { LEVELS } else { rounded }.saturating_sub(1);
+            let rounded = (share * LEVELS as f32 + 0.5) as i32;
+            *level = if rounded > LEVELS as i32 { LEVELS as i32 } else { rounded }.max(1) as u32 - 1;
         }
         levels
     }
