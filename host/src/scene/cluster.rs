@@ -72,11 +72,13 @@ pub struct VertexClustering {
 }
 
 impl VertexClustering {
-    /// Keeps at most so many triangles.
-    pub fn new(most_triangles: usize) -> Self {
+    /// Keeps at most so many triangles of about so many that will come: cells begin so large that little has to be clustered again.
+    pub fn new(most_triangles: usize, coming: u64) -> Self {
+        let side = (coming as f64 / most_triangles.max(1) as f64).sqrt() as f32;
         Self {
             most_triangles,
-            cell_m: FIRST_CELL_M,
+            // A surface has triangles by the inverse square of their sides.
+            cell_m: FIRST_CELL_M * side.max(1.0),
             cells: HashMap::new(),
             clusters: Vec::new(),
             triangles: Vec::new(),
@@ -154,7 +156,7 @@ mod tests {
 
     /// A square of `side` x `side` squares of 5 cm, two triangles each, that lies at a depth of 2 m.
     fn plane(side: u32, most_triangles: usize) -> IndexedMesh {
-        let mut clustering = VertexClustering::new(most_triangles);
+        let mut clustering = VertexClustering::new(most_triangles, u64::from(2 * side * side));
         let corner = |x: u32, y: u32| ([0.05 * x as f32, 0.05 * y as f32, 2.0], [200, x as u8, 0]);
         for (x, y) in (0..side * side).map(|at| (at % side, at / side)) {
             clustering.add([corner(x, y), corner(x + 1, y), corner(x, y + 1)]);
@@ -184,7 +186,7 @@ mod tests {
 
     #[test]
     fn the_two_sides_of_a_sheet_become_one_and_nonsense_is_left_out() {
-        let mut clustering = VertexClustering::new(10);
+        let mut clustering = VertexClustering::new(10, 3);
         let corners = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(|at| (at, [0; 3]));
         clustering.add(corners);
         clustering.add([corners[0], corners[2], corners[1]]);

@@ -48,7 +48,7 @@ impl Scene {
 /// The triangles of a mesh, of the static map alone where that is asked for, so many at most; and their number on disk.
 fn simplified(path: &Path, static_only: bool, most_triangles: usize) -> Result<(IndexedMesh, u64), FormatError> {
     let ply = PlyMesh::open(path)?;
-    let mut clustering = VertexClustering::new(most_triangles);
+    let mut clustering = VertexClustering::new(most_triangles, ply.triangles);
     let mut triangles = 0;
     let add = |corners: [PlyVertex; 3]| {
         if corners[0].object == 0 || !static_only {

@@ -41,33 +41,38 @@ fn half(image: &Image<u8>) -> Option<Image<u8>> {
     Image::new(width, height, (0..height).flat_map(|v| (0..width).map(move |u| (u, v))).map(|(u, v)| mean(u, v)).collect())
 }
 
+/// Pixels of a patch of that half side.
+const fn area(half: i32) -> usize {
+    ((2 * half + 1) * (2 * half + 1)) as usize
+}
+
 /// A patch less its mean, and its length.
-struct Patch {
-    values: Vec<f32>,
+struct Patch<const AREA: usize> {
+    values: [f32; AREA],
     length: f32,
     mean: f32,
 }
 
-/// The patch about a pixel; `None` where it is not within the image.
-fn patch(image: &Image<u8>, u: i32, v: i32, half: i32) -> Option<Patch> {
+/// The patch of that half side about a pixel; `None` where it is not within the image.
+fn patch<const AREA: usize>(image: &Image<u8>, u: i32, v: i32, half: i32) -> Option<Patch<AREA>> {
     let within = |at: i32, side: usize| at >= half && at + half < side as i32;
     if !(within(u, image.width()) && within(v, image.height())) {
         return None;
     }
-    let columns = (u - half) as usize..(u + half + 1) as usize;
-    let rows = (v - half) as usize..(v + half + 1) as usize;
-    let values: Vec<f32> = rows
-        .flat_map(|row| image.pixels().get(row * image.width() + columns.start..row * image.width() + columns.end).unwrap_or(&[]))
-        .map(|&grey| f32::from(grey))
-        .collect();
-    let mean = values.iter().sum::<f32>() / values.len() as f32;
-    let values: Vec<f32> = values.iter().map(|value| value - mean).collect();
+    let side = (2 * half + 1) as usize;
+    let from_first = image.pixels().get((v - half) as usize * image.width() + (u - half) as usize..)?;
+    let mut values = [0.0; AREA];
+    for (values, row) in values.chunks_exact_mut(side).zip(from_first.chunks(image.width())) {
+        values.iter_mut().zip(row).for_each(|(value, &grey)| *value = f32::from(grey));
+    }
+    let mean = values.iter().sum::<f32>() / AREA as f32;
+    values.iter_mut().for_each(|value| *value -= mean);
     let length = values.iter().map(|value| value * value).sum::<f32>().sqrt();
     Some(Patch { values, length, mean })
 }
 
 /// Cosine of two patches; -1 where one is flat or outside.
-fn similarity(a: &Patch, b: Option<&Patch>) -> f64 {
+fn similarity<const AREA: usize>(a: &Patch<AREA>, b: Option<&Patch<AREA>>) -> f64 {
     let Some(b) = b.filter(|b| a.length > 1.0 && b.length > 1.0) else { return -1.0 };
     f64::from(a.values.iter().zip(&b.values).map(|(a, b)| a * b).sum::<f32>() / (a.length * b.length))
 }
@@ -94,7 +99,7 @@ pub fn matches(left: &Image<u8>, right: &Image<u8>) -> Vec<PatchMatch> {
 
 fn find([left, right]: [&Image<u8>; 2], [small_left, small_right]: [&Image<u8>; 2], u: i32, v: i32) -> Option<PatchMatch> {
     let (small_u, small_v) = (u / 2, v / 2);
-    let coarse = patch(small_left, small_u, small_v, COARSE)?;
+    let coarse = patch::<{ area(COARSE) }>(small_left, small_u, small_v, COARSE)?;
     if small_u < 5 || small_v < 5 || !has_corners(small_left, small_u, small_v) {
         return None;
     }
@@ -115,7 +120,7 @@ fn find([left, right]: [&Image<u8>; 2], [small_left, small_right]: [&Image<u8>; 
 
 /// The place at full size, below the pixel.
 fn refined(left: &Image<u8>, right: &Image<u8>, [u, v]: [i32; 2], [near_u, near_v]: [i32; 2]) -> Option<PatchMatch> {
-    let sought = patch(left, u, v, FINE)?;
+    let sought = patch::<{ area(FINE) }>(left, u, v, FINE)?;
     let score = |du: i32, dv: i32| similarity(&sought, patch(right, near_u + du, near_v + dv, FINE).as_ref());
     let around = (-3..=3).flat_map(|du| (-3..=3).map(move |dv| (du, dv)));
     let (best, du, dv) = around.map(|(du, dv)| (score(du, dv), du, dv)).max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -128,7 +133,7 @@ fn refined(left: &Image<u8>, right: &Image<u8>, [u, v]: [i32; 2], [near_u, near_
     };
     let sub_u = vertex(score(du - 1, dv), score(du + 1, dv));
     let sub_v = vertex(score(du, dv - 1), score(du, dv + 1));
-    let found = patch(right, near_u + du, near_v + dv, FINE)?;
+    let found = patch::<{ area(FINE) }>(right, near_u + du, near_v + dv, FINE)?;
     Some(PatchMatch {
         u_px: f64::from(u),
         disparity_px: f64::from(u - near_u - du) - sub_u,
