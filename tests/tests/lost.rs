@@ -1,6 +1,11 @@
 //! A camera that was covered for long: found again in its own street, and in a segment of its own in another one.
+#![allow(unsafe_code)]
 
 use dynvox::synth::{Street, StreetConfig, Traffic};
+use dynvox_capi::{
+    DynvoxCapacity, DynvoxConfig, DynvoxFrame, DynvoxImage, DynvoxReport, DynvoxRig, DynvoxSeverity, DynvoxStatus, dynvox_alignment,
+    dynvox_bytes, dynvox_config_default, dynvox_config_set, dynvox_create, dynvox_step,
+};
 use dynvox_core::egomotion::{REFERENCE_FRAMES_MAX, SEGMENT_GAP_M};
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
@@ -35,16 +40,66 @@ fn map_covered(before: &Street, after: &Street) -> Vec<Report> {
     let mut config = Config::for_rig(before.rig());
     config.volume.voxel_size_m = 0.1;
     let mut mapper = Mapper::new(&capacity, &config, slab.bytes()).expect("a slab that fits");
-    let black = vec![0; SIZE[0] * SIZE[1]];
     (0..FRAMES)
         .map(|index| {
-            let frame = if index < COVERED { before } else { after }.frame(index);
-            let covered = (COVERED..UNCOVERED).contains(&index);
-            let images = if covered { [&black, &black] } else { [&frame.left_grey, &frame.right_grey] };
-            let [left, right] = images.map(|grey| View::new(grey, SIZE[0], SIZE[1]).expect("pixels of the street's size"));
+            let images = images(before, after, index);
+            let [left, right] = images.each_ref().map(|grey| View::new(grey, SIZE[0], SIZE[1]).expect("pixels of the street's size"));
             mapper.step(&StereoFrame::pair(left, right), &Serial).expect("a good frame")
         })
         .collect()
+}
+
+/// The same through the C interface.
+fn map_covered_in_c(before: &Street, after: &Street) -> Vec<DynvoxReport> {
+    let bounds = Capacity { colour: true, blocks: 8_000, ..Capacity::TINY };
+    let (rig, capacity) = (DynvoxRig::from(&before.rig()), DynvoxCapacity::from(&bounds));
+    let (mut len, mut mapper, mut config) = (0, std::ptr::null_mut(), std::mem::MaybeUninit::<DynvoxConfig>::uninit());
+    // SAFETY: both pointers are to values that outlive the call.
+    assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut len) }, DynvoxStatus::Ok);
+    let mut buffer = vec![0; len + dynvox_alignment()];
+    let start = buffer.as_ptr().align_offset(dynvox_alignment());
+    let slab = &mut buffer[start..];
+    // SAFETY: every pointer is to a value that outlives its call; the first call writes the configuration; the slab outlives the mapper.
+    unsafe {
+        assert_eq!(dynvox_config_default(&raw const rig, config.as_mut_ptr()), DynvoxStatus::Ok);
+        assert_eq!(dynvox_config_set(config.as_mut_ptr(), c"volume.voxel_size_m".as_ptr(), c"0.1".as_ptr()), DynvoxStatus::Ok);
+        let created = dynvox_create(&raw const capacity, config.as_ptr(), slab.as_mut_ptr(), slab.len(), &raw mut mapper);
+        assert_eq!(created, DynvoxStatus::Ok);
+    }
+    let no_image = DynvoxImage { pixels: std::ptr::null(), stride: 0 };
+    (0..FRAMES)
+        .map(|index| {
+            let [left, right] = images(before, after, index);
+            let image = |pixels: &Vec<u8>| DynvoxImage { pixels: pixels.as_ptr(), stride: SIZE[0] };
+            let frame = DynvoxFrame {
+                width: SIZE[0],
+                height: SIZE[1],
+                left: image(&left),
+                right: image(&right),
+                colour: no_image,
+                detections: std::ptr::null(),
+                detection_count: 0,
+                t_world_camera: std::ptr::null(),
+                time_ns: std::ptr::null(),
+                disparity_q8: std::ptr::null(),
+            };
+            let mut report = std::mem::MaybeUninit::uninit();
+            // SAFETY: the mapper and the images are there; a step that succeeds has written the report.
+            unsafe {
+                assert_eq!(dynvox_step(mapper, &raw const frame, std::ptr::null(), report.as_mut_ptr()), DynvoxStatus::Ok);
+                report.assume_init()
+            }
+        })
+        .collect()
+}
+
+/// The images of a frame, black while the camera is covered.
+fn images(before: &Street, after: &Street, index: u32) -> [Vec<u8>; 2] {
+    if (COVERED..UNCOVERED).contains(&index) {
+        return [vec![0; SIZE[0] * SIZE[1]], vec![0; SIZE[0] * SIZE[1]]];
+    }
+    let frame = if index < COVERED { before } else { after }.frame(index);
+    [frame.left_grey, frame.right_grey]
 }
 
 fn segments(reports: &[Report]) -> Vec<u32> {
@@ -61,6 +116,16 @@ fn a_covered_camera_is_found_again_in_its_map() {
     let t_truth_camera = street.t_world_camera(UNCOVERED + 1).inverse() * found.t_world_camera;
     assert!(t_truth_camera.distance_m() < 0.3, "{} m off", t_truth_camera.distance_m());
     assert_eq!(reports.last().map(Report::severity), Some(Severity::Info));
+}
+
+#[test]
+fn the_c_interface_reports_the_same() {
+    let street = street(3);
+    let (expected, reports) = (map_covered(&street, &street), map_covered_in_c(&street, &street));
+    let digests: Vec<u64> = reports.iter().map(|report| report.digest).collect();
+    assert_eq!(digests, expected.iter().map(|report| report.digest).collect::<Vec<_>>());
+    let found = &reports[UNCOVERED as usize + 1];
+    assert_eq!((found.severity, found.fused, found.segment), (DynvoxSeverity::Recovered, true, 0));
 }
 
 #[test]
