@@ -27,7 +27,7 @@ const COLOUR_REACH: usize = 3;
 /// Distance to the pixels a slope is taken from, px.
 const SLOPE_REACH: isize = 4;
 /// Largest difference to them within a surface: 6 px.
-const SLOPE_MOST_Q8: i32 = 4 * EDGE_Q8 as i32;
+const SLOPE_MOST_Q8: u16 = 4 * EDGE_Q8;
 /// Levels of obliqueness.
 const LEVELS: u32 = 16;
 /// Set where the colour may be another surface's.
@@ -165,12 +165,12 @@ fn slope(here: &[u16; BLOCK], [after, before]: [[u16; BLOCK]; 2]) -> [f32; BLOCK
     const HALF: f32 = 0.5 / (SLOPE_REACH as f32 * 256.0);
     let mut slopes = [0.0; BLOCK];
     for (slope, ((&here, after), before)) in slopes.iter_mut().zip(here.iter().zip(after).zip(before)) {
-        let [here, after_q8, before_q8] = [here, after, before].map(i32::from);
-        let (rise, fall) = (after_q8 - here, here - before_q8);
-        let has_after = (after > 0) & (rise < SLOPE_MOST_Q8) & (rise > -SLOPE_MOST_Q8);
-        let has_before = (before > 0) & (fall < SLOPE_MOST_Q8) & (fall > -SLOPE_MOST_Q8);
+        let has_after = (after > 0) & (after.abs_diff(here) < SLOPE_MOST_Q8);
+        let has_before = (before > 0) & (before.abs_diff(here) < SLOPE_MOST_Q8);
+        // Differences so small have 16 bits with their signs.
+        let (rise, fall) = (after.wrapping_sub(here) as i16, here.wrapping_sub(before) as i16);
         let sum = if has_after { rise } else { 0 } + if has_before { fall } else { 0 };
-        *slope = sum as f32 * if has_after & has_before { HALF } else { 2.0 * HALF };
+        *slope = f32::from(sum) * if has_after & has_before { HALF } else { 2.0 * HALF };
     }
     slopes
 }
