@@ -65,6 +65,12 @@ fn killed_after(root: &Path, args: &[&str], delay: Duration) -> bool {
     run.wait().unwrap().signal().is_some()
 }
 
+/// Whether the killed run had come to its end, and removed what it no longer needed.
+fn is_complete(root: &Path) -> bool {
+    let folder = root.join("killed");
+    folder.exists() && !names(&folder).iter().any(|name| name.starts_with("run.snapshot"))
+}
+
 /// Resumes the killed run, or starts it again where it had no snapshot, until it is complete.
 fn complete(root: &Path, start: &[&str], counts: &mut Counts) {
     let resumed = dynvox(root, &["run", "--resume", "killed", "--quiet"]);
@@ -101,7 +107,7 @@ fn runs_killed_at_any_moment_equal_the_run_never_killed() {
         if counts.killed_again < counts.killed / 2 {
             counts.killed_again += u32::from(killed_after(root, &["run", "--resume", "killed", "--quiet"], delay()));
         }
-        if !root.join("killed").exists() {
+        if !is_complete(root) {
             complete(root, &start, &mut counts);
         }
         assert_same(root, "whole", "killed");
@@ -109,4 +115,25 @@ fn runs_killed_at_any_moment_equal_the_run_never_killed() {
         assert_eq!(names(root), ["whole"], "nothing is left over");
         println!("{counts:?}");
     }
+}
+
+#[test]
+fn a_run_killed_while_it_removes_its_snapshots_is_complete_once_resumed() {
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    let args = |out: &'static str| [&STREET[..], &["--snapshot-every", "2", "--quiet", "--out", out]].concat();
+    let begin = Instant::now();
+    assert!(dynvox(root, &args("whole")).status.success());
+    let half = begin.elapsed() / 2;
+    let snapshot = root.join(".killed.partial/run.snapshot");
+    while !(killed_after(root, &args("killed"), half) && snapshot.is_file()) {}
+    // As if it had come to its end, and was killed when its store and its last snapshot were removed.
+    let kept = std::fs::read(&snapshot).unwrap();
+    assert!(dynvox(root, &["run", "--resume", "killed", "--quiet"]).status.success());
+    std::fs::write(root.join("killed/run.snapshot.previous"), kept).unwrap();
+    assert!(!is_complete(root));
+    let resumed = dynvox(root, &["run", "--resume", "killed"]);
+    assert!(resumed.status.success() && output_text(&resumed).contains("was complete"), "{}", output_text(&resumed));
+    assert!(is_complete(root));
+    assert_same(root, "whole", "killed");
 }

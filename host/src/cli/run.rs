@@ -299,6 +299,13 @@ impl IncompleteRun {
     }
 }
 
+/// Files of a run that its results do not need, in the order in which they go: as long as a snapshot is there, the run can be resumed.
+fn temporary_files(blocks_stay: bool, snapshots_stay: bool) -> Vec<&'static str> {
+    let snapshots = [SNAPSHOT_FILE, PREVIOUS_SNAPSHOT_FILE].map(|name| (name, snapshots_stay));
+    let files = [(BLOCKS_FILE, blocks_stay)].into_iter().chain(snapshots);
+    files.filter(|(_, stays)| !stays).map(|(name, _)| name).collect()
+}
+
 /// Maps, writes the results, and renames the folder to its target.
 fn finish(args: &RunArgs, plan: &Plan, mut folder: RunFolder, checkpoint: Option<Checkpoint>) -> anyhow::Result<()> {
     let mut record = map(plan, &folder, checkpoint)?;
@@ -308,9 +315,7 @@ fn finish(args: &RunArgs, plan: &Plan, mut folder: RunFolder, checkpoint: Option
     let resumable = record.incomplete.is_some() && folder.has_snapshot();
     let blocks =
         resumable || record.keeps_blocks() || record.incomplete.as_ref().is_some_and(|of| of.missing.iter().any(|name| name == MAP_FILE));
-    let snapshots = [SNAPSHOT_FILE, PREVIOUS_SNAPSHOT_FILE].map(|name| (name, resumable));
-    let temporary = [(BLOCKS_FILE, blocks)].into_iter().chain(snapshots).filter(|(_, stays)| !stays);
-    let target = folder.commit(&temporary.map(|(name, _)| name).collect::<Vec<_>>())?;
+    let target = folder.commit(&temporary_files(blocks, resumable))?;
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {

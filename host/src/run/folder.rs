@@ -81,6 +81,8 @@ pub enum FolderError {
 pub const SNAPSHOT_FILE: &str = "run.snapshot";
 /// Name of the snapshot before it.
 pub const PREVIOUS_SNAPSHOT_FILE: &str = "run.snapshot.previous";
+/// Name of the summary in a run folder.
+const SUMMARY_FILE: &str = "summary.json";
 /// Name of a file that keeps disk space for trajectory, rows and summary, should the disk become full during the run.
 const RESERVE_FILE: &str = ".reserve";
 /// Its bytes.
@@ -134,7 +136,7 @@ impl RunFolder {
         let killed = has_snapshot(&partial);
         let ended_early = !partial.is_dir() && has_snapshot(&target);
         if !killed && !ended_early {
-            return Err(nothing(match (partial.is_dir(), target.join("summary.json").is_file()) {
+            return Err(nothing(match (partial.is_dir(), target.join(SUMMARY_FILE).is_file()) {
                 (true, _) => "it was interrupted before its first snapshot. Start it again",
                 (false, true) => "it has no snapshot: it is complete, or ran without --snapshot-every",
                 (false, false) => "there is no such run. Give the --out of the interrupted run",
@@ -157,6 +159,13 @@ impl RunFolder {
             Err(source) if source.kind() != ErrorKind::NotFound => Err(FolderError::Write { path: folder.snapshot(), source }),
             _ => Ok(folder),
         }
+    }
+
+    /// Whether the results of a reopened run were in place already: it was killed while it removed what it no longer needed.
+    pub fn is_complete(&self) -> bool {
+        let summary = std::fs::read(self.file(SUMMARY_FILE)).ok();
+        let summary = summary.and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok());
+        self.reopened && summary.is_some_and(|summary| summary.get("incomplete").is_none_or(serde_json::Value::is_null))
     }
 
     /// Takes disk space for what is written last.
@@ -344,7 +353,7 @@ fn check_target(target: &Path, overwrite: bool) -> Result<(), FolderError> {
         return Err(FolderError::Interrupted { path: target.to_path_buf() });
     }
     let empty = !target.exists() || target.read_dir().is_ok_and(|mut entries| entries.next().is_none());
-    match (overwrite || empty, empty || target.join("summary.json").is_file()) {
+    match (overwrite || empty, empty || target.join(SUMMARY_FILE).is_file()) {
         (true, true) => Ok(()),
         (true, false) => Err(FolderError::Foreign { path: target.to_path_buf() }),
         (false, _) => Err(FolderError::Exists { path: target.to_path_buf() }),

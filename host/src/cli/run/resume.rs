@@ -1,6 +1,6 @@
 //! `dynvox run --resume`: an interrupted run continues from its last snapshot, as it was started.
 
-use super::{RunArgs, finish, plan, print_header};
+use super::{RunArgs, finish, plan, print_header, temporary_files};
 use crate::input::StopRequest;
 use crate::run::{Checkpoint, CheckpointPlan, Plan, RunFolder, RunManifest};
 use anyhow::{Context, bail};
@@ -81,6 +81,13 @@ pub fn run(args: &RunArgs, target: &Path, stop: &StopRequest) -> anyhow::Result<
         .with_context(|| format!("the run was started in {}, which cannot be entered", working_dir.display()))?;
     let line: Vec<String> = std::iter::once("dynvox".to_owned()).chain(manifest.arguments().iter().cloned()).collect();
     let mut original = RunArgs::parse(&line).context("another dynvox started the run: this one does not accept its command line")?;
+    if folder.is_complete() {
+        let target = folder.commit(&temporary_files(original.keep_blocks, false))?;
+        if !args.silent() {
+            eprintln!("note: {} was complete but for files that it no longer needs; they are removed", target.display());
+        }
+        return Ok(());
+    }
     original.threads = args.threads.or(original.threads);
     original.rss_limit_mib = args.rss_limit_mib.or(original.rss_limit_mib);
     original.snapshot_every = args.snapshot_every.or(original.snapshot_every);
