@@ -24,8 +24,8 @@ def test_a_covered_camera_is_found_again():
     assert [report["segment"] for report in found] == [0] * len(found)
     assert {report["pose"] for report in found[COVERED + 1 : UNCOVERED]} == {"Held"}
     again = found[UNCOVERED + 1]
-    assert (again["pose"], again["severity"], again["fused"]) == ("Relocalized", "Recovered", True)
-    assert found[-1]["severity"] == "Info"
+    assert (again["pose"], again["severity"], again["fused"]) == ("Relocalized", "recovered", True)
+    assert found[-1]["severity"] == "info"
 
 
 def test_another_street_is_a_segment_of_its_own():
