@@ -13,6 +13,7 @@ use dynvox_core::{Capacity, Config, Mapper, PoseOrigin, Report, Serial, Severity
 use dynvox_tests::HeapSlab;
 
 const SIZE: [usize; 2] = [320, 96];
+const CAPACITY: Capacity = Capacity { colour: true, blocks: 8_000, ..Capacity::TINY };
 /// Frames before the camera is covered, and the first that it sees again.
 const COVERED: u32 = 12;
 const UNCOVERED: u32 = COVERED + REFERENCE_FRAMES_MAX + 4;
@@ -35,11 +36,10 @@ fn street(seed: u64) -> Street {
 
 /// Reports of `before` until the camera is covered, and of `after` from when it sees again.
 fn map_covered(before: &Street, after: &Street) -> Vec<Report> {
-    let capacity = Capacity { colour: true, blocks: 8_000, ..Capacity::TINY };
-    let mut slab = HeapSlab::of(&capacity);
+    let mut slab = HeapSlab::of(&CAPACITY);
     let mut config = Config::for_rig(before.rig());
     config.volume.voxel_size_m = 0.1;
-    let mut mapper = Mapper::new(&capacity, &config, slab.bytes()).expect("a slab that fits");
+    let mut mapper = Mapper::new(&CAPACITY, &config, slab.bytes()).expect("a slab that fits");
     (0..FRAMES)
         .map(|index| {
             let images = images(before, after, index);
@@ -51,8 +51,7 @@ fn map_covered(before: &Street, after: &Street) -> Vec<Report> {
 
 /// The same through the C interface.
 fn map_covered_in_c(before: &Street, after: &Street) -> Vec<DynvoxReport> {
-    let bounds = Capacity { colour: true, blocks: 8_000, ..Capacity::TINY };
-    let (rig, capacity) = (DynvoxRig::from(&before.rig()), DynvoxCapacity::from(&bounds));
+    let (rig, capacity) = (DynvoxRig::from(&before.rig()), DynvoxCapacity::from(&CAPACITY));
     let (mut len, mut mapper, mut config) = (0, std::ptr::null_mut(), std::mem::MaybeUninit::<DynvoxConfig>::uninit());
     // SAFETY: both pointers are to values that outlive the call.
     assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut len) }, DynvoxStatus::Ok);

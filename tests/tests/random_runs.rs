@@ -13,6 +13,7 @@ use dynvox_core::random::Random;
 use dynvox_core::tracking::{Class, Detection};
 use dynvox_core::volume::{BlockStore, EvictedBlock, LoadedBlock};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, StereoFrame};
+use dynvox_tests::fuzz::sizes;
 
 /// Runs where the environment does not say.
 const RUNS: u64 = 300;
@@ -134,28 +135,9 @@ fn capacity(random: &mut Random) -> Capacity {
     };
     for _ in 0..random.below(4) {
         let size = [0, 1, 2, 7, 33, 300, 5_000][random.below(7) as usize];
-        let fields = [
-            &mut of.image_width,
-            &mut of.image_height,
-            &mut of.raw_width,
-            &mut of.raw_height,
-            &mut of.features,
-            &mut of.matches,
-            &mut of.blocks,
-            &mut of.visible_blocks,
-            &mut of.history_frames,
-            &mut of.detections,
-            &mut of.mask_words,
-            &mut of.tracks,
-            &mut of.objects,
-            &mut of.object_blocks,
-            &mut of.crop_pixels,
-            &mut of.planning_width,
-            &mut of.planning_length,
-            &mut of.planning_height,
-        ];
-        let at = random.below(fields.len() as u32) as usize;
-        *fields[at] = size;
+        let sizes = sizes(&mut of);
+        let at = random.below(sizes.len() as u32) as usize;
+        *sizes[at] = size;
     }
     of
 }
@@ -194,7 +176,7 @@ struct Inputs {
 
 impl Inputs {
     fn new(frames: &[[Vec<u8>; 2]], at: usize, random: &mut Random) -> Self {
-        let [left, right] = &frames[at % frames.len()];
+        let [left, right] = &frames[at];
         let noise = |random: &mut Random| (0..SIZE[0] * SIZE[1]).map(|_| random.next_u32() as u8).collect::<Vec<_>>();
         let mut images = match random.below(12) {
             0 => [right.clone(), left.clone()],
@@ -253,12 +235,11 @@ impl Inputs {
 }
 
 fn assert_sound(report: &Report, mapper: &Mapper<'_>, seed: u64) {
-    let finite = |pose: &Transform| pose.rotation.iter().chain(&pose.translation_m).all(|number| number.is_finite());
     let frame = report.frame;
     assert_eq!(report.internal_faults, 0, "run {seed}, frame {frame}");
-    assert!(finite(&report.t_world_camera), "run {seed}, frame {frame}: {:?}", report.t_world_camera);
+    assert!(report.t_world_camera.is_finite(), "run {seed}, frame {frame}: {:?}", report.t_world_camera);
     for track in mapper.tracks() {
-        let poses = track.t_world_object.iter().chain([&track.motion_world]).all(finite);
+        let poses = track.t_world_object.iter().chain([&track.motion_world]).all(Transform::is_finite);
         let numbers = track.center_world_m.iter().all(|number| number.is_finite());
         assert!(poses && numbers, "run {seed}, frame {frame}: {track:?}");
     }

@@ -103,33 +103,14 @@ impl Caller {
 }
 
 fn capacity(program: &mut Program<'_>) -> DynvoxCapacity {
-    let mut of = DynvoxCapacity::from(&super::mapper::CAPACITY);
+    let mut of = super::mapper::CAPACITY;
     for _ in 0..program.byte() % 4 {
         let (field, size) = (program.byte(), program.size());
-        let fields = [
-            &mut of.image_width,
-            &mut of.image_height,
-            &mut of.raw_width,
-            &mut of.raw_height,
-            &mut of.features,
-            &mut of.matches,
-            &mut of.blocks,
-            &mut of.visible_blocks,
-            &mut of.history_frames,
-            &mut of.detections,
-            &mut of.mask_words,
-            &mut of.tracks,
-            &mut of.objects,
-            &mut of.object_blocks,
-            &mut of.crop_pixels,
-            &mut of.planning_width,
-            &mut of.planning_length,
-            &mut of.planning_height,
-        ];
-        let at = usize::from(field) % fields.len();
-        *fields[at] = size;
+        let sizes = super::sizes(&mut of);
+        let at = usize::from(field) % sizes.len();
+        *sizes[at] = size;
     }
-    of
+    DynvoxCapacity::from(&of)
 }
 
 fn config(program: &mut Program<'_>) -> Option<DynvoxConfig> {

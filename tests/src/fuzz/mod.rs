@@ -12,6 +12,8 @@ mod seeds;
 
 pub use mutate::Mutator;
 
+use dynvox_core::Capacity;
+
 /// A reader that takes any bytes.
 #[derive(Clone, Copy)]
 pub struct Target {
@@ -39,6 +41,30 @@ pub const TARGETS: [Target; 13] = [
     Target { name: "settings", seeds: seeds::settings, run: mapper::settings },
     Target { name: "calls", seeds: calls::programs, run: calls::calls },
 ];
+
+/// The sizes that bound a mapper, to be made any number.
+pub fn sizes(of: &mut Capacity) -> [&mut usize; 18] {
+    [
+        &mut of.image_width,
+        &mut of.image_height,
+        &mut of.raw_width,
+        &mut of.raw_height,
+        &mut of.features,
+        &mut of.matches,
+        &mut of.blocks,
+        &mut of.visible_blocks,
+        &mut of.history_frames,
+        &mut of.detections,
+        &mut of.mask_words,
+        &mut of.tracks,
+        &mut of.objects,
+        &mut of.object_blocks,
+        &mut of.crop_pixels,
+        &mut of.planning_width,
+        &mut of.planning_length,
+        &mut of.planning_height,
+    ]
+}
 
 /// Hands bytes to the target of a name.
 ///
