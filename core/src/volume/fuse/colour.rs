@@ -1,6 +1,9 @@
 //! Colours of a layer's voxels: read where there is one to average in, averaged 64 at a time.
 
-use super::{Fusion, layer::Scratch};
+use super::{
+    Fusion,
+    layer::{Scratch, averaged},
+};
 use crate::volume::{
     block::{LAYER_VOXELS, Layer, packed},
     observed::is_spoiled,
@@ -79,15 +82,13 @@ impl Fusion<'_> {
     }
 }
 
-/// Moves colours towards those seen: `old + round((seen - old) * share)`, as a sum of two products of 16 bits.
+/// Moves colours towards those seen.
 // Never inlined: one copy serves all planes.
 #[inline(never)]
 fn average(plane: &mut Layer<u8>, seen: &Layer<u8>, share: &Layer<i16>) {
     for ((colour, &seen), &share) in plane.iter_mut().zip(seen).zip(share) {
         // All 0 is "no colour yet".
         let seen = if seen == 0 { 1 } else { seen };
-        let rest = i16::MIN.wrapping_sub(share);
-        let sum = i32::from(*colour) * i32::from(rest) + i32::from(seen) * i32::from(share);
-        *colour = (((1 << 14) - sum) >> 15) as u8;
+        *colour = averaged(i32::from(*colour), i32::from(seen), share) as u8;
     }
 }

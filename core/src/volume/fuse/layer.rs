@@ -219,15 +219,20 @@ fn fill(layer: &mut Layer<f32>, starts: &[Vector3<f32>; BLOCK_SIDE], axis: usize
     }
 }
 
-/// Moves distances towards what is observed: `old + round((target - old) * share)`, as a sum of two products of 16 bits.
+/// `old + round((seen - old) * share)` of a share times -32,768, as a sum of two products of 16 bits.
+#[inline(always)]
+pub(super) fn averaged(old: i32, seen: i32, share: i16) -> i32 {
+    // Both shares are negative, and add up to -32,768.
+    let rest = i16::MIN.wrapping_sub(share);
+    ((1 << 14) - (old * i32::from(rest) + seen * i32::from(share))) >> 15
+}
+
+/// Moves distances towards what is observed.
 #[inline]
 fn average(scratch: &Scratch, sdf: &mut Layer<i16>) {
-    let averaged = scratch.share.iter().zip(&scratch.target).zip(&scratch.hit);
-    for (sdf, ((&share, &target), &hit)) in sdf.iter_mut().zip(averaged) {
-        // Both shares are negative, and add up to -32,768.
-        let rest = i16::MIN.wrapping_sub(share);
-        let sum = i32::from(*sdf) * i32::from(rest) + i32::from(target) * i32::from(share);
-        let new = (((1 << 14) - sum) >> 15) as i16;
+    let observed = scratch.share.iter().zip(&scratch.target).zip(&scratch.hit);
+    for (sdf, ((&share, &target), &hit)) in sdf.iter_mut().zip(observed) {
+        let new = averaged(i32::from(*sdf), i32::from(target), share) as i16;
         *sdf = (new & hit) | (*sdf & !hit);
     }
 }
