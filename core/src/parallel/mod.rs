@@ -11,8 +11,8 @@ mod vectors;
 pub use bands::each;
 pub(crate) use bands::{BANDS, Bands, zip2, zip3};
 pub use stage::Stage;
-pub(crate) use vectors::Level;
 pub use vectors::Vectors;
+pub(crate) use vectors::{Level, Work};
 
 /// Runs work for the core.
 ///

@@ -14,6 +14,16 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Vectors(Level);
 
+/// Ordinary code whose loops compilers turn into vectors: compiled once for each level that compilers can write for.
+///
+/// [`Work::run`] is `#[inline(always)]`, and so is every function that one of its loops is in: what is called and not inlined keeps to
+/// the target's baseline. No level multiplies and adds in one instruction, so that none gives another bit.
+pub(crate) trait Work {
+    type Output;
+
+    fn run(self) -> Self::Output;
+}
+
 /// Levels of vector instructions that kernels are written for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Level {
@@ -61,6 +71,21 @@ impl Vectors {
         [Some(plain), (baseline != plain).then_some(baseline), (most != baseline).then_some(most)].into_iter().flatten()
     }
 
+    /// Runs work compiled for these vectors.
+    #[cfg_attr(
+        all(target_arch = "x86_64", target_feature = "sse2"),
+        expect(unsafe_code, reason = "calls code compiled for what the processor has; docs/decisions/0023-vector-kernels.md")
+    )]
+    pub(crate) fn run<W: Work>(self, work: W) -> W::Output {
+        match self.0 {
+            // SAFETY: this level exists only where the processor says that it has AVX2.
+            #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
+            Level::Avx2 => unsafe { x86::with_avx2(work) },
+            // Ordinary code is compiled for what every machine of the target has.
+            _ => work.run(),
+        }
+    }
+
     /// Name in tables.
     pub const fn name(self) -> &'static str {
         match self.0 {
@@ -93,6 +118,12 @@ mod x86 {
         let known = __cpuid(0).eax >= 7 && __cpuid(1).ecx & OSXSAVE != 0 && __cpuid_count(7, 0).ebx & AVX2 != 0;
         // SAFETY: XGETBV exists where OSXSAVE is set.
         known && unsafe { saved_state() } & SAVED == SAVED
+    }
+
+    /// Runs work with 256 bits.
+    #[target_feature(enable = "avx2")]
+    pub fn with_avx2<W: super::Work>(work: W) -> W::Output {
+        work.run()
     }
 
     #[target_feature(enable = "xsave")]

@@ -8,6 +8,7 @@ use super::{
 use crate::{
     image::{InvalidPixels, View},
     memory::{Capacity, Carver, region_bytes},
+    parallel::{Vectors, Work},
     sad::Descriptor,
     state::Visitor,
 };
@@ -117,7 +118,13 @@ impl<'s> Camera<'s> {
     }
 
     /// Makes the current frame the previous one and takes in an image no larger than the capacity.
-    pub(super) fn take(&mut self, image: View<'_, u8>, invalid: Option<&InvalidPixels<'_>>, response_min: i16) -> FeatureCount {
+    pub(super) fn take(
+        &mut self,
+        image: View<'_, u8>,
+        invalid: Option<&InvalidPixels<'_>>,
+        response_min: i16,
+        vectors: Vectors,
+    ) -> FeatureCount {
         self.current = !self.current;
         let [a, b] = &mut self.frames;
         let frame = if self.current { b } else { a };
@@ -125,7 +132,7 @@ impl<'s> Camera<'s> {
         for (copied, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
             copied.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
         }
-        self.describe(width, height, invalid, response_min)
+        self.describe([width, height], invalid, response_min, vectors)
     }
 
     /// Makes the previous frame the current one again: the next image overwrites the last one.
@@ -148,33 +155,57 @@ impl<'s> Camera<'s> {
     }
 
     /// Finds the features of the current frame, none on pixels that are not to be used.
-    pub(super) fn describe(&mut self, width: usize, height: usize, invalid: Option<&InvalidPixels<'_>>, response_min: i16) -> FeatureCount {
-        let [a, b] = &mut self.frames;
-        let frame = if self.current { b } else { a };
+    pub(super) fn describe(
+        &mut self,
+        size: [usize; 2],
+        invalid: Option<&InvalidPixels<'_>>,
+        response_min: i16,
+        vectors: Vectors,
+    ) -> FeatureCount {
+        vectors.run(FindFeatures { camera: self, size, invalid, response_min })
+    }
+}
+
+/// Finds the features of a camera's current frame.
+struct FindFeatures<'a, 's> {
+    camera: &'a mut Camera<'s>,
+    size: [usize; 2],
+    invalid: Option<&'a InvalidPixels<'a>>,
+    response_min: i16,
+}
+
+impl Work for FindFeatures<'_, '_> {
+    type Output = FeatureCount;
+
+    #[inline(always)]
+    fn run(self) -> FeatureCount {
+        let Self { camera, size: [width, height], invalid, response_min } = self;
+        let [a, b] = &mut camera.frames;
+        let frame = if camera.current { b } else { a };
         let pixels = width * height;
         let (Some(gradient), Some(blob), Some(corner)) =
-            (self.gradient.get_mut(..pixels), self.blob.get_mut(..pixels), self.corner.get_mut(..pixels))
+            (camera.gradient.get_mut(..pixels), camera.blob.get_mut(..pixels), camera.corner.get_mut(..pixels))
         else {
             frame.dense.clear();
             frame.sparse.clear();
             return FeatureCount::default();
         };
         let Some(image) = View::new(frame.pixels, width, height) else { return FeatureCount::default() };
-        filter(image, Responses { gradient, blob, corner }, self.sums);
+        filter(image, Responses { gradient, blob, corner }, camera.sums);
         if let Some(invalid) = invalid {
             silence(invalid, width, blob);
             silence(invalid, width, corner);
         }
         let mut found = 0;
-        let mut slots = self.candidates.iter_mut();
-        suppress(Field { response: blob, width }, Field { response: corner, width }, response_min, self.sums, |candidate| {
+        let mut slots = camera.candidates.iter_mut();
+        suppress(Field { response: blob, width }, Field { response: corner, width }, response_min, camera.sums, |candidate| {
             found += 1;
             if let Some(slot) = slots.next() {
                 *slot = candidate;
             }
         });
-        let candidates = self.candidates.iter().take(found).copied();
-        let mut dropped = found.saturating_sub(self.candidates.len());
+        let candidates = camera.candidates.iter().take(found).copied();
+        let mut dropped = found.saturating_sub(camera.candidates.len());
         dropped += frame.dense.fill(candidates.clone(), gradient, width, height);
         dropped += frame.sparse.fill(candidates.filter(|candidate| candidate.sparse == 1), gradient, width, height);
         FeatureCount {

@@ -79,6 +79,7 @@ impl<'s> Features<'s> {
 
     /// Sorts candidates in and describes them by `gradient`, whose rows are `width` apart. The first that fit are kept; returns how
     /// many were dropped.
+    #[inline(always)]
     pub(super) fn fill(
         &mut self,
         candidates: impl Iterator<Item = Candidate> + Clone,
@@ -203,6 +204,7 @@ pub(super) struct Window {
 }
 
 /// Samples the gradients around a feature that is at least 5 px inside the image.
+#[inline(always)]
 fn describe(gradient: &[u16], width: usize, u: usize, v: usize, out: &mut [u8; DESCRIPTOR]) {
     let centre = v * width + u;
     for (pair, (du, dv)) in out.chunks_exact_mut(2).zip(SAMPLES) {

@@ -26,6 +26,7 @@ pub(super) struct Responses<'a> {
 }
 
 /// Filters a whole image. `sums` holds [`COLUMN_SUMS`] rows. Does nothing below 5 x 5 px.
+#[inline(always)]
 pub(super) fn filter(image: View<'_, u8>, out: Responses<'_>, sums: &mut [i16]) {
     let (width, height) = (image.width(), image.height());
     let Responses { gradient, blob, corner } = out;
@@ -48,6 +49,7 @@ pub(super) fn filter(image: View<'_, u8>, out: Responses<'_>, sums: &mut [i16]) 
 }
 
 /// Sums each column's five pixels in the five ways the filters need. Nothing where the rows or `sums` are too short.
+#[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "all slices are cut to the same length first")]
 fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) -> Option<()> {
     let [a, b, c, d, e] = rows;
@@ -70,6 +72,7 @@ fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) -> Option<()> {
 }
 
 /// Finishes the filters along one row, border columns excluded. Nothing where a row is too short.
+#[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "the outputs are 4 shorter than a row of sums; all slices are cut to their length first")]
 fn sum_rows(sums: &[i16], pixels: &[u8], gradient: &mut [u16], blob: &mut [i16], corner: &mut [i16]) -> Option<()> {
     let n = gradient.len();

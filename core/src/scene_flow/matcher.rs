@@ -8,7 +8,7 @@ use super::{
     circle::{Corners, Reach},
     matches::Match,
     prior::Prior,
-    refine::{Images, Pixels, find_back, refine},
+    refine::{Images, Pixels, RefineSupported, find_back},
     report::{FlowReport, FlowStatus, PassCount},
     support::{Motion, support},
 };
@@ -18,7 +18,7 @@ use crate::{
     geometry::ColumnCorrection,
     image::{InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
-    parallel::{Bands, Executor, each, zip3},
+    parallel::{Bands, Executor, Vectors, each, zip3},
     part::part,
     state::Visitor,
 };
@@ -239,8 +239,9 @@ impl<'s> FlowMatcher<'s> {
     /// Finds the features of the pair that was read.
     pub(crate) fn rebuild(&mut self, config: &SceneFlowConfig, invalid: Option<&InvalidPair<'_>>) {
         if let Some([width, height]) = self.last {
-            self.left.describe(width, height, invalid.map(|pair| &pair.left), response_min(config));
-            self.right.describe(width, height, invalid.map(|pair| &pair.right), response_min(config));
+            let vectors = Vectors::BASELINE;
+            self.left.describe([width, height], invalid.map(|pair| &pair.left), response_min(config), vectors);
+            self.right.describe([width, height], invalid.map(|pair| &pair.right), response_min(config), vectors);
         }
     }
 
@@ -272,8 +273,11 @@ impl<'s> FlowMatcher<'s> {
         }
         let response_min = response_min(config);
         let [invalid_left, invalid_right] = [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
-        let (left, right) =
-            executor.join(|| self.left.take(left, invalid_left, response_min), || self.right.take(right, invalid_right, response_min));
+        let vectors = executor.vectors();
+        let (left, right) = executor.join(
+            || self.left.take(left, invalid_left, response_min, vectors),
+            || self.right.take(right, invalid_right, response_min, vectors),
+        );
         let mut report = FlowReport { left, right, ..FlowReport::default() };
         if self.last.replace(size) != Some(size) {
             return FlowReport { status: FlowStatus::First, ..report };
@@ -351,19 +355,13 @@ impl<'s> FlowMatcher<'s> {
     /// Refines the supported among the first `closed` matches and closes the gaps the others leave.
     fn refine_supported<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], closed: usize, executor: &E) {
         let images = images(&self.left, &self.right, [width, height]);
-        let band = |(matches, supported, score): (&mut [Match], &mut [u8], &mut [f32])| {
-            for ((m, supported), score) in matches.iter_mut().zip(supported).zip(score).filter(|((_, supported), _)| **supported == 1) {
-                *score = 0.0;
-                match refine(m, images) {
-                    Some(better) => (*m, *score) = better,
-                    None => *supported = 0,
-                }
-            }
-        };
         if config.refine {
             let bands = Bands::of(closed);
             let (matches, supported) = (bands.split_mut(self.refined, 1), bands.split_mut(self.supported, 1));
-            each(executor, zip3(matches, supported, bands.split_mut(self.score, 1)), band);
+            let jobs = zip3(matches, supported, bands.split_mut(self.score, 1));
+            each(executor, jobs, |(matches, supported, score)| {
+                executor.vectors().run(RefineSupported { images, matches, supported, score })
+            });
         } else {
             self.score.fill(0.0);
         }

@@ -5,6 +5,7 @@
 //! at sixteenths of a pixel; the step taken there is not rounded, so the result is finer than the sampling.
 
 use super::matches::Match;
+use crate::parallel::Work;
 
 /// Side of a patch, px.
 const SIDE: usize = 8;
@@ -53,10 +54,12 @@ pub(super) struct Template {
     pattern: f64,
 }
 
+#[inline(always)]
 fn sum_products(a: &[[i16; SIDE]; SIDE], b: &[[i16; SIDE]; SIDE]) -> i32 {
     a.as_flattened().iter().zip(b.as_flattened()).map(|(&a, &b)| i32::from(a) * i32::from(b)).sum()
 }
 
+#[inline(always)]
 fn sum(a: &[[i16; SIDE]; SIDE]) -> i32 {
     a.as_flattened().iter().map(|&a| i32::from(a)).sum()
 }
@@ -111,6 +114,7 @@ impl Template {
     }
 
     /// Where the patch is in another image, begun at (u, v); the first step below `small_step_px` is the last one.
+    #[inline(always)]
     pub(super) fn find(&self, image: Pixels<'_>, [u, v]: [f32; 2], small_step_px: f64) -> Option<[f32; 2]> {
         let begin = [f64::from(u), f64::from(v)];
         let mut at = begin;
@@ -148,6 +152,7 @@ impl Template {
     }
 
     /// The image minus the template, in 1/32 grey levels, with the patch's corner at `corner` sixteenths of a pixel.
+    #[inline(always)]
     fn error(&self, image: Pixels<'_>, corner: [i32; 2]) -> Option<[[i16; SIDE]; SIDE]> {
         let (left, top) = (usize::try_from(corner[0] >> 4).ok()?, usize::try_from(corner[1] >> 4).ok()?);
         let (along, down) = ((corner[0] & 15) as u16, (corner[1] & 15) as u16);
@@ -176,6 +181,7 @@ impl Template {
     }
 
     /// How far the template must move to explain the error, px.
+    #[inline(always)]
     fn step(&self, error: &[[i16; SIDE]; SIDE]) -> [f64; 2] {
         let total = f64::from(sum(error));
         let pattern = f64::from(sum_products(&self.pixel, error)) - self.mean[0] * total;
@@ -192,12 +198,18 @@ impl Template {
 pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
     let [u, v] = m.current_left.map(|x| x as usize);
     let template = Template::extract(images.current_left, u, v)?;
-    let find = |image, at| template.find(image, at, GUESSED_STEP_PX).filter(|&at| template.is_alike(image, at)).map(middle);
+    let sought =
+        [(images.previous_left, m.previous_left), (images.previous_right, m.previous_right), (images.current_right, m.current_right)];
+    let mut found = [[0.0; 2]; 3];
+    for (found, (image, at)) in found.iter_mut().zip(sought) {
+        *found = middle(template.find(image, at, GUESSED_STEP_PX).filter(|&at| template.is_alike(image, at))?);
+    }
+    let [previous_left, previous_right, current_right] = found;
     let found = Match {
-        previous_left: find(images.previous_left, m.previous_left)?,
-        previous_right: find(images.previous_right, m.previous_right)?,
+        previous_left,
+        previous_right,
         current_left: middle(m.current_left),
-        current_right: find(images.current_right, m.current_right)?,
+        current_right,
     };
     let valid = found.previous_disparity_px() > 0.0 && found.current_disparity_px() > 0.0;
     valid.then_some(found)
@@ -212,17 +224,50 @@ pub(super) struct Images<'a> {
     pub current_right: Pixels<'a>,
 }
 
+/// Refines those of a band's matches that are supported.
+pub(super) struct RefineSupported<'a> {
+    pub images: Images<'a>,
+    pub matches: &'a mut [Match],
+    /// 1 where a match is supported; 0 afterwards where its patch is lost.
+    pub supported: &'a mut [u8],
+    /// How well each can be placed.
+    pub score: &'a mut [f32],
+}
+
+impl Work for RefineSupported<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let all = self.matches.iter_mut().zip(self.supported).zip(self.score);
+        for ((m, supported), score) in all.filter(|((_, supported), _)| **supported == 1) {
+            *score = 0.0;
+            match refine(m, self.images) {
+                Some(better) => (*m, *score) = better,
+                None => *supported = 0,
+            }
+        }
+    }
+}
+
 /// Refines one match that is still at whole pixels. Returns it with its texture (the better it can be placed, the larger), or `None`
 /// when the patch is lost in one of the images or loses its positive disparity.
+#[inline(always)]
 pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
     let [u, v] = m.previous_left.map(|x| x as usize);
     let template = Template::extract(images.previous_left, u, v)?;
-    let find = |image, at| template.find(image, at, SMALL_STEP_PX).map(middle);
+    let sought =
+        [(images.previous_right, m.previous_right), (images.current_left, m.current_left), (images.current_right, m.current_right)];
+    let mut found = [[0.0; 2]; 3];
+    for (found, (image, at)) in found.iter_mut().zip(sought) {
+        *found = middle(template.find(image, at, SMALL_STEP_PX)?);
+    }
+    let [previous_right, current_left, current_right] = found;
     let refined = Match {
         previous_left: middle(m.previous_left),
-        previous_right: find(images.previous_right, m.previous_right)?,
-        current_left: find(images.current_left, m.current_left)?,
-        current_right: find(images.current_right, m.current_right)?,
+        previous_right,
+        current_left,
+        current_right,
     };
     let valid = refined.previous_disparity_px() > 0.0 && refined.current_disparity_px() > 0.0;
     valid.then_some((refined, template.texture as f32))

@@ -48,6 +48,7 @@ pub(super) struct Field<'a> {
 
 /// Finds the features of both filters and hands them to `emit`: four rows by four rows, there by filter, there by four columns from left
 /// to right, maxima first; no 4 x 4 px hold two peaks of a class. `scratch` holds [`SCRATCH_ROWS`] rows.
+#[inline(always)]
 pub(super) fn suppress(blob: Field<'_>, corner: Field<'_>, response_min: i16, scratch: &mut [i16], mut emit: impl FnMut(Candidate)) {
     let width = blob.width;
     if width <= 2 * FEATURE_MARGIN {
@@ -85,6 +86,7 @@ fn stronger<const SIGN: i16>(a: i16, b: i16) -> i16 {
 
 /// Flags the pixels of rows `top..top + rows` that reach the threshold and that nothing within [`DENSE_RADIUS`] is stronger than: a bit a
 /// row, maxima below minima, for each column from [`FEATURE_MARGIN`] on.
+#[inline(always)]
 fn flag_strongest<const SIGN: i16>(field: Field<'_>, [top, rows]: [usize; 2], response_min: i16, strongest: &mut [i16], flags: &mut [u8]) {
     let width = field.width.max(1);
     down_columns::<SIGN>(field, top, strongest);
@@ -96,6 +98,7 @@ fn flag_strongest<const SIGN: i16>(field: Field<'_>, [top, rows]: [usize; 2], re
 }
 
 /// The strongest of each column within [`DENSE_RADIUS`] of each of the rows `top..top + 4`, a row each. Nothing where rows are missing.
+#[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "all slices are cut to the same length first")]
 fn down_columns<const SIGN: i16>(field: Field<'_>, top: usize, strongest: &mut [i16]) -> Option<()> {
     let width = field.width;
@@ -122,6 +125,7 @@ fn down_columns<const SIGN: i16>(field: Field<'_>, top: usize, strongest: &mut [
 }
 
 /// Flags what of a row is as strong as the strongest of the columns about it. Nothing where a row is too short.
+#[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "all slices are cut to the same length first")]
 fn along_row<const SIGN: i16>(row: &[i16], strongest: &[i16], response_min: i16, flag: u8, flags: &mut [u8]) -> Option<()> {
     let n = row.len().checked_sub(2 * FEATURE_MARGIN)?;

@@ -48,6 +48,7 @@ pub(super) struct Gradients<'a> {
 impl<'a> Gradients<'a> {
     /// Builds the descriptors of row `v` into `out`, which is as wide as the image. Those in the margin are left as they are; returns
     /// whether the row has descriptors at all.
+    #[inline(always)]
     pub fn describe_row(&self, v: usize, out: &mut [Descriptor]) -> bool {
         let row = |image: &'a [u8], v: usize| part(image, v * self.width..(v + 1) * self.width);
         if v < MARGIN || v + MARGIN >= self.height || self.width < 2 * MARGIN || out.len() < self.width {
@@ -73,6 +74,7 @@ struct SampledRows<'a> {
 
 impl<'a> SampledRows<'a> {
     /// Describes pixels from column 2 on, by words, until the words would reach beyond the row; returns where it stopped.
+    #[inline(always)]
     fn describe_most(&self, out: &mut [Descriptor]) -> usize {
         let ([du_above, du_here, du_below], [dv_above, dv_here, dv_below]) = (self.du, self.dv);
         let from = |row: &'a [u8], column: usize| part(row, column..);
@@ -94,6 +96,7 @@ impl<'a> SampledRows<'a> {
     }
 
     /// Describes one pixel, two columns or more from either end of the row.
+    #[inline(never)]
     fn describe(&self, u: usize) -> Descriptor {
         let ([du_above, du_here, du_below], [dv_above, dv_here, dv_below]) = (self.du, self.dv);
         let at = |row: &[u8], u: usize| row.get(u).copied().unwrap_or(FLAT);

@@ -2,29 +2,43 @@
 //!
 //! Memory: two bytes a pixel, given by the caller. The outermost pixels have no gradient (128).
 
-use crate::image::View;
+use crate::{image::View, parallel::Work};
 
 /// The gradient of a pixel without any.
 pub(super) const FLAT: u8 = 128;
 
-/// Fills the rows of `du` and `dv` (`width` wide) that begin at image row `first`.
-pub(super) fn gradients(image: View<'_, u8>, first: usize, du: &mut [u8], dv: &mut [u8]) {
-    let width = image.width().max(1);
-    for (i, (du, dv)) in du.chunks_exact_mut(width).zip(dv.chunks_exact_mut(width)).enumerate() {
-        let v = first + i;
-        du.fill(FLAT);
-        dv.fill(FLAT);
-        if v > 0 && v + 1 < image.height() {
-            row(image.row(v - 1), image.row(v), image.row(v + 1), du, dv);
+/// Fills rows of `du` and `dv`, as wide as the image, that begin at its row `first`.
+pub(super) struct GradientRows<'a> {
+    pub image: View<'a, u8>,
+    pub first: usize,
+    pub du: &'a mut [u8],
+    pub dv: &'a mut [u8],
+}
+
+impl Work for GradientRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { image, first, du, dv } = self;
+        let width = image.width().max(1);
+        for (v, (du, dv)) in (first..).zip(du.chunks_exact_mut(width).zip(dv.chunks_exact_mut(width))) {
+            du.fill(FLAT);
+            dv.fill(FLAT);
+            if v > 0 && v + 1 < image.height() {
+                row(image.row(v - 1), image.row(v), image.row(v + 1), du, dv);
+            }
         }
     }
 }
 
+#[inline]
 fn quarter(response: i16) -> u8 {
     ((response >> 2) + 128).clamp(0, 255) as u8
 }
 
 /// The gradients of an inner row. None where a row is too short.
+#[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "every slice is cut to n = width - 2 items, and i < n")]
 fn row(above: &[u8], here: &[u8], below: &[u8], du: &mut [u8], dv: &mut [u8]) -> Option<()> {
     let n = du.len().checked_sub(2)?;
@@ -50,11 +64,11 @@ mod tests {
     fn a_ramp_has_a_constant_gradient_and_an_edge_saturates() {
         let ramp: std::vec::Vec<u8> = (0..5 * 9).map(|i| ((i % 9) * 8) as u8).collect();
         let (mut du, mut dv) = (std::vec![0; 45], std::vec![0; 45]);
-        gradients(View::new(&ramp, 9, 5).unwrap(), 0, &mut du, &mut dv);
+        GradientRows { image: View::new(&ramp, 9, 5).unwrap(), first: 0, du: &mut du, dv: &mut dv }.run();
         assert!(du[9 + 1..9 + 8].iter().all(|&g| g == 128 + 16), "8 a pixel is a response of 64, a quarter of it 16");
         assert!(dv.iter().all(|&g| g == FLAT));
         let edge: std::vec::Vec<u8> = (0..45).map(|i| if i < 18 { 255 } else { 0 }).collect();
-        gradients(View::new(&edge, 9, 5).unwrap(), 0, &mut du, &mut dv);
+        GradientRows { image: View::new(&edge, 9, 5).unwrap(), first: 0, du: &mut du, dv: &mut dv }.run();
         assert_eq!(dv[9 + 4], 0, "-1020 / 4 + 128 saturates");
         assert_eq!(du[9 + 4], FLAT);
     }

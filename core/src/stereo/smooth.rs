@@ -4,7 +4,10 @@
 //! centre's: from full weight when equal to none at 4 px. All in 16-bit integers, but for one division per pixel in `f32`, whose operands
 //! are integers below 2^15 and which is therefore the same everywhere.
 
-use crate::part::part;
+use crate::{
+    parallel::Work,
+    part::{part, part_mut},
+};
 
 use super::dense::NONE;
 
@@ -22,6 +25,7 @@ type Taps<'a> = [&'a [i16]; 2 * REACH];
 /// The weighted mean of each centre and its taps. Centre, taps and `to` are of one length.
 ///
 /// One tap after the other for a block of pixels, so that each loop is short and runs on vectors.
+#[inline(always)]
 fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
     for (block, (centre, to)) in centre.chunks(BLOCK).zip(to.chunks_mut(BLOCK)).enumerate() {
         // At most 8 x 31 x 126 = 31,248 in the numerator; the centre alone makes the denominator 63.
@@ -47,29 +51,44 @@ fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
     }
 }
 
-/// Smooths along the rows of `from` into `to`. Pixels nearer than four to an end stay as they are.
-pub(super) fn mean_along_rows(from: &[i16], width: usize, to: &mut [i16]) {
-    let width = width.max(1);
-    for (from, to) in from.chunks_exact(width).zip(to.chunks_exact_mut(width)) {
-        to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
-        let n = width.saturating_sub(2 * REACH);
-        let taps = window().map(|k| from.get(k..).and_then(|tap| tap.get(..n)).unwrap_or(&[]));
-        if let (Some(centre), Some(to)) = (from.get(REACH..), to.get_mut(REACH..)) {
-            mean(part(centre, ..n), taps, to.get_mut(..n).unwrap_or_default());
-        }
-    }
+/// Which pixels make a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Along {
+    Rows,
+    Columns,
 }
 
-/// Smooths along the columns of `from`, whose row `first` is the first one of `to`.
-pub(super) fn mean_along_columns(from: &[i16], width: usize, first: usize, to: &mut [i16]) {
-    let width = width.max(1);
-    let height = from.len() / width;
-    for (v, to) in (first..).zip(to.chunks_exact_mut(width)) {
-        let row = |v: usize| from.get(v * width..).and_then(|row| row.get(..width)).unwrap_or(&[]);
-        if v < REACH || v + REACH >= height {
-            to.iter_mut().zip(row(v)).for_each(|(to, from)| *to = *from);
-        } else {
-            mean(row(v), window().map(|k| row(v + k - REACH)), to);
+/// Smooths rows `to` of the image `from`, from row `first` on. Pixels nearer than four to an end of their row or column stay as they are.
+pub(super) struct Smooth<'a> {
+    pub from: &'a [i16],
+    pub width: usize,
+    pub along: Along,
+    pub first: usize,
+    pub to: &'a mut [i16],
+}
+
+impl Work for Smooth<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { from, width, along, first, to } = self;
+        let width = width.max(1);
+        let inner_rows = REACH..(from.len() / width).saturating_sub(REACH);
+        for (v, to) in (first..).zip(to.chunks_exact_mut(width)) {
+            let row = v * width;
+            to.iter_mut().zip(part(from, row..row + width)).for_each(|(to, from)| *to = *from);
+            let (inner, stride) = match along {
+                Along::Rows => (REACH..width.saturating_sub(REACH), 1),
+                Along::Columns => (if inner_rows.contains(&v) { 0..width } else { 0..0 }, width),
+            };
+            if inner.is_empty() {
+                continue;
+            }
+            let pixels = |first: usize| part(from, first..first + inner.len());
+            let centre = row + inner.start;
+            let taps = window().map(|k| pixels(centre + k * stride - REACH * stride));
+            mean(pixels(centre), taps, part_mut(to, inner.clone()));
         }
     }
 }
@@ -116,9 +135,9 @@ mod tests {
                 })
                 .collect();
             let mut rows = vec![0; image.len()];
-            mean_along_rows(&image, width, &mut rows);
+            Smooth { from: &image, width, along: Along::Rows, first: 0, to: &mut rows }.run();
             let mut columns = vec![0; image.len()];
-            mean_along_columns(&image, width, 0, &mut columns);
+            Smooth { from: &image, width, along: Along::Columns, first: 0, to: &mut columns }.run();
             for i in 0..image.len() {
                 let (u, v) = (i % width, i / width);
                 assert_eq!(rows[i], plain(&image, 1, u, i, width));
@@ -133,7 +152,7 @@ mod tests {
             let mut row = [8_000 + difference; 9];
             row[4] = 8_000;
             let mut out = [0; 9];
-            mean_along_rows(&row, 9, &mut out);
+            Smooth { from: &row, width: 9, along: Along::Rows, first: 0, to: &mut out }.run();
             assert!((out[4] - 8_000).abs() <= difference.abs(), "{difference}: {}", out[4]);
             assert_eq!(out[4], plain(&row, 1, 4, 4, 9));
         }

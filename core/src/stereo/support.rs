@@ -109,11 +109,9 @@ impl SupportMatching<'_> {
         for (j, out) in grid.chunks_exact_mut(candidates(width, step).max(1)).enumerate() {
             let v = (first + j) * step;
             let Some(above) = v.checked_sub(CORNER) else { continue };
-            let ready = self.left.describe_row(above, l0)
-                && self.left.describe_row(v + CORNER, l1)
-                && self.right.describe_row(above, r0)
-                && self.right.describe_row(v + CORNER, r1);
-            if ready {
+            let below = v + CORNER;
+            let described = [(self.left, above, &mut *l0), (self.left, below, l1), (self.right, above, r0), (self.right, below, r1)];
+            if described.into_iter().all(|(image, v, row)| image.describe_row(v, row)) {
                 self.match_row(&Rows { above: l0, below: l1 }, &Rows { above: r0, below: r1 }, out, kernels);
             }
         }

@@ -14,7 +14,7 @@ use super::{DistanceAlong, VolumeConfig};
 use crate::{
     geometry::StereoRig,
     image::{View, ViewMut},
-    parallel::{BANDS, Bands, Executor, each, zip3},
+    parallel::{Bands, Executor, Work, each, zip2},
     part::{part, part_mut},
 };
 
@@ -61,14 +61,11 @@ impl ObservedDepth<'_> {
     pub fn write<E: Executor>(&self, depth_m: &mut ViewMut<'_, f32>, executor: &E) {
         let width = depth_m.width().max(1);
         let bands = Bands::of(depth_m.pixels_mut().len() / width);
-        let jobs = zip3(bands.first(), bands.split_mut(depth_m.pixels_mut(), width), [(); BANDS]);
-        each(executor, jobs, |(first, depths, ())| {
-            for (v, row) in (first..).zip(depths.chunks_exact_mut(width)) {
-                row.chunks_mut(BLOCK).enumerate().for_each(|(block, depths)| self.write_block(block * BLOCK, v, depths));
-            }
-        });
+        let jobs = zip2(bands.first(), bands.split_mut(depth_m.pixels_mut(), width));
+        each(executor, jobs, |(first, depths)| executor.vectors().run(WriteRows { observed: self, first, width, depths }));
     }
 
+    #[inline(always)]
     fn write_block(&self, first: usize, v: usize, depths: &mut [f32]) {
         let here = self.tap(first, v, 0, 0);
         let [behind, spoiling] = self.farthest(first, v);
@@ -91,6 +88,7 @@ impl ObservedDepth<'_> {
     }
 
     /// The disparities of a block, moved by so many pixels; 0 outside the image.
+    #[inline(always)]
     fn tap(&self, first: usize, v: usize, du: isize, dv: isize) -> [u16; BLOCK] {
         let mut tap = [0; BLOCK];
         let Some(v) = v.checked_add_signed(dv).filter(|&v| v < self.disparity_q8.height()) else { return tap };
@@ -107,6 +105,7 @@ impl ObservedDepth<'_> {
     }
 
     /// The least disparity about each pixel of a block: of what has one within the reach of edges, and of all, none being 0, within that of colours.
+    #[inline(always)]
     fn farthest(&self, first: usize, v: usize) -> [[u16; BLOCK]; 2] {
         let edge_reach = usize::from(self.config.edge_reach_px);
         let mut farthest = [[u16::MAX; BLOCK]; 2];
@@ -131,6 +130,7 @@ impl ObservedDepth<'_> {
     }
 
     /// Levels of obliqueness of a block with these slopes along columns and rows.
+    #[inline(always)]
     fn levels(&self, first: usize, v: usize, here: &[u16; BLOCK], [along_u, along_v]: &[[f32; BLOCK]; 2]) -> [u32; BLOCK] {
         let focal = self.rig.focal_px as f32;
         let y = (v as f64 - self.rig.center_v_px) as f32;
@@ -155,12 +155,34 @@ impl ObservedDepth<'_> {
     }
 }
 
+/// One of four bands of rows, from `first` on.
+struct WriteRows<'a> {
+    observed: &'a ObservedDepth<'a>,
+    first: usize,
+    width: usize,
+    depths: &'a mut [f32],
+}
+
+impl Work for WriteRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (v, row) in (self.first..).zip(self.depths.chunks_exact_mut(self.width.max(1))) {
+            for (block, depths) in row.chunks_mut(BLOCK).enumerate() {
+                self.observed.write_block(block * BLOCK, v, depths);
+            }
+        }
+    }
+}
+
 #[inline]
 fn least_of(a: u16, b: u16) -> u16 {
     if a < b { a } else { b }
 }
 
 /// Slopes, px per px, from those of the two neighbours that lie on the same surface.
+#[inline(always)]
 fn slope(here: &[u16; BLOCK], [after, before]: [[u16; BLOCK]; 2]) -> [f32; BLOCK] {
     const HALF: f32 = 0.5 / (SLOPE_REACH as f32 * 256.0);
     let mut slopes = [0.0; BLOCK];

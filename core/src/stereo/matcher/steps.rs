@@ -3,7 +3,7 @@
 use super::{ROWS, StereoMatcher};
 use crate::{
     image::{DISPARITY_FILLED, DISPARITY_ONE_PX, InvalidPair, View},
-    parallel::{BANDS, Bands, Executor, each, zip3},
+    parallel::{BANDS, Bands, Executor, each, zip2, zip3},
     part::{part, part_mut},
     sad::compare,
     stereo::{
@@ -14,9 +14,11 @@ use crate::{
         descriptor::Gradients,
         filter_support, gaps,
         gaps::Filling,
-        gradient, invalid, median, prior,
+        gradient::GradientRows,
+        invalid, median, prior,
         prior::{CellGrid, DisparitySet, PlaneCost},
-        smooth, speckle,
+        smooth::{Along, Smooth},
+        speckle,
         speckle::Scratch,
         support,
         support::{MatchRows, NO_MATCH, SupportMatching},
@@ -36,7 +38,7 @@ impl StereoMatcher<'_> {
         let [left_invalid, right_invalid] = [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
         for (image, invalid, du, dv) in [(left, left_invalid, left_du, left_dv), (right, right_invalid, right_du, right_dv)] {
             let jobs = zip3(bands.first(), bands.split_mut(du, width), bands.split_mut(dv, width));
-            each(executor, jobs, |(first, du, dv)| gradient::gradients(image, first, du, dv));
+            each(executor, jobs, |(first, du, dv)| executor.vectors().run(GradientRows { image, first, du, dv }));
             if let Some(invalid) = invalid {
                 invalid::flatten(invalid, width, du);
                 invalid::flatten(invalid, width, dv);
@@ -143,15 +145,17 @@ impl StereoMatcher<'_> {
         let image = image_of(self.disparity, pixels);
         let other = part_mut(self.other, ..pixels);
         if config.adaptive_mean {
-            let rows = zip3(bands.first(), bands.split_mut(image, width), bands.split_mut(other, width));
-            each(executor, rows, |(_, from, to)| smooth::mean_along_rows(from, width, to));
-            let columns = zip3(bands.first(), bands.split_mut(image, width), [(); BANDS]);
-            each(executor, columns, |(first, to, ())| smooth::mean_along_columns(other, width, first, to));
+            let smooth = |from: &[i16], along, to: &mut [i16]| {
+                let rows = zip2(bands.first(), bands.split_mut(to, width));
+                each(executor, rows, |(first, to)| executor.vectors().run(Smooth { from, width, along, first, to }));
+            };
+            smooth(image, Along::Rows, other);
+            smooth(other, Along::Columns, image);
         }
         if config.median {
             other.iter_mut().zip(&*image).for_each(|(to, from)| *to = *from);
-            let rows = zip3(bands.first(), bands.split_mut(image, width), [(); BANDS]);
-            each(executor, rows, |(first, to, ())| median::median(other, width, first, to));
+            let rows = zip2(bands.first(), bands.split_mut(image, width));
+            each(executor, rows, |(first, to)| median::median(other, width, first, to));
         }
     }
 

@@ -15,6 +15,7 @@ const PAST_MAX: usize = 5;
 impl Fusion<'_> {
     /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is that after this observation.
     #[expect(clippy::indexing_slicing, reason = "masks keep voxels below LAYER_VOXELS, the length of every layer")]
+    #[inline(always)]
     pub(super) fn colour_layer(&self, scratch: &Scratch, [red, green, blue]: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
         let near = self.near_surface(scratch);
         let mut bits = packed(&near);
@@ -32,22 +33,22 @@ impl Fusion<'_> {
                 None => reds[i] = self.seen.grey.get(u, v).unwrap_or_default(),
             }
         }
+        // What was grey stays grey: one plane is the others.
+        let grey = self.seen.colour.is_none() && red == green && green == blue;
+        average(red, &reds, &share);
+        if grey {
+            (*green, *blue) = (*red, *red);
+            return;
+        }
         if self.seen.colour.is_none() {
-            if red == green && green == blue {
-                // What was grey stays grey: one plane is the others.
-                average(red, &reds, &share);
-                (*green, *blue) = (*red, *red);
-                return;
-            }
             (greens, blues) = (reds, reds);
         }
-        for (plane, seen) in [(red, &reds), (green, &greens), (blue, &blues)] {
-            average(plane, seen, &share);
-        }
+        average(green, &greens, &share);
+        average(blue, &blues, &share);
     }
 
     /// 1 for each voxel that is observed within the band about the surface, else 0.
-    #[inline]
+    #[inline(always)]
     fn near_surface(&self, scratch: &Scratch) -> Layer<u8> {
         let mut near = [0; LAYER_VOXELS];
         let band_m = self.colour_band_m;
@@ -60,7 +61,7 @@ impl Fusion<'_> {
 
     /// The share of the colours seen, times -32,768: all where there is no colour yet, none away from the surface and where another
     /// surface's may be seen.
-    #[inline]
+    #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
     fn colour_shares(&self, scratch: &Scratch, near: &Layer<u8>, planes: [&Layer<u8>; 3], weight: &Layer<u8>) -> Layer<i16> {
         let [all, second, third, fourth, fifth, sixth]: [i16; PAST_MAX + 1] = self.shares.of_one();
@@ -83,8 +84,7 @@ impl Fusion<'_> {
 }
 
 /// Moves colours towards those seen.
-// Never inlined: one copy serves all planes.
-#[inline(never)]
+#[inline(always)]
 fn average(plane: &mut Layer<u8>, seen: &Layer<u8>, share: &Layer<i16>) {
     for ((colour, &seen), &share) in plane.iter_mut().zip(seen).zip(share) {
         // All 0 is "no colour yet".

@@ -36,13 +36,13 @@ impl Shares {
     }
 
     /// Shares of one observation where the sum of weights is 1 to `N`, times -32,768.
-    #[inline]
+    #[inline(always)]
     pub fn of_one<const N: usize>(&self) -> [i16; N] {
         core::array::from_fn(|past| self.ones.get(past + 1).copied().unwrap_or(0))
     }
 
     /// Share of an observation of weight `gain`, times -32,768.
-    #[inline]
+    #[inline(always)]
     fn of(&self, sum: i32, gain: i32) -> i16 {
         let unit = self.units.get(sum as usize).copied().unwrap_or(0);
         -((gain * unit + 128) >> 8) as i16
@@ -50,7 +50,7 @@ impl Shares {
 }
 
 /// Rounds to the nearest integer, ties to even, by the float format itself: exact for magnitudes below 2^22, and any bits at all beyond.
-#[inline]
+#[inline(always)]
 fn rounded(value: f32) -> i32 {
     const MAGIC: f32 = 12_582_912.0;
     ((value + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)
@@ -103,7 +103,7 @@ impl Scratch {
 impl Fusion<'_> {
     /// Fuses layer `z` of a block whose first voxel lies at `corner` in the camera. Whether any voxel changed; then `scratch` tells
     /// [`Fusion::colour_layer`] which.
-    #[inline]
+    #[inline(always)]
     pub(super) fn layer(
         &self,
         (corner, z): (Vector3<f32>, usize),
@@ -122,7 +122,7 @@ impl Fusion<'_> {
     }
 
     /// Where the voxels fall in the image.
-    #[inline]
+    #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer; axes are below 3")]
     fn project(&self, corner: Vector3<f32>, z: usize, scratch: &mut Scratch) {
         let starts = core::array::from_fn(|y| corner + self.steps[1] * y as f32 + self.steps[2] * z as f32);
@@ -145,7 +145,7 @@ impl Fusion<'_> {
     }
 
     /// Reads the depths observed. Whether there is any.
-    #[inline]
+    #[inline(always)]
     fn observe(&self, scratch: &mut Scratch) -> bool {
         let mut any = 0;
         for (observed_m, &pixel) in scratch.observed_m.iter_mut().zip(&scratch.pixel) {
@@ -156,7 +156,7 @@ impl Fusion<'_> {
     }
 
     /// Compares voxels with what is observed. Whether any is neither unobserved nor hidden.
-    #[inline]
+    #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
     fn measure(&self, scratch: &mut Scratch) -> bool {
         let (truncation_m, scale) = (self.config.truncation_m, self.scale);
@@ -180,7 +180,7 @@ impl Fusion<'_> {
     }
 
     /// What each observation weighs, and its share of the average.
-    #[inline]
+    #[inline(always)]
     fn share(&self, scratch: &mut Scratch, weight: &Layer<u8>) {
         if self.plain_weights {
             for (share, &weight) in scratch.share.iter_mut().zip(weight) {
@@ -198,7 +198,7 @@ impl Fusion<'_> {
     }
 
     /// Counts the observations.
-    #[inline]
+    #[inline(always)]
     fn count(&self, scratch: &Scratch, weight: &mut Layer<u8>) {
         let most = i16::from(self.config.max_weight);
         for (weight, (gain, hit)) in weight.iter_mut().zip(scratch.gain.iter().zip(&scratch.hit)) {
@@ -209,7 +209,7 @@ impl Fusion<'_> {
 }
 
 /// Sets a coordinate of all voxels, from those of the first voxels of its rows on.
-#[inline]
+#[inline(always)]
 fn fill(layer: &mut Layer<f32>, starts: &[Vector3<f32>; BLOCK_SIDE], axis: usize, along: &[f32; BLOCK_SIDE]) {
     for (row, start) in layer.as_chunks_mut::<BLOCK_SIDE>().0.iter_mut().zip(starts) {
         let start = start[axis];
@@ -228,7 +228,7 @@ pub(super) fn averaged(old: i32, seen: i32, share: i16) -> i32 {
 }
 
 /// Moves distances towards what is observed.
-#[inline]
+#[inline(always)]
 fn average(scratch: &Scratch, sdf: &mut Layer<i16>) {
     let observed = scratch.share.iter().zip(&scratch.target).zip(&scratch.hit);
     for (sdf, ((&share, &target), &hit)) in sdf.iter_mut().zip(observed) {

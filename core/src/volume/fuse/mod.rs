@@ -30,7 +30,7 @@ use crate::{
     digest::Digest,
     geometry::scalar::{floor_i32, max_f32, min_f32},
     image::View,
-    parallel::{Executor, each},
+    parallel::{Executor, Work, each},
 };
 use nalgebra::{Point3, Rotation3, Vector3};
 
@@ -132,21 +132,31 @@ impl Volume<'_> {
         let fusion = Fusion::new(&self.config, view, seen, horizon);
         let (low, high) = Band::whole(self.visible.slots(), &mut self.blocks).halves();
         let ((a, b), (c, d)) = (low.halves(), high.halves());
-        let changes = each(executor, [a, b, c, d], |band| fusion.band(band));
+        let changes = each(executor, [a, b, c, d], |band| executor.vectors().run(FuseBand { fusion: &fusion, band }));
         self.digest = changes.iter().fold(self.digest, |sum, change| sum.wrapping_add(*change));
     }
 }
 
-impl Fusion<'_> {
-    /// Fuses one band and returns by how much the sum of block digests changes.
-    fn band(&self, band: Band<'_>) -> u64 {
+/// One of four bands of blocks.
+struct FuseBand<'a, 'b> {
+    fusion: &'a Fusion<'a>,
+    band: Band<'b>,
+}
+
+impl Work for FuseBand<'_, '_> {
+    /// By how much the sum of block digests changes.
+    type Output = u64;
+
+    #[inline(always)]
+    fn run(self) -> u64 {
+        let Self { fusion, band } = self;
         let mut change = 0u64;
         let mut scratch = Scratch::new();
         for &slot in band.slots {
             let at = slot.index().wrapping_sub(band.first);
             let (Some(header), Some(voxels)) = (band.header.get_mut(at), band.voxels.get_mut(at)) else { continue };
             let mut colour = band.colour.get_mut(at);
-            if self.block(header.coord(), &mut scratch, voxels, colour.as_deref_mut()) {
+            if fusion.block(header.coord(), &mut scratch, voxels, colour.as_deref_mut()) {
                 let new = block_digest(header.coord(), voxels, colour.as_deref());
                 change = change.wrapping_add(new).wrapping_sub(header.digest);
                 header.digest = new;
@@ -155,8 +165,11 @@ impl Fusion<'_> {
         }
         change
     }
+}
 
+impl Fusion<'_> {
     /// Fuses one block. Whether any voxel changed.
+    #[inline(always)]
     fn block(&self, coord: BlockCoord, scratch: &mut Scratch, voxels: &mut Voxels, mut colour: Option<&mut Colour>) -> bool {
         let voxel_m = f64::from(self.config.voxel_size_m);
         let origin_m = Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m));
