@@ -7,6 +7,8 @@ mod faults;
 mod fixture;
 #[cfg(not(feature = "hosted"))]
 mod forbidden;
+#[cfg(feature = "instructions")]
+mod instructions;
 mod line;
 #[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "platform/cortex_m.rs")]
 #[cfg_attr(all(target_os = "linux", not(feature = "hosted")), path = "platform/linux.rs")]
@@ -21,7 +23,9 @@ mod snapshots;
 mod stack;
 
 use dynvox_clip::{Clip, FrameDigests, replay_with};
-use dynvox_core::{Serial, memory::Slab};
+#[cfg(not(feature = "instructions"))]
+use dynvox_core::Serial;
+use dynvox_core::memory::Slab;
 use fixture::{CAPACITY, CONFIG};
 use line::Line;
 use stack::Paint;
@@ -39,7 +43,11 @@ fn run() -> u8 {
     let mut expected = Lines(fixture::DIGESTS.as_bytes()).filter(|line| line.first() != Some(&b'#'));
     let mut paint = Paint::below();
     let (mut wrong, mut most, mut step) = (0u32, 0, 0);
-    let done = replay_with(&clip, (&CAPACITY, &CONFIG), &mut slab.0, &Serial, |frame| {
+    #[cfg(not(feature = "instructions"))]
+    let executor = Serial;
+    #[cfg(feature = "instructions")]
+    let executor = instructions::Counting::new();
+    let done = replay_with(&clip, (&CAPACITY, &CONFIG), &mut slab.0, &executor, |frame| {
         let bytes = paint.used_below();
         most = paint.used_in_all().max(most);
         // What the first frame shows is mostly the making of the mapper.
@@ -50,6 +58,8 @@ fn run() -> u8 {
         platform::put(
             &digests.str(if same { " blocks " } else { " WRONG, blocks " }).decimal(frame.blocks).str(" stack ").decimal(bytes).str("\n"),
         );
+        #[cfg(feature = "instructions")]
+        executor.put();
         paint = Paint::below();
     });
     let missing = expected.count() as u32;
