@@ -40,6 +40,19 @@ fn a_camera_a_frame_late_is_noticed() {
     assert!(of["unreported_frames"].as_u64() <= Some(1) && of["map_affected"].as_u64() >= Some(8), "{of}");
 }
 
+/// As docs/faults.md has it.
+#[test]
+fn no_pose_of_a_camera_a_frame_late_is_wrong_and_unreported() {
+    let root = TempDir::new().unwrap();
+    let run = dynvox(root.path(), &["evaluate", "faults", "--json", "--fault", "delay:right@20..", "--fault", "delay:left@20.."]);
+    assert!(run.status.success(), "{}", output_text(&run));
+    let table = serde_json::from_slice::<Vec<serde_json::Value>>(&run.stdout).unwrap();
+    for of in &table {
+        assert_eq!((of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()), (Some(0), Some(0)), "{of}");
+    }
+    assert_eq!(table.len(), 2);
+}
+
 #[test]
 fn a_frozen_camera_and_a_jump_are_not_taken_for_motion() {
     for fault in ["freeze:right@8..", "freeze:left@8..", "jump=20@8"] {

@@ -33,10 +33,11 @@ pub struct RightAhead {
 
 impl RightAhead {
     /// Whether the cameras seem to expose at the same time, where synchronous ones show at most `most_m`. A distance four times as large is
-    /// enough to say no; a smaller one where few matches agree with the motion; and after a gap one that few matches leave open, too.
+    /// enough to say no, and after a gap a distance as large; a smaller one where few matches agree with the motion; and after a gap one that
+    /// few matches leave open, too.
     pub fn is_synchronous(&self, most_m: f64, agree: bool, after_gap: bool) -> bool {
         let (distance_m, sigma_m) = (libm::fabs(self.distance_m), self.sigma_m);
-        let is_far = distance_m - 4.0 * sigma_m > 4.0 * most_m;
+        let is_far = distance_m - 4.0 * sigma_m > if after_gap { most_m } else { 4.0 * most_m };
         let may_be_far = distance_m - sigma_m > most_m || after_gap && distance_m + sigma_m > 2.0 * most_m;
         !(is_far || !agree && may_be_far)
     }
@@ -149,9 +150,11 @@ mod tests {
             assert_eq!(both[0], both[1], "ahead and behind are alike");
             both[0]
         };
-        // Four standard deviations beyond four times the most, however many agree.
-        assert!(is_synchronous(0.75, 0.0625, true, true) && !is_synchronous(0.76, 0.0625, true, false));
-        assert!(is_synchronous(0.5, 0.0, true, true) && !is_synchronous(0.51, 0.0, true, true));
+        // Four standard deviations beyond four times the most, and after a gap beyond the most, however many agree.
+        assert!(is_synchronous(0.75, 0.0625, true, false) && !is_synchronous(0.76, 0.0625, true, false));
+        assert!(is_synchronous(0.5, 0.0, true, false) && !is_synchronous(0.51, 0.0, true, false));
+        assert!(is_synchronous(0.375, 0.0625, true, true) && !is_synchronous(0.38, 0.0625, true, true));
+        assert!(is_synchronous(0.125, 0.0, true, true) && !is_synchronous(0.13, 0.0, true, true));
         // One standard deviation beyond the most: where few agree.
         assert!(is_synchronous(0.1875, 0.0625, false, false) && !is_synchronous(0.19, 0.0625, false, false));
         assert!(is_synchronous(0.19, 0.0625, true, false));

@@ -93,6 +93,18 @@ fn what_few_matches_leave_open_is_doubted_after_a_gap_alone() {
 }
 
 #[test]
+fn after_a_gap_few_inliers_do_not_vouch_for_cameras_that_may_be_out_of_step() {
+    let doubt = |since_reference: u32, inliers: u32| {
+        let camera = Egomotion { since_reference, reference_s: 0.1 * f64::from(since_reference + 1), ..moving() };
+        let ahead_of = RightAhead { distance_m: 0.3, sigma_m: 0.1 };
+        camera.doubt(&config(), &ahead(-1.0), &MotionEstimate { right_ahead: Some(ahead_of), matches: inliers, ..estimated(inliers) })
+    };
+    // All matches agree, but a quarter as many as before must be left.
+    assert_eq!([25, 24].map(|inliers| doubt(1, inliers)), [None, Some(MotionStatus::Unsynchronized)]);
+    assert_eq!([25, 24].map(|inliers| doubt(0, inliers)), [None; 2]);
+}
+
+#[test]
 fn the_time_of_a_frame_is_its_share_of_the_time_since_the_reference() {
     // Three frames in 0.3 s: each may be 1 m ahead, and 16 m/s² of a tenth of a second make 0.16 m more.
     let camera = Egomotion { since_reference: 2, reference_s: 0.3, ..moving() };
