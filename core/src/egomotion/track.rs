@@ -154,12 +154,13 @@ impl Egomotion {
         let as_many = FEWER_INLIERS_MAX * estimate.inliers >= self.inliers;
         let agree = estimate.inliers as f32 >= config.inlier_share_strong * estimate.matches as f32;
         let after_gap = self.since_reference > 0;
-        let is_synchronous =
-            |ahead: RightAhead| ahead.is_synchronous(config.right_ahead_max_m, agree && (as_many || !after_gap), after_gap);
+        let strong = as_many && agree;
+        let vouched = if after_gap { strong } else { agree };
+        let is_synchronous = |ahead: RightAhead| ahead.is_synchronous(config.right_ahead_max_m, vouched, after_gap);
         let can_accelerate = || self.can_accelerate_to(config, motion, self.reference_s / f64::from(self.since_reference + 1));
         if !estimate.right_ahead.is_none_or(is_synchronous) {
             Some(MotionStatus::Unsynchronized)
-        } else if (as_many && agree) || can_accelerate() {
+        } else if strong || can_accelerate() {
             None
         } else {
             Some(MotionStatus::Implausible)

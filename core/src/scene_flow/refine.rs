@@ -137,6 +137,21 @@ impl Template {
         None
     }
 
+    /// The middles of the patch in three other images; `None` where it is lost in one, or what is found there is not accepted.
+    #[inline(always)]
+    fn find_all(
+        &self,
+        sought: [(Pixels<'_>, [f32; 2]); 3],
+        small_step_px: f64,
+        is_accepted: impl Fn(Pixels<'_>, [f32; 2]) -> bool,
+    ) -> Option<[[f32; 2]; 3]> {
+        let mut found = [[0.0; 2]; 3];
+        for (found, (image, at)) in found.iter_mut().zip(sought) {
+            *found = middle(self.find(image, at, small_step_px).filter(|&at| is_accepted(image, at))?);
+        }
+        Some(found)
+    }
+
     /// Whether another image shows the patch at a position: whether its pattern there is that of the template, independent of brightness and contrast.
     fn is_alike(&self, image: Pixels<'_>, at: [f32; 2]) -> bool {
         let corner = at.map(|x| libm::floor(16.0 * (f64::from(x) - HALF) + 0.5) as i32);
@@ -200,11 +215,8 @@ pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
     let template = Template::extract(images.current_left, u, v)?;
     let sought =
         [(images.previous_left, m.previous_left), (images.previous_right, m.previous_right), (images.current_right, m.current_right)];
-    let mut found = [[0.0; 2]; 3];
-    for (found, (image, at)) in found.iter_mut().zip(sought) {
-        *found = middle(template.find(image, at, GUESSED_STEP_PX).filter(|&at| template.is_alike(image, at))?);
-    }
-    let [previous_left, previous_right, current_right] = found;
+    let [previous_left, previous_right, current_right] =
+        template.find_all(sought, GUESSED_STEP_PX, |image, at| template.is_alike(image, at))?;
     let found = Match {
         previous_left,
         previous_right,
@@ -258,11 +270,7 @@ pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
     let template = Template::extract(images.previous_left, u, v)?;
     let sought =
         [(images.previous_right, m.previous_right), (images.current_left, m.current_left), (images.current_right, m.current_right)];
-    let mut found = [[0.0; 2]; 3];
-    for (found, (image, at)) in found.iter_mut().zip(sought) {
-        *found = middle(template.find(image, at, SMALL_STEP_PX)?);
-    }
-    let [previous_right, current_left, current_right] = found;
+    let [previous_right, current_left, current_right] = template.find_all(sought, SMALL_STEP_PX, |_, _| true)?;
     let refined = Match {
         previous_left: middle(m.previous_left),
         previous_right,
