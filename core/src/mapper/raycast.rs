@@ -3,18 +3,19 @@
 use super::Mapper;
 use crate::{
     Stage,
-    geometry::Transform,
     objects::PosedObject,
     parallel::Executor,
-    view::{RaycastError, Raycaster},
+    view::{RaycastError, RaycastView, Raycaster},
     volume::Viewpoint,
 };
 
 impl<'s> Mapper<'s> {
-    /// Looks at the static map from a pose, at the size of the frames taken so far. Before the first frame there is no size to look at.
+    /// Looks at the static map from a pose, at the size of the frames taken so far or thinned out ([`RaycastView`]). Before the first frame
+    /// there is no size to look at.
     ///
     /// ```
     /// use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform}, image::View, memory::SLAB_ALIGN};
+    /// use dynvox_core::view::RaycastView;
     ///
     /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
     /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
@@ -24,10 +25,12 @@ impl<'s> Mapper<'s> {
     /// mapper.step(&StereoFrame::pair(image, image), &Serial)?;
     /// let view = mapper.raycast(&Transform::IDENTITY, &Serial)?;
     /// assert!(view.depth_m().unwrap().pixels().iter().all(|&depth_m| depth_m == 0.0), "an empty map");
+    /// let preview = mapper.raycast(RaycastView { t_world_camera: Transform::IDENTITY, every: 4 }, &Serial)?;
+    /// assert_eq!(preview.depth_m().map(|depth_m| [depth_m.width(), depth_m.height()]), Some([80, 24]));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn raycast<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
-        let view = self.viewpoint(t_world_camera)?;
+    pub fn raycast<E: Executor>(&mut self, view: impl Into<RaycastView>, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
+        let view = self.viewpoint(view.into())?;
         executor.stage(Stage::Raycast, || self.raycaster.cast(&self.background, &view, executor))?;
         Ok(&self.raycaster)
     }
@@ -35,8 +38,8 @@ impl<'s> Mapper<'s> {
     /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is nearest (the compositing of Section
     /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of [`Mapper::posed_objects`]. Time: one raycast, and
     /// one more for each object; there are at most [`crate::objects::MAX_OBJECTS`].
-    pub fn raycast_composed<E: Executor>(&mut self, t_world_camera: &Transform, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
-        let view = self.viewpoint(t_world_camera)?;
+    pub fn raycast_composed<E: Executor>(&mut self, view: impl Into<RaycastView>, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
+        let view = self.viewpoint(view.into())?;
         executor.stage(Stage::Raycast, || {
             self.raycaster.cast(&self.background, &view, executor)?;
             for (layer, posed) in (1..=u8::MAX).zip(self.objects.posed(&self.tracker)) {
@@ -52,10 +55,10 @@ impl<'s> Mapper<'s> {
     pub fn raycast_object<E: Executor>(
         &mut self,
         track: u32,
-        t_world_camera: &Transform,
+        view: impl Into<RaycastView>,
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
-        let view = self.viewpoint(t_world_camera)?;
+        let view = self.viewpoint(view.into())?;
         let posed = self.objects.posed(&self.tracker).find(|posed| posed.summary.id == track).ok_or(RaycastError::Object)?;
         let view = from_object(&view, &posed);
         executor.stage(Stage::Raycast, || self.raycaster.cast(posed.object.volume(), &view, executor))?;
@@ -67,9 +70,15 @@ impl<'s> Mapper<'s> {
         self.objects.posed(&self.tracker)
     }
 
-    fn viewpoint(&self, t_world_camera: &Transform) -> Result<Viewpoint, RaycastError> {
+    fn viewpoint(&self, view: RaycastView) -> Result<Viewpoint, RaycastError> {
         let [width, height] = self.size.ok_or(RaycastError::ImageSize)?;
-        Ok(Viewpoint { rig: self.config.scaled_rig(), width, height, t_world_camera: *t_world_camera })
+        let full = Viewpoint {
+            rig: self.config.scaled_rig(),
+            width,
+            height,
+            t_world_camera: view.t_world_camera,
+        };
+        full.thinned(view.every).ok_or(RaycastError::ImageSize)
     }
 }
 

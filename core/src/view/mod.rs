@@ -7,4 +7,4 @@ mod raycast;
 
 pub use mesh::{MeshConfig, Triangle, Vertex};
 pub(crate) use raycast::signs_of_block;
-pub use raycast::{NORMAL_ONE, RaycastConfig, RaycastError, RaycastReport, Raycaster};
+pub use raycast::{NORMAL_ONE, RaycastConfig, RaycastError, RaycastReport, RaycastView, Raycaster};

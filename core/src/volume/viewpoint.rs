@@ -1,6 +1,7 @@
 //! A camera at a place, as the map uses it.
 
 use crate::geometry::{StereoRig, Transform};
+use core::num::NonZeroUsize;
 use nalgebra::{Point3, Rotation3, Vector3};
 
 /// The left camera of a rig, looking from a pose at an image of a size.
@@ -17,6 +18,18 @@ pub struct Viewpoint {
 }
 
 impl Viewpoint {
+    /// The same camera, of whose pixels every so many columns and rows are kept, from the first on; `None` for 0. Rays through the pixels kept
+    /// stay what they were, to the last bit where `every` is a power of two.
+    pub(crate) fn thinned(mut self, every: usize) -> Option<Self> {
+        let kept = NonZeroUsize::new(every)?;
+        let scale = every as f64;
+        (self.width, self.height) = (self.width.div_ceil(kept.get()), self.height.div_ceil(kept.get()));
+        for length_px in [&mut self.rig.focal_px, &mut self.rig.center_u_px, &mut self.rig.center_v_px] {
+            *length_px /= scale;
+        }
+        Some(self)
+    }
+
     /// World to camera, as a rotation matrix and the camera's place in the world. Differences to that place are taken in `f64`, so that
     /// a map kilometres from its origin is as exact as one at it.
     pub(crate) fn camera_from_world(&self) -> (Rotation3<f64>, Point3<f64>) {

@@ -13,6 +13,7 @@ use dynvox::cli::{MapperPlan, check_options};
 use dynvox::run::store;
 use dynvox::slab::HostSlab;
 use dynvox_core::tracking::TrackReport;
+use dynvox_core::view::RaycastView;
 use dynvox_core::{Report, StereoFrame};
 use hashbrown::HashSet;
 use numpy::{PyArray2, PyArray3};
@@ -124,16 +125,22 @@ impl Mapper {
         PyList::new(py, tracks.iter().map(|track| track_dictionary(py, track)).collect::<PyResult<Vec<_>>>()?)
     }
 
-    #[pyo3(signature = (t_world_camera=None, *, objects=true))]
-    fn raycast<'py>(&self, py: Python<'py>, t_world_camera: Option<Bound<'py, PyAny>>, objects: bool) -> PyResult<Bound<'py, PyDict>> {
+    #[pyo3(signature = (t_world_camera=None, *, objects=true, every=1))]
+    fn raycast<'py>(
+        &self,
+        py: Python<'py>,
+        t_world_camera: Option<Bound<'py, PyAny>>,
+        objects: bool,
+        every: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let from = t_world_camera.map(|pose| pose::given("t_world_camera", &pose)).transpose()?;
         let (shown, ids) = self.with(py, |Running { mapper, threads, .. }| {
             mapper.with_dependent_mut(|_, mapper| {
-                let from = from.unwrap_or(*mapper.t_world_camera());
+                let view = RaycastView { t_world_camera: from.unwrap_or(*mapper.t_world_camera()), every };
                 let ids: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
                 let cast = threads.run(|| match objects {
-                    true => mapper.raycast_composed(&from, threads).map(Raycast::of),
-                    false => mapper.raycast(&from, threads).map(Raycast::of),
+                    true => mapper.raycast_composed(view, threads).map(Raycast::of),
+                    false => mapper.raycast(view, threads).map(Raycast::of),
                 });
                 let action = "Map a frame first, and look from a pose within the map";
                 let cast = cast.map_err(|error| refuse(format!("there is no picture of the map: {error}. {action}")))?;

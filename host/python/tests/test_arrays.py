@@ -108,6 +108,8 @@ def test_a_pose_is_a_matrix_or_what_a_report_has(street):
     by_matrix = mapper.raycast(np.eye(4)[:3], objects=False)
     by_list = mapper.raycast(np.eye(4).tolist(), objects=False)
     assert np.array_equal(by_report["depth_m"], by_matrix["depth_m"]) and np.array_equal(by_list["depth_m"], by_matrix["depth_m"])
+    thinned = mapper.raycast(np.eye(4), objects=False, every=4)
+    assert np.array_equal(thinned["depth_m"], by_matrix["depth_m"][::4, ::4])
     with pytest.raises(dynvox.Error, match="cannot be read as a pose"):
         mapper.raycast(np.eye(3))
     with pytest.raises(dynvox.Error, match="is not finite"):

@@ -58,8 +58,7 @@ impl Observer for GalleryObserver {
 
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         let Some(row) = end.last.filter(|_| self.failure.is_none()) else { return Ok(()) };
-        let seen = end.view.raycast(&keyframes::overview_pose(&row.report.t_world_camera));
-        let overview = seen.and_then(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None));
+        let overview = pictures::map(pictures::LARGE_PX, end.view, &keyframes::overview_pose(&row.report.t_world_camera));
         let (width, height) = setup.dataset.size();
         let index = PictureIndex { width, height, frames: self.taken.iter().map(|(_, frame)| *frame).collect() };
         let written = overview.map_or(Ok(()), |overview| write(&folder(setup).join(OVERVIEW), &pictures::jpeg(&overview)));
@@ -109,8 +108,11 @@ fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), Ob
     let masks = pictures::masks(frame.view.mapper(), disparity_q8.width(), disparity_q8.height());
     let disparity = pictures::jpeg(&pictures::disparity(&disparity_q8));
     let composed = pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera);
-    let seen = |frame: &mut FrameContext<'_, '_>| pictures::map(pictures::SMALL_PX, frame.view.raycast(&t_world_camera)?, |_| None);
-    let map = composed.or_else(|| seen(frame)).as_ref().map(pictures::jpeg).unwrap_or_default();
+    let map = composed
+        .or_else(|| pictures::map(pictures::SMALL_PX, frame.view, &t_world_camera))
+        .as_ref()
+        .map(pictures::jpeg)
+        .unwrap_or_default();
     let left = keyframes::left(frame).as_ref().map(pictures::jpeg).unwrap_or_default();
     let number = frame.row.frame;
     for (kind, picture) in PictureKind::ALL.into_iter().zip([left, masks, disparity, map]) {

@@ -64,8 +64,7 @@ impl Observer for KeyframesObserver {
 
     fn end(&mut self, _: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         if let Some(row) = end.last {
-            let seen = end.view.raycast(&overview_pose(&row.report.t_world_camera));
-            self.overview_jpeg = jpeg(seen.and_then(|seen| pictures::map(pictures::LARGE_PX, seen, |_| None)));
+            self.overview_jpeg = jpeg(pictures::map(pictures::LARGE_PX, end.view, &overview_pose(&row.report.t_world_camera)));
         }
         Ok(())
     }
@@ -98,12 +97,11 @@ fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
     let t_world_camera: Transform = frame.row.report.t_world_camera;
     let input_jpeg = jpeg(Some(left(frame)?));
     let disparity_jpeg = jpeg(Some(pictures::disparity(&frame.view.mapper().disparity_q8())));
-    let seen = frame.view.raycast(&t_world_camera)?;
     Some(Keyframe {
         frame: frame.row.frame,
         input_jpeg,
         disparity_jpeg,
-        raycast_jpeg: jpeg(pictures::map(pictures::SMALL_PX, seen, |_| None)),
+        raycast_jpeg: jpeg(Some(pictures::map(pictures::SMALL_PX, frame.view, &t_world_camera)?)),
         composed_jpeg: jpeg(pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera)),
     })
 }

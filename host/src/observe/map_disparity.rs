@@ -31,7 +31,7 @@ impl Observer for MapDisparityObserver {
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         let Some(folder) = setup.save_map_disparity else { return Ok(()) };
         for (name, t_world_camera) in self.frames.drain(..) {
-            let seen = end.view.raycast(&t_world_camera).and_then(|seen| disparities(&setup.config.rig, seen.depth_m()?));
+            let seen = end.view.raycast((&t_world_camera).into()).and_then(|seen| disparities(&setup.config.rig, seen.depth_m()?));
             if let Some(disparity) = seen {
                 write_png_deep(&folder.join(format!("{name}.png")), &disparity).map_err(InputError::from)?;
             }

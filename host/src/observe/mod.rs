@@ -52,11 +52,10 @@ pub use written_file::WrittenFile;
 
 use crate::formats::{Axes, Mesh};
 use crate::input::{FrameSource, InputError, StereoImages};
-use dynvox_core::geometry::Transform;
 use dynvox_core::memory::Region;
 use dynvox_core::objects::ObjectSummary;
 use dynvox_core::planning::PlanningReport;
-use dynvox_core::view::Raycaster;
+use dynvox_core::view::{RaycastView, Raycaster};
 use dynvox_core::volume::{BlockCoord, PruneReport};
 use dynvox_core::{Capacity, Config, Mapper};
 use hashbrown::HashSet;
@@ -119,10 +118,10 @@ pub trait MapView<'s> {
     fn mapper(&self) -> &Mapper<'s>;
 
     /// The static map from a pose; `None` where the core refuses the pose.
-    fn raycast(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>>;
+    fn raycast(&mut self, view: RaycastView) -> Option<&Raycaster<'s>>;
 
     /// The same with every object in its place.
-    fn raycast_with_objects(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>>;
+    fn raycast_with_objects(&mut self, view: RaycastView) -> Option<&Raycaster<'s>>;
 
     /// Makes the planner's window, with moving objects where they will be so many seconds later.
     fn plan(&mut self, ahead_s: f32) -> PlanningReport;

@@ -6,7 +6,7 @@ use dynvox_core::Mapper;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::{DISPARITY_FILLED, DISPARITY_ONE_PX, View};
 use dynvox_core::tracking::MotionState;
-use dynvox_core::view::{NORMAL_ONE, Raycaster};
+use dynvox_core::view::{NORMAL_ONE, RaycastView, Raycaster};
 use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageResult, Rgb, RgbImage, Rgba, RgbaImage};
 
@@ -53,9 +53,14 @@ fn file(encode: impl FnOnce(&mut Vec<u8>) -> ImageResult<()>) -> Vec<u8> {
     bytes
 }
 
-/// Every so many pixels is shown so that a picture is not wider than `widest_px`; and the columns and rows that remain.
+/// Every so many pixels is shown so that a picture is not wider than `widest_px`.
+fn step(widest_px: usize, width: usize) -> usize {
+    width.div_ceil(widest_px).max(1)
+}
+
+/// That step, and the columns and rows that remain.
 fn thinned(widest_px: usize, width: usize, height: usize) -> (usize, u32, u32) {
-    let step = width.div_ceil(widest_px).max(1);
+    let step = step(widest_px, width);
     (step, width.div_ceil(step) as u32, height.div_ceil(step) as u32)
 }
 
@@ -166,11 +171,17 @@ pub fn disparity(disparity_q8: &View<'_, u16>) -> RgbImage {
     })
 }
 
-/// The map: its colours, or clay grey where it has none, lit from behind the camera, tinted by layer with the colours of `tint`. `None`
-/// before the first raycast.
-pub fn map(widest_px: usize, seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Option<RgbImage> {
-    let (depth_m, normal, colour, layer) = (seen.depth_m()?, seen.normal()?, seen.colour()?, seen.layer()?);
-    Some(Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }.picture(widest_px))
+/// A view of the map that is not wider than `widest_px`.
+fn looking(widest_px: usize, view: &dyn MapView<'_>, t_world_camera: &Transform) -> RaycastView {
+    RaycastView {
+        t_world_camera: *t_world_camera,
+        every: step(widest_px, view.mapper().disparity_q8().width()),
+    }
+}
+
+/// The static map: its colours, or clay grey where it has none, lit from behind the camera.
+pub fn map(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &Transform) -> Option<RgbImage> {
+    painted(view.raycast(looking(widest_px, view, t_world_camera))?, |_| None)
 }
 
 /// The static map with every object at its pose: dynamic ones tinted orange, static ones blue. `None` without objects.
@@ -183,7 +194,13 @@ pub fn composed(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &T
         MotionState::Dynamic => Some(MOVING),
         _ => Some(STATIC),
     };
-    view.raycast_with_objects(t_world_camera).and_then(|seen| map(widest_px, seen, tint))
+    painted(view.raycast_with_objects(looking(widest_px, view, t_world_camera))?, tint)
+}
+
+/// What a raycast shows, tinted by layer with the colours of `tint`. `None` before the first raycast.
+fn painted(seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Option<RgbImage> {
+    let (depth_m, normal, colour, layer) = (seen.depth_m()?, seen.normal()?, seen.colour()?, seen.layer()?);
+    Some(Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }.picture())
 }
 
 /// What a raycast shows, and how it is painted.
@@ -199,8 +216,9 @@ struct Painting<'a, T> {
 }
 
 impl<T: Fn(usize, usize) -> Option<[u8; 3]>> Painting<'_, T> {
-    fn picture(&self, widest_px: usize) -> RgbImage {
-        picture(widest_px, self.depth_m.width(), self.depth_m.height(), |u, v| self.pixel(u, v).unwrap_or(EMPTY))
+    fn picture(&self) -> RgbImage {
+        let (width, height) = (self.depth_m.width() as u32, self.depth_m.height() as u32);
+        RgbImage::from_fn(width, height, |u, v| Rgb(self.pixel(u as usize, v as usize).unwrap_or(EMPTY)))
     }
 
     fn pixel(&self, u: usize, v: usize) -> Option<[u8; 3]> {

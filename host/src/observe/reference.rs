@@ -131,8 +131,8 @@ impl Observer for ReferenceObserver {
         let Some(due) = self.pending.step(plan.delay, pending) else { return Ok(()) };
         // Object poses of past frames are not kept: later the background is viewed alone.
         let seen = match plan.delay {
-            0 => frame.view.raycast_with_objects(&due.t_world_camera),
-            _ => frame.view.raycast(&due.t_world_camera),
+            0 => frame.view.raycast_with_objects((&due.t_world_camera).into()),
+            _ => frame.view.raycast((&due.t_world_camera).into()),
         };
         if let Some((depth_m, normal)) = seen.and_then(|seen| Some((seen.depth_m()?, seen.normal()?))) {
             self.compare(setup, &due, &depth_m, &normal);

@@ -2,9 +2,8 @@
 
 use super::Threads;
 use crate::observe::{MapView, StageTime};
-use dynvox_core::geometry::Transform;
 use dynvox_core::planning::PlanningReport;
-use dynvox_core::view::Raycaster;
+use dynvox_core::view::{RaycastView, Raycaster};
 use dynvox_core::{Mapper, Stage};
 
 /// The mapper and the threads that raycast.
@@ -20,16 +19,16 @@ impl<'s> MapView<'s> for LiveMap<'_, 's> {
         self.mapper
     }
 
-    fn raycast(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>> {
+    fn raycast(&mut self, view: RaycastView) -> Option<&Raycaster<'s>> {
         let (mapper, threads) = (&mut *self.mapper, self.threads);
-        let seen = threads.run(|| mapper.raycast(t_world_camera, threads));
+        let seen = threads.run(|| mapper.raycast(view, threads));
         self.first_raycast.get_or_insert(threads.take_times()[Stage::Raycast as usize]);
         seen.ok()
     }
 
-    fn raycast_with_objects(&mut self, t_world_camera: &Transform) -> Option<&Raycaster<'s>> {
+    fn raycast_with_objects(&mut self, view: RaycastView) -> Option<&Raycaster<'s>> {
         let (mapper, threads) = (&mut *self.mapper, self.threads);
-        threads.run(|| mapper.raycast_composed(t_world_camera, threads)).ok()
+        threads.run(|| mapper.raycast_composed(view, threads)).ok()
     }
 
     fn plan(&mut self, ahead_s: f32) -> PlanningReport {

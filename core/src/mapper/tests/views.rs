@@ -1,7 +1,11 @@
 //! Looking at what was made, and finding a camera again by it.
 
 use super::*;
-use crate::{PoseOrigin, egomotion::REFERENCE_FRAMES_MAX, view::RaycastError};
+use crate::{
+    PoseOrigin,
+    egomotion::REFERENCE_FRAMES_MAX,
+    view::{RaycastError, RaycastView},
+};
 
 fn depths(mapper: &mut Mapper<'_>, cast: impl FnOnce(&mut Mapper<'_>) -> Result<(), RaycastError>) -> Vec<f32> {
     cast(mapper).unwrap();
@@ -27,6 +31,14 @@ fn a_composed_view_shows_what_is_nearest_of_the_map_and_the_objects() {
             assert_eq!(composed[at], if is_object { object[at] } else { map[at] }, "pixel {at}");
             assert_eq!(layers[at], u8::from(is_object), "pixel {at}");
         }
+        for every in [2, 4] {
+            let preview = RaycastView { t_world_camera, every };
+            let thinned = depths(mapper, |mapper| mapper.raycast_composed(preview, &Serial).map(|_| ()));
+            let kept = (0..composed.len()).filter(|at| (at % WIDTH) % every == 0 && (at / WIDTH) % every == 0).map(|at| composed[at]);
+            assert!(thinned.iter().copied().eq(kept), "every {every}");
+        }
+        let none = RaycastView { t_world_camera, every: 0 };
+        assert_eq!(mapper.raycast(none, &Serial).err(), Some(RaycastError::ImageSize));
         // Its mask is the object's place in the image, but for where it has moved on.
         let [left, top, width, height] = Walk::CAR.map(|px| px as usize);
         let outside = |at: usize| {

@@ -33,7 +33,7 @@ pub use config::RaycastConfig;
 pub(crate) use signs::of_block as signs_of_block;
 
 use crate::{
-    geometry::scalar::min_f32,
+    geometry::{Transform, scalar::min_f32},
     image::View,
     memory::{Capacity, Carver, Footprint, region_bytes},
     parallel::{Executor, each},
@@ -72,6 +72,22 @@ impl fmt::Display for RaycastError {
 }
 
 impl core::error::Error for RaycastError {}
+
+/// Where a picture is taken from, and how many of its pixels are wanted. A pose alone stands for all of them.
+#[derive(Clone, Copy, Debug)]
+pub struct RaycastView {
+    /// Camera to world.
+    pub t_world_camera: Transform,
+    /// Every so many columns and rows are looked at, from the first on, at least 1. Time falls with the number of pixels; where it is a power
+    /// of two, they show what they show in the whole picture, to the last bit.
+    pub every: usize,
+}
+
+impl From<&Transform> for RaycastView {
+    fn from(t_world_camera: &Transform) -> Self {
+        Self { t_world_camera: *t_world_camera, every: 1 }
+    }
+}
 
 /// What a picture is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

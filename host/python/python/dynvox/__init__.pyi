@@ -219,8 +219,9 @@ class Mapper:
     def tracks(self) -> list[Track]:
         """What is tracked after the last step, oldest first."""
 
-    def raycast(self, t_world_camera: ArrayLike | Pose | None = None, *, objects: bool = True) -> Raycast:
-        """The map seen from a pose, the last one of the camera without one; with the objects where they are now."""
+    def raycast(self, t_world_camera: ArrayLike | Pose | None = None, *, objects: bool = True, every: int = 1) -> Raycast:
+        """The map seen from a pose, the last one of the camera without one; with the objects where they are now. Of the image's columns and rows every so many
+        are looked at."""
 
     def plan(self, ahead_s: float = 0.0) -> Plan:
         """The window around the camera for planners, with moving objects where they will be `ahead_s` seconds after the last frame; an error of a mapper

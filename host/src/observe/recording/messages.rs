@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 const WORLD: &str = "world";
 const LEFT: &str = "left";
 /// Every so many pixels of a raycast are points.
-const POINT_EVERY: usize = 3;
+pub const POINT_EVERY: usize = 3;
 /// Bytes of a point: three floats, four bytes of colour.
 const POINT_BYTES: usize = 16;
 /// Foxglove's numbers of the types of a point's or a cell's fields.
@@ -118,18 +118,16 @@ pub fn figures(stamp: Stamp, row: &FrameRow) -> Value {
     })
 }
 
-/// What a raycast shows as coloured points in the camera's frame; `None` before the first raycast.
+/// What a raycast of every [`POINT_EVERY`] pixels shows as coloured points in the camera's frame; `None` before the first raycast.
 pub fn cloud(stamp: Stamp, seen: &Raycaster<'_>, rig: &StereoRig) -> Option<Value> {
     let (depth_m, colour) = (seen.depth_m()?, seen.colour()?);
     let mut data = Vec::new();
-    for v in (0..depth_m.height()).step_by(POINT_EVERY) {
-        for u in (0..depth_m.width()).step_by(POINT_EVERY) {
+    for v in 0..depth_m.height() {
+        for u in 0..depth_m.width() {
             let z = depth_m.get(u, v).unwrap_or_default();
             if z > 0.0 {
-                let (x, y) = (
-                    (u as f32 - rig.center_u_px as f32) / rig.focal_px as f32 * z,
-                    (v as f32 - rig.center_v_px as f32) / rig.focal_px as f32 * z,
-                );
+                let from_center = |at: usize, center_px: f64| ((at * POINT_EVERY) as f32 - center_px as f32) / rig.focal_px as f32;
+                let (x, y) = (from_center(u, rig.center_u_px) * z, from_center(v, rig.center_v_px) * z);
                 data.extend([x, y, z].iter().flat_map(|value| value.to_le_bytes()));
                 data.extend(colour.get(u, v).unwrap_or_default());
                 data.push(255);

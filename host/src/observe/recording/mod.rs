@@ -6,6 +6,7 @@ mod schemas;
 
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup, keyframes, pictures};
 use dynvox_core::geometry::Transform;
+use dynvox_core::view::RaycastView;
 use mcap::records::MessageHeader;
 use messages::Stamp;
 use schemas::{TOPICS, Topic};
@@ -94,7 +95,8 @@ impl Recording {
         self.write(Topic::Objects, time_ns, &messages::objects(stamp, frame.view.mapper()))?;
         self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
         if frame.position.is_multiple_of(MAP_EVERY)
-            && let Some(cloud) = frame.view.raycast(&t_world_camera).and_then(|seen| messages::cloud(stamp, seen, &setup.config.rig))
+            && let Some(seen) = frame.view.raycast(RaycastView { t_world_camera, every: messages::POINT_EVERY })
+            && let Some(cloud) = messages::cloud(stamp, seen, &setup.config.rig)
         {
             self.write(Topic::Map, time_ns, &cloud)?;
         }
