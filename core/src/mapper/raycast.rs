@@ -3,6 +3,7 @@
 use super::Mapper;
 use crate::{
     Stage,
+    geometry::Transform,
     objects::PosedObject,
     parallel::Executor,
     view::{RaycastError, RaycastView, Raycaster},
@@ -70,15 +71,14 @@ impl<'s> Mapper<'s> {
         self.objects.posed(&self.tracker)
     }
 
+    #[inline(always)]
     fn viewpoint(&self, view: RaycastView) -> Result<Viewpoint, RaycastError> {
+        self.whole_view(&view.t_world_camera)?.thinned(view.every).ok_or(RaycastError::ImageSize)
+    }
+
+    fn whole_view(&self, t_world_camera: &Transform) -> Result<Viewpoint, RaycastError> {
         let [width, height] = self.size.ok_or(RaycastError::ImageSize)?;
-        let full = Viewpoint {
-            rig: self.config.scaled_rig(),
-            width,
-            height,
-            t_world_camera: view.t_world_camera,
-        };
-        full.thinned(view.every).ok_or(RaycastError::ImageSize)
+        Ok(Viewpoint { rig: self.config.scaled_rig(), width, height, t_world_camera: *t_world_camera })
     }
 }
 

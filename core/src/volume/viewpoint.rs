@@ -20,6 +20,7 @@ pub struct Viewpoint {
 impl Viewpoint {
     /// The same camera, of whose pixels every so many columns and rows are kept, from the first on; `None` for 0. Rays through the pixels kept
     /// stay what they were, to the last bit where `every` is a power of two.
+    #[inline(always)]
     pub(crate) fn thinned(mut self, every: usize) -> Option<Self> {
         let kept = NonZeroUsize::new(every)?;
         let scale = every as f64;

@@ -140,6 +140,8 @@ struct Band<'b> {
 }
 
 impl<'b> Band<'b> {
+    // Four calls a picture: apart, for the size of a Cortex-M7's image.
+    #[inline(never)]
     fn split(self, rows: usize, width: usize) -> (Self, Self) {
         let at = (rows * width).min(self.depth_m.len());
         let (depth_m, depth_low) = self.depth_m.split_at_mut_checked(at).unwrap_or_default();
