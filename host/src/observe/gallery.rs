@@ -57,11 +57,13 @@ impl Observer for GalleryObserver {
     }
 
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
-        let Some(row) = end.last.filter(|_| self.failure.is_none()) else { return Ok(()) };
-        let overview = pictures::map(pictures::LARGE_PX, end.view, &keyframes::overview_pose(&row.report.t_world_camera));
+        if end.last.is_none() || self.failure.is_some() {
+            return Ok(());
+        }
         let (width, height) = setup.dataset.size();
         let index = PictureIndex { width, height, frames: self.taken.iter().map(|(_, frame)| *frame).collect() };
-        let written = overview.map_or(Ok(()), |overview| write(&folder(setup).join(OVERVIEW), &pictures::jpeg(&overview)));
+        let overview = &end.overview_jpeg;
+        let written = if overview.is_empty() { Ok(()) } else { write(&folder(setup).join(OVERVIEW), overview) };
         let index = serde_json::to_vec(&index).unwrap_or_default();
         self.failure = written.and_then(|()| write(&folder(setup).join(PICTURES_INDEX), &index)).err().map(|error| error.to_string());
         Ok(())

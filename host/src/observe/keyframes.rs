@@ -9,11 +9,6 @@ use serde::{Deserialize, Serialize};
 /// Frames shown in the report.
 const KEYFRAMES: usize = 5;
 
-/// Position of the overview's camera relative to the last camera, m: behind and above.
-const OVERVIEW_OFFSET_M: [f64; 3] = [0.0, -7.0, -15.0];
-/// How far it is tilted down, rad.
-const OVERVIEW_PITCH_RAD: f64 = 0.33;
-
 /// Pictures of one frame, as JPEG files.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Keyframe {
@@ -63,21 +58,13 @@ impl Observer for KeyframesObserver {
     }
 
     fn end(&mut self, _: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
-        if let Some(row) = end.last {
-            self.overview_jpeg = jpeg(pictures::map(pictures::LARGE_PX, end.view, &overview_pose(&row.report.t_world_camera)));
-        }
+        self.overview_jpeg = end.overview_jpeg.clone();
         Ok(())
     }
 
     fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<KeyframesSection, ObserveError> {
         Ok(KeyframesSection { keyframes: self.keyframes, overview_jpeg: self.overview_jpeg })
     }
-}
-
-/// A camera behind and above another.
-pub(super) fn overview_pose(t_world_camera: &Transform) -> Transform {
-    let down = nalgebra::Vector3::new(-OVERVIEW_PITCH_RAD, 0.0, 0.0);
-    *t_world_camera * Transform::new(down, OVERVIEW_OFFSET_M)
 }
 
 /// The left image of a frame: in colour where that lies on the image that was matched.

@@ -14,6 +14,7 @@ mod instances;
 mod keyframes;
 mod map_disparity;
 mod objects;
+mod overview;
 pub mod pictures;
 mod planning;
 mod planning_layers;
@@ -40,6 +41,7 @@ pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use map_disparity::MapDisparityObserver;
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
+pub use overview::overview;
 pub use planning::{BoxDescription, PlanningObserver, write_folder as write_planning};
 pub use planning_layers::PlanningLayers;
 pub use recording::{RECORDING_FILE, RecordingObserver};
@@ -157,6 +159,8 @@ pub struct EndContext<'a, 's> {
     pub last: Option<&'a FrameRow>,
     /// Objects that left the mapper at the end.
     pub retired: &'a [RetiredVolume],
+    /// The finished map from behind and above the last camera, as a JPEG file; empty without frames.
+    pub overview_jpeg: Vec<u8>,
     /// The map.
     pub view: &'a mut dyn MapView<'s>,
 }

@@ -8,7 +8,7 @@ use super::view::LiveMap;
 use super::{FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes, stereo_frame};
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
-    EndContext, FrameContext, FrameRow, ObserveError, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy, from_first,
+    EndContext, FrameContext, FrameRow, ObserveError, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy, from_first, overview,
 };
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
@@ -292,7 +292,9 @@ impl<'p, 's> Session<'p, 's> {
         let pruned = self.mapper.finish_with(&mut retired);
         let RunState { frames, observers, .. } = &mut self.state;
         let mut view = LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
-        let mut context = EndContext { last: frames.last(), retired: &retired.0, view: &mut view };
+        let last = frames.last();
+        let overview_jpeg = last.map(|row| overview(&mut view, &row.report.t_world_camera)).unwrap_or_default();
+        let mut context = EndContext { last, retired: &retired.0, overview_jpeg, view: &mut view };
         observers.end(&self.setup, &mut context)?;
         Ok(pruned)
     }

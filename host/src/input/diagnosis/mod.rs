@@ -4,6 +4,7 @@
 //! images is compared as thumbnails (`order`). What makes a map meaningless is refused, what is doubtful is a warning. Too few matches give
 //! no verdict.
 
+mod correlation;
 mod order;
 mod patches;
 #[cfg(test)]

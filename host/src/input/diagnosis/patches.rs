@@ -1,17 +1,20 @@
 //! Patches of a left image matched to the right one, also across rows: first at half size over a wide window, then at full size about it,
 //! and below the pixel by a parabola. Similarity is normalised, so that exposure does not matter.
 
+use super::correlation::{HALF, Score, SearchedImage};
 use crate::formats::Image;
 
 /// Pixels from one patch to the next.
 const STEP_PX: usize = 28;
-/// Half sides of patches, at half and at full size, px.
-const COARSE: i32 = 3;
+/// Half side of patches at full size, px; at half size they are smaller.
 const FINE: i32 = 5;
+const COARSE: i32 = HALF as i32;
+/// Pixels of a patch at full size.
+const FINE_AREA: usize = ((2 * FINE + 1) * (2 * FINE + 1)) as usize;
 /// How far a match is looked for to either side, as a share of the width.
 const REACH: f64 = 0.12;
 /// How far above and below, px.
-const REACH_ROWS_PX: i32 = 10;
+const REACH_ROWS_PX: usize = 10;
 /// Least similarity of a match.
 const SIMILAR: f64 = 0.9;
 /// How much better a match must be than the second best place.
@@ -41,38 +44,33 @@ fn half(image: &Image<u8>) -> Option<Image<u8>> {
     Image::new(width, height, (0..height).flat_map(|v| (0..width).map(move |u| (u, v))).map(|(u, v)| mean(u, v)).collect())
 }
 
-/// Pixels of a patch of that half side.
-const fn area(half: i32) -> usize {
-    ((2 * half + 1) * (2 * half + 1)) as usize
-}
-
 /// A patch less its mean, and its length.
-struct Patch<const AREA: usize> {
-    values: [f32; AREA],
+struct Patch {
+    values: [f32; FINE_AREA],
     length: f32,
     mean: f32,
 }
 
-/// The patch of that half side about a pixel; `None` where it is not within the image.
-fn patch<const AREA: usize>(image: &Image<u8>, u: i32, v: i32, half: i32) -> Option<Patch<AREA>> {
-    let within = |at: i32, side: usize| at >= half && at + half < side as i32;
+/// The patch about a pixel; `None` where it is not within the image.
+fn patch(image: &Image<u8>, u: i32, v: i32) -> Option<Patch> {
+    let within = |at: i32, side: usize| at >= FINE && at + FINE < side as i32;
     if !(within(u, image.width()) && within(v, image.height())) {
         return None;
     }
-    let side = (2 * half + 1) as usize;
-    let from_first = image.pixels().get((v - half) as usize * image.width() + (u - half) as usize..)?;
-    let mut values = [0.0; AREA];
+    let side = (2 * FINE + 1) as usize;
+    let from_first = image.pixels().get((v - FINE) as usize * image.width() + (u - FINE) as usize..)?;
+    let mut values = [0.0; FINE_AREA];
     for (values, row) in values.chunks_exact_mut(side).zip(from_first.chunks(image.width())) {
         values.iter_mut().zip(row).for_each(|(value, &grey)| *value = f32::from(grey));
     }
-    let mean = values.iter().sum::<f32>() / AREA as f32;
+    let mean = values.iter().sum::<f32>() / FINE_AREA as f32;
     values.iter_mut().for_each(|value| *value -= mean);
     let length = values.iter().map(|value| value * value).sum::<f32>().sqrt();
     Some(Patch { values, length, mean })
 }
 
 /// Cosine of two patches; -1 where one is flat or outside.
-fn similarity<const AREA: usize>(a: &Patch<AREA>, b: Option<&Patch<AREA>>) -> f64 {
+fn similarity(a: &Patch, b: Option<&Patch>) -> f64 {
     let Some(b) = b.filter(|b| a.length > 1.0 && b.length > 1.0) else { return -1.0 };
     f64::from(a.values.iter().zip(&b.values).map(|(a, b)| a * b).sum::<f32>() / (a.length * b.length))
 }
@@ -93,35 +91,32 @@ fn has_corners(image: &Image<u8>, u: i32, v: i32) -> bool {
 /// The matches of a pair.
 pub fn matches(left: &Image<u8>, right: &Image<u8>) -> Vec<PatchMatch> {
     let (Some(small_left), Some(small_right)) = (half(left), half(right)) else { return Vec::new() };
+    let searched = SearchedImage::new(&small_right);
     let centers = (STEP_PX..left.height()).step_by(STEP_PX).flat_map(|v| (STEP_PX..left.width()).step_by(STEP_PX).map(move |u| (u, v)));
-    centers.filter_map(|(u, v)| find([left, right], [&small_left, &small_right], u as i32, v as i32)).collect()
+    centers.filter_map(|(u, v)| find([left, right], &small_left, &searched, [u, v])).collect()
 }
 
-fn find([left, right]: [&Image<u8>; 2], [small_left, small_right]: [&Image<u8>; 2], u: i32, v: i32) -> Option<PatchMatch> {
+fn find([left, right]: [&Image<u8>; 2], small_left: &Image<u8>, searched: &SearchedImage<'_>, [u, v]: [usize; 2]) -> Option<PatchMatch> {
     let (small_u, small_v) = (u / 2, v / 2);
-    let coarse = patch::<{ area(COARSE) }>(small_left, small_u, small_v, COARSE)?;
-    if small_u < 5 || small_v < 5 || !has_corners(small_left, small_u, small_v) {
+    if small_u < 5 || small_v < 5 || !has_corners(small_left, small_u as i32, small_v as i32) {
         return None;
     }
-    let reach = (REACH * small_left.width() as f64) as i32;
-    let rows = REACH_ROWS_PX / 2;
-    let mut scores: Vec<(f64, i32, i32)> = Vec::new();
-    for (du, dv) in (-reach..=reach).flat_map(|du| (-rows..=rows).map(move |dv| (du, dv))) {
-        scores.push((similarity(&coarse, patch(small_right, small_u + du, small_v + dv, COARSE).as_ref()), du, dv));
-    }
-    let &(best, du, dv) = scores.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let apart = |other: &&(f64, i32, i32)| (other.1 - du).abs() > 2 || (other.2 - dv).abs() > 2;
-    let second = scores.iter().filter(apart).map(|score| score.0).fold(-1.0, f64::max);
-    if best < SIMILAR || best - second < CLEAR || dv.abs() == rows || du.abs() == reach {
+    let reach = [(REACH * small_left.width() as f64) as usize, REACH_ROWS_PX / 2];
+    let scores = searched.scores(small_left, [small_u, small_v], reach);
+    let &best = scores.iter().max_by(|a, b| a.similarity.total_cmp(&b.similarity))?;
+    let apart = |other: &&Score| (other.du - best.du).abs() > 2 || (other.dv - best.dv).abs() > 2;
+    let second = scores.iter().filter(apart).map(|score| score.similarity).fold(-1.0, f64::max);
+    let at_the_end = best.du.unsigned_abs() as usize == reach[0] || best.dv.unsigned_abs() as usize == reach[1];
+    if best.similarity < SIMILAR || best.similarity - second < CLEAR || at_the_end {
         return None;
     }
-    refined(left, right, [u, v], [u + 2 * du, v + 2 * dv])
+    refined(left, right, [u, v].map(|at| at as i32), [u as i32 + 2 * best.du, v as i32 + 2 * best.dv])
 }
 
 /// The place at full size, below the pixel.
 fn refined(left: &Image<u8>, right: &Image<u8>, [u, v]: [i32; 2], [near_u, near_v]: [i32; 2]) -> Option<PatchMatch> {
-    let sought = patch::<{ area(FINE) }>(left, u, v, FINE)?;
-    let score = |du: i32, dv: i32| similarity(&sought, patch(right, near_u + du, near_v + dv, FINE).as_ref());
+    let sought = patch(left, u, v)?;
+    let score = |du: i32, dv: i32| similarity(&sought, patch(right, near_u + du, near_v + dv).as_ref());
     let around = (-3..=3).flat_map(|du| (-3..=3).map(move |dv| (du, dv)));
     let (best, du, dv) = around.map(|(du, dv)| (score(du, dv), du, dv)).max_by(|a, b| a.0.total_cmp(&b.0))?;
     if best < SIMILAR || du.abs() == 3 || dv.abs() == 3 {
@@ -133,7 +128,7 @@ fn refined(left: &Image<u8>, right: &Image<u8>, [u, v]: [i32; 2], [near_u, near_
     };
     let sub_u = vertex(score(du - 1, dv), score(du + 1, dv));
     let sub_v = vertex(score(du, dv - 1), score(du, dv + 1));
-    let found = patch::<{ area(FINE) }>(right, near_u + du, near_v + dv, FINE)?;
+    let found = patch(right, near_u + du, near_v + dv)?;
     Some(PatchMatch {
         u_px: f64::from(u),
         disparity_px: f64::from(u - near_u - du) - sub_u,
