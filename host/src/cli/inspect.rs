@@ -1,6 +1,7 @@
 //! `dynvox inspect`.
 
 use crate::evaluate::stereo::{StereoSetError, find_stereo_set};
+use crate::formats::{SETTINGS_FILE, SUMMARY_FILE};
 use crate::input::diagnosis;
 use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout};
 use dynvox_core::geometry::StereoRig;
@@ -62,10 +63,10 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
 /// Describes a folder that is not a data set: a run's results, a stereo benchmark; `None` for neither.
 fn other(args: &InspectArgs) -> Option<anyhow::Result<()>> {
     let (path, shown) = (&args.path, args.path.display());
-    if path.join("summary.json").is_file() {
+    if path.join(SUMMARY_FILE).is_file() {
         let (evaluate, again) = (
             format!("dynvox evaluate trajectory {shown} TRUTH"),
-            format!("dynvox run [PATH] --config {}", path.join("config.toml").display()),
+            format!("dynvox run [PATH] --config {}", path.join(SETTINGS_FILE).display()),
         );
         if args.json {
             outln!("{:#}", json!({ "path": path, "layout": "run", "commands": [evaluate, again] }));

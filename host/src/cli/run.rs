@@ -13,6 +13,7 @@ use super::egomotion::EgomotionChoice;
 use super::export::ExportArgs;
 use super::rectified::RectifiedArgs;
 use super::settings::{Settings, on_or_off};
+use crate::formats::MAP_FILE;
 use crate::input::bags::Topics;
 use crate::input::depth::{self, DepthChoice};
 use crate::input::faults::{self, Faults};
@@ -22,8 +23,7 @@ use crate::observe::Reference;
 use crate::report;
 use crate::report::text::counted;
 use crate::run::{
-    self, BLOCKS_FILE, Checkpoint, Incomplete, MAP_FILE, PREVIOUS_SNAPSHOT_FILE, Plan, RunError, RunFolder, RunRecord, SNAPSHOT_FILE,
-    has_snapshot,
+    self, BLOCKS_FILE, Checkpoint, Incomplete, PREVIOUS_SNAPSHOT_FILE, Plan, RunError, RunFolder, RunRecord, SNAPSHOT_FILE, has_snapshot,
 };
 use anyhow::bail;
 use instances::InstancesArgs;

@@ -38,4 +38,7 @@ pub use ply::{Axes, Mesh, MeshVertex, PlyMesh, PlyVertex, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};
 pub use poses::{Trajectory, kitti_line, read_numbered, read_poses, tum_line, write_numbered};
 pub use rows::{parse_seconds, read_stamped_names, read_times};
-pub use run_files::{FRAMES_FILE, TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE};
+pub use run_files::{
+    BLOCKS_TABLE_FILE, FRAMES_FILE, MAP_FILE, SETTINGS_FILE, SUMMARY_FILE, TIMED_TRAJECTORY_FILE, TRACKS_FILE, TRAJECTORY_FILE,
+    TRUE_TRAJECTORY_FILE,
+};

@@ -4,12 +4,12 @@
 
 use super::tables::{BlockFate, block_rows};
 use super::{EndContext, Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
+use crate::formats::BLOCKS_TABLE_FILE;
 use dynvox_core::volume::{BlockCoord, Volume};
 use serde::{Deserialize, Serialize};
 use std::io;
 
 /// The file.
-const BLOCKS_TABLE: &str = "blocks.csv";
 
 /// A block, and the number of the frame it was last visible in.
 type Sighting = ([i16; 3], u32);
@@ -24,7 +24,7 @@ pub struct BlockHistoryObserver {
 
 impl Default for BlockHistoryObserver {
     fn default() -> Self {
-        Self { sightings: Vec::new(), file: GrowingFile::new(BLOCKS_TABLE) }
+        Self { sightings: Vec::new(), file: GrowingFile::new(BLOCKS_TABLE_FILE) }
     }
 }
 
@@ -88,7 +88,7 @@ impl BlockHistoryObserver {
     }
 
     fn write(&mut self, setup: &Setup<'_>, rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>) -> Result<(), ObserveError> {
-        let failed = |source: io::Error| ObserveError::Write { path: setup.folder.join(BLOCKS_TABLE), source };
+        let failed = |source: io::Error| ObserveError::Write { path: setup.folder.join(BLOCKS_TABLE_FILE), source };
         self.file.append(&block_rows(rows, self.file.is_empty()).map_err(failed)?);
         Ok(())
     }

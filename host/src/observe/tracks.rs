@@ -6,7 +6,7 @@ use super::tables::track_rows;
 use super::{Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
 use crate::evaluate::masks::{MovingErrors, MovingFigures, Overlaps};
 use crate::evaluate::objects::{ObjectErrors, ObjectFigures, TrackComparison, TrackErrors};
-use crate::formats::Image;
+use crate::formats::{Image, TRACKS_FILE};
 use dynvox_core::Mapper;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::{Class, MotionState, TrackReport};
@@ -136,7 +136,7 @@ pub struct TracksObserver {
 impl Default for TracksObserver {
     fn default() -> Self {
         Self {
-            file: GrowingFile::new("tracks.csv"),
+            file: GrowingFile::new(TRACKS_FILE),
             frames: 0,
             tracks: BTreeMap::new(),
             errors: ObjectErrors::default(),

@@ -3,7 +3,7 @@
 use super::map_objects::{MapObjects, add_objects};
 use super::store::{self, BlockFile, Position, StoreError};
 use super::{FolderError, RunFolder};
-use crate::formats::{Axes, Mesh, MeshVertex, PlyWriter};
+use crate::formats::{Axes, MAP_FILE, Mesh, MeshVertex, PlyWriter};
 use crate::observe::{StoreStats, weighed_triangles};
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
 use dynvox_core::{Capacity, Config, Mapper};
@@ -12,8 +12,6 @@ use std::fs::File;
 
 /// Name of the file in the run folder.
 pub const BLOCKS_FILE: &str = "map.blocks";
-/// Name of the mesh in the run folder.
-pub const MAP_FILE: &str = "map.ply";
 
 /// How evicted blocks are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

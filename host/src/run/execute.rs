@@ -1,14 +1,14 @@
 //! One run: frames in; map, trajectory and figures out.
 
 use super::checkpoint::Checkpoint;
-use super::disk_store::{MAP_FILE, MeshOutput};
+use super::disk_store::MeshOutput;
 use super::ending::Incomplete;
 use super::error::RunError;
 use super::record::{RunHeader, RunRecord};
 use super::session::Session;
 use super::state::RunState;
 use super::{Plan, RunFolder, resident_bytes};
-use crate::formats::Mesh;
+use crate::formats::{MAP_FILE, Mesh};
 use crate::observe::{Finished, Observer, RECORDING_FILE, Setup};
 use crate::scene::PICTURES_FOLDER;
 use crate::slab::HostSlab;

@@ -4,6 +4,7 @@
 #[cfg(test)]
 mod tests;
 
+use crate::formats::SUMMARY_FILE;
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
@@ -81,8 +82,6 @@ pub enum FolderError {
 pub const SNAPSHOT_FILE: &str = "run.snapshot";
 /// Name of the snapshot before it.
 pub const PREVIOUS_SNAPSHOT_FILE: &str = "run.snapshot.previous";
-/// Name of the summary in a run folder.
-const SUMMARY_FILE: &str = "summary.json";
 /// Name of a file that keeps disk space for trajectory, rows and summary, should the disk become full during the run.
 const RESERVE_FILE: &str = ".reserve";
 /// Its bytes.

@@ -24,7 +24,7 @@ mod view;
 
 pub use bench::{Bench, StageBench, bench};
 pub use checkpoint::{Checkpoint, CheckpointPlan, ResumeError, RunManifest};
-pub use disk_store::{BLOCKS_FILE, DiskStore, MAP_FILE, MeshOutput, Streaming};
+pub use disk_store::{BLOCKS_FILE, DiskStore, MeshOutput, Streaming};
 pub use ending::{Incomplete, IncompleteCause, SkippedFrame, SkippedFrames};
 pub use error::{RunError, step_reason};
 pub use execute::run;

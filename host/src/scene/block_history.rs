@@ -1,7 +1,7 @@
 //! `blocks.csv` as a viewer shows it: when each place was last seen, and which blocks pruning took.
 
 use super::{neighbourhood, tables::read_rows};
-use crate::formats::{FormatError, read_text};
+use crate::formats::{BLOCKS_TABLE_FILE, FormatError, SETTINGS_FILE, read_text};
 use hashbrown::HashMap;
 use serde::Deserialize;
 use std::path::Path;
@@ -47,7 +47,7 @@ impl BlockHistory {
     /// # Errors
     /// A file is damaged.
     pub fn read(folder: &Path) -> Result<Self, FormatError> {
-        let (table, config) = (folder.join("blocks.csv"), folder.join("config.toml"));
+        let (table, config) = (folder.join(BLOCKS_TABLE_FILE), folder.join(SETTINGS_FILE));
         if !table.is_file() || !config.is_file() {
             return Ok(Self::default());
         }
@@ -93,15 +93,15 @@ mod tests {
     fn the_last_row_of_a_block_says_what_became_of_it() {
         let folder = tempfile::TempDir::new().unwrap();
         assert!(BlockHistory::read(folder.path()).unwrap().is_empty());
-        std::fs::write(folder.path().join("config.toml"), "[volume]\nvoxel_size_m = 0.05\nfar_m = 20\n").unwrap();
+        std::fs::write(folder.path().join(SETTINGS_FILE), "[volume]\nvoxel_size_m = 0.05\nfar_m = 20\n").unwrap();
         let rows = "x,y,z,last_frame,fate\n0,0,0,7,evicted\n1,0,0,5,pruned\n9,0,0,5,pruned\n0,0,0,9,map\n9,0,0,6,pruned\n1,0,0,8,map\n";
-        std::fs::write(folder.path().join("blocks.csv"), rows).unwrap();
+        std::fs::write(folder.path().join(BLOCKS_TABLE_FILE), rows).unwrap();
         let history = BlockHistory::read(folder.path()).unwrap();
         let at = |x: f32| history.last_frame([x, 0.1, 0.1]);
         assert_eq!([at(0.1), at(0.5), at(0.9), at(-0.1), at(3.7)], [Some(9), Some(8), Some(8), Some(9), None]);
         assert_eq!(history.pruned_m.len(), 1, "once, and not what came back");
         assert!((0..3).all(|axis| (history.pruned_m[0][axis] - [3.8, 0.2, 0.2][axis]).abs() < 1e-5), "{:?}", history.pruned_m);
-        std::fs::write(folder.path().join("blocks.csv"), "x,y\n1,2\n").unwrap();
+        std::fs::write(folder.path().join(BLOCKS_TABLE_FILE), "x,y\n1,2\n").unwrap();
         assert!(BlockHistory::read(folder.path()).unwrap_err().to_string().contains("blocks.csv cannot be used"));
     }
 }

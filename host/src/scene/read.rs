@@ -5,7 +5,10 @@ use super::{
     BlockHistory, IndexedMesh, OBJECTS_FOLDER, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PlanningWindow, Scene, SceneFrame,
     SceneObject, SurfaceErrorMap, VertexClustering,
 };
-use crate::formats::{FRAMES_FILE, FormatError, MeshVertex, PlyMesh, PlyVertex, TRAJECTORY_FILE, read_numbered, read_poses, read_text};
+use crate::formats::{
+    FRAMES_FILE, FormatError, MAP_FILE, MeshVertex, PlyMesh, PlyVertex, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE, read_numbered,
+    read_poses, read_text,
+};
 use dynvox_core::geometry::Transform;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,7 +30,7 @@ impl Scene {
     pub fn read(folder: &Path, most_triangles: usize) -> Result<Self, FormatError> {
         let objects = objects(&folder.join(OBJECTS_FOLDER), most_triangles / OBJECT_SHARE)?;
         let of_objects: usize = objects.iter().map(|object| object.mesh.triangles.len()).sum();
-        let map = folder.join("map.ply");
+        let map = folder.join(MAP_FILE);
         let (static_map, static_triangles) =
             if map.is_file() { simplified(&map, true, most_triangles.saturating_sub(of_objects))? } else { (IndexedMesh::default(), 0) };
         let (frames, truth) = frames(folder)?;
@@ -99,13 +102,13 @@ fn frames(folder: &Path) -> Result<(Vec<SceneFrame>, Vec<Transform>), FormatErro
     let mut rows: Vec<FrameColumns> = Vec::new();
     read_rows(&folder.join(FRAMES_FILE), |row| rows.push(row))?;
     let poses = read_poses(&folder.join(TRAJECTORY_FILE))?.poses;
-    let truth_file = folder.join("trajectory_truth_kitti.txt");
+    let truth_file = folder.join(TRUE_TRAJECTORY_FILE);
     let truth = if truth_file.is_file() { read_poses(&truth_file)?.poses } else { Vec::new() };
     let every = rows.len().div_ceil(MOST_FRAMES).max(1);
     let frame = |(row, t_world_camera): (FrameColumns, Transform)| SceneFrame { row, t_world_camera, tracks: Vec::new() };
     let mut frames: Vec<SceneFrame> = rows.into_iter().zip(poses).map(frame).step_by(every).collect();
     let position: BTreeMap<usize, usize> = frames.iter().enumerate().map(|(at, frame)| (frame.row.frame, at)).collect();
-    let tracks = folder.join("tracks.csv");
+    let tracks = folder.join(TRACKS_FILE);
     if tracks.is_file() {
         read_rows(&tracks, |track: TrackColumns| {
             if let Some(&at) = position.get(&track.frame) {

@@ -1,6 +1,6 @@
 //! The files of a run folder that are written at the end, after the map and the objects. A file that the disk refuses is missing, and the others are written.
 
-use crate::formats::kitti_line;
+use crate::formats::{SETTINGS_FILE, SUMMARY_FILE, TRUE_TRAJECTORY_FILE, kitti_line};
 use crate::report::{self, Summary};
 use crate::run::{FolderError, Incomplete, RunFolder, RunRecord};
 use crate::scene::{MOST_TRIANGLES, Scene, glb};
@@ -39,7 +39,7 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
         Incomplete::add_missing(&mut run.incomplete, "report.html", &error.to_string());
     }
     let summary = Summary::of(run);
-    folder.write("summary.json", |out| Ok(serde_json::to_writer_pretty(out, &summary)?))?;
+    folder.write(SUMMARY_FILE, |out| Ok(serde_json::to_writer_pretty(out, &summary)?))?;
     Ok(summary)
 }
 
@@ -47,7 +47,7 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
 fn files(run: &RunRecord) -> Vec<(&'static str, Writer<'_>)> {
     let sections = &run.sections;
     let mut files: Vec<(&'static str, Writer<'_>)> =
-        vec![("config.toml", Box::new(|out| out.write_all(run.header.config_toml.as_bytes())))];
+        vec![(SETTINGS_FILE, Box::new(|out| out.write_all(run.header.config_toml.as_bytes())))];
     if let Ok(text) = report::bounds::capacity_toml(run) {
         files.push(("capacity.toml", Box::new(move |out| out.write_all(text.as_bytes()))));
     }
@@ -55,10 +55,7 @@ fn files(run: &RunRecord) -> Vec<(&'static str, Writer<'_>)> {
         files.push(("calibration.toml", Box::new(move |out| out.write_all(text.as_bytes()))));
     }
     if let Some(truth) = &sections.trajectory.truth {
-        files.push((
-            "trajectory_truth_kitti.txt",
-            Box::new(|out| truth.iter().try_for_each(|pose| out.write_all(kitti_line(pose).as_bytes()))),
-        ));
+        files.push((TRUE_TRAJECTORY_FILE, Box::new(|out| truth.iter().try_for_each(|pose| out.write_all(kitti_line(pose).as_bytes())))));
     }
     if !sections.tracks.comparisons.is_empty() {
         files.push(("tracks_truth.csv", Box::new(|out| report::write_tracks_truth(out, &sections.tracks))));

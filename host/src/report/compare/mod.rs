@@ -4,7 +4,7 @@ mod distance;
 
 pub use distance::{Distance, Outcome};
 
-use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses};
+use crate::formats::{FRAMES_FILE, SETTINGS_FILE, SUMMARY_FILE, TRAJECTORY_FILE, read_poses};
 use crate::observe::tables::{FrameDigests, read_frame_digests};
 use crate::run::settings::{Setting, differing, settings};
 use dynvox_core::StageDigests;
@@ -123,10 +123,10 @@ impl RunDigests {
         let text = |file: &'static str| {
             std::fs::read_to_string(folder.join(file)).map_err(|source| CompareError::NoRun { path: folder.to_path_buf(), file, source })
         };
-        let (frames, config, summary) = (text(FRAMES_FILE)?, text("config.toml")?, text("summary.json")?);
+        let (frames, config, summary) = (text(FRAMES_FILE)?, text(SETTINGS_FILE)?, text(SUMMARY_FILE)?);
         let damaged = |file: &str, reason: String| CompareError::Damaged { path: folder.join(file), reason };
-        let mut settings = settings(&config).map_err(|error| damaged("config.toml", error.message().to_owned()))?;
-        let summary: serde_json::Value = serde_json::from_str(&summary).map_err(|error| damaged("summary.json", error.to_string()))?;
+        let mut settings = settings(&config).map_err(|error| damaged(SETTINGS_FILE, error.message().to_owned()))?;
+        let summary: serde_json::Value = serde_json::from_str(&summary).map_err(|error| damaged(SUMMARY_FILE, error.to_string()))?;
         for key in ["dataset", "profile"] {
             if let Some(value) = summary.get(key).and_then(serde_json::Value::as_str) {
                 settings.insert(format!("({key})"), value.to_owned());
