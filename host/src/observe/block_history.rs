@@ -9,8 +9,6 @@ use dynvox_core::volume::{BlockCoord, Volume};
 use serde::{Deserialize, Serialize};
 use std::io;
 
-/// The file.
-
 /// A block, and the number of the frame it was last visible in.
 type Sighting = ([i16; 3], u32);
 
