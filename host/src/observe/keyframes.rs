@@ -88,7 +88,7 @@ fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
         frame: frame.row.frame,
         input_jpeg,
         disparity_jpeg,
-        raycast_jpeg: jpeg(Some(pictures::map(pictures::SMALL_PX, frame.view, &t_world_camera)?)),
+        raycast_jpeg: pictures::jpeg(&pictures::map(pictures::SMALL_PX, frame.view, &t_world_camera)?),
         composed_jpeg: jpeg(pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera)),
     })
 }
