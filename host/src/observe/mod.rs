@@ -5,7 +5,6 @@ mod block_history;
 mod blocks;
 mod bounds;
 mod chart_values;
-mod components;
 mod frame;
 mod frame_log;
 mod gallery;

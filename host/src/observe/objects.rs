@@ -1,7 +1,6 @@
 //! Reconstructed objects: meshes of those that leave the mapper, and their poses. An object leaves within a step, which must not wait for
 //! its mesh: its blocks are copied there, and meshed here, after the step.
 
-use super::components::without_fragments;
 use super::thumbnail::thumbnail;
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, RetiredVolume, Setup, WrittenFile};
 use crate::evaluate::objects::true_object;
@@ -204,7 +203,6 @@ impl ObjectsObserver {
         let mut triangles = Vec::new();
         let meshed = volume.triangles(&setup.config.mesh, &mut |corners| triangles.push(corners));
         meshed.map_err(|source| ObserveError::Write { path: folder.clone(), source })?;
-        let triangles = without_fragments(triangles, volume.config().voxel_size_m);
         if triangles.is_empty() {
             return Ok(());
         }
