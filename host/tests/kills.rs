@@ -12,7 +12,7 @@ use dynvox_core::random::Random;
 use same_run::{assert_same, summary};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -50,19 +50,38 @@ struct Counts {
     started_again: u32,
 }
 
-/// Starts the binary and kills it after a while. Whether the kill ended it.
-fn killed_after(root: &Path, args: &[&str], delay: Duration) -> bool {
-    let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
+/// Starts the binary without waiting for its end.
+fn started(root: &Path, args: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_dynvox"))
         .args(args)
         .current_dir(root)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
-        .unwrap();
-    std::thread::sleep(delay);
-    // SIGKILL: the run cannot clean up.
+        .unwrap()
+}
+
+/// Sends SIGKILL, after which a run cannot clean up. Whether that ended it.
+fn killed(mut run: Child) -> bool {
     run.kill().unwrap();
     run.wait().unwrap().signal().is_some()
+}
+
+/// Starts the binary and kills it after a while. Whether the kill ended it.
+fn killed_after(root: &Path, args: &[&str], delay: Duration) -> bool {
+    let run = started(root, args);
+    std::thread::sleep(delay);
+    killed(run)
+}
+
+/// Starts the binary and kills it as soon as it has written a file.
+fn killed_once_written(root: &Path, args: &[&str], file: &Path) {
+    let mut run = started(root, args);
+    while !file.is_file() {
+        assert!(run.try_wait().unwrap().is_none(), "the run ended without {}", file.display());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(killed(run), "the run ended before it was killed");
 }
 
 /// Whether the killed run had come to its end, and removed what it no longer needed.
@@ -122,11 +141,9 @@ fn a_run_killed_while_it_removes_its_snapshots_is_complete_once_resumed() {
     let root = TempDir::new().unwrap();
     let root = root.path();
     let args = |out: &'static str| [&STREET[..], &["--snapshot-every", "2", "--quiet", "--out", out]].concat();
-    let begin = Instant::now();
     assert!(dynvox(root, &args("whole")).status.success());
-    let half = begin.elapsed() / 2;
     let snapshot = root.join(".killed.partial/run.snapshot");
-    while !(killed_after(root, &args("killed"), half) && snapshot.is_file()) {}
+    killed_once_written(root, &args("killed"), &snapshot);
     // As if it had come to its end, and was killed when its store and its last snapshot were removed.
     let kept = std::fs::read(&snapshot).unwrap();
     assert!(dynvox(root, &["run", "--resume", "killed", "--quiet"]).status.success());
