@@ -4,7 +4,9 @@
 #![allow(missing_docs)]
 #![cfg(unix)]
 
+#[path = "command_line/binary.rs"]
 mod binary;
+#[path = "command_line/same_run.rs"]
 mod same_run;
 
 use binary::{dynvox, names, output_text};
@@ -52,13 +54,7 @@ struct Counts {
 
 /// Starts the binary without waiting for its end.
 fn started(root: &Path, args: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_dynvox"))
-        .args(args)
-        .current_dir(root)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap()
+    Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(root).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
 /// Sends SIGKILL, after which a run cannot clean up. Whether that ended it.

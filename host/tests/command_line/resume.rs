@@ -1,12 +1,8 @@
 //! A run that was killed or failed resumes after its last snapshot, identical to an uninterrupted one; another run is refused by name.
-#![allow(missing_docs)]
 
-mod binary;
-mod same_run;
-
-use binary::{dynvox, names, output_text, rig};
+use super::binary::{dynvox, names, output_text, rig};
+use super::same_run::{assert_same, summary};
 use image::GrayImage;
-use same_run::{assert_same, summary};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;

@@ -1,9 +1,6 @@
 //! `dynvox run -`: the street's frames through a pipe are the street's frames from a folder.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, names, output_text};
+use super::binary::{dynvox, names, output_text};
 use image::GrayImage;
 use std::fs;
 use std::io::Write;

@@ -1,9 +1,6 @@
 //! A fixture of one's own: made, verified, one pixel changed and found, blessed.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, names, output_text};
+use super::binary::{dynvox, names, output_text};
 use std::fs;
 use std::path::Path;
 use std::process::Output;

@@ -1,10 +1,7 @@
 //! What a run leaves behind for other programs: meshes, glTF, recordings; completions and the manual.
-#![allow(missing_docs)]
 
-mod binary;
-
+use super::binary::{dynvox, names, output_text, rig};
 use base64::{Engine, engine::general_purpose::STANDARD};
-use binary::{dynvox, names, output_text, rig};
 use dynvox::formats::{PlyMesh, read_numbered, read_poses};
 use dynvox::run::stereo_frame;
 use dynvox_core::geometry::Transform;

@@ -1,9 +1,6 @@
 //! Commands other than `run`: inspect, budget, evaluate.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, output_text, rig};
+use super::binary::{dynvox, output_text, rig};
 use image::{GrayImage, Luma};
 use std::fs;
 use tempfile::TempDir;

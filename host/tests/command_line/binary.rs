@@ -1,5 +1,5 @@
 //! The binary, run in a folder, and what it left there.
-#![allow(dead_code, reason = "not every test needs all of it")]
+#![allow(dead_code, reason = "the program that kills does not need all of it")]
 
 use image::{GrayImage, Luma};
 use std::fs;

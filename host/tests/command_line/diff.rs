@@ -1,9 +1,6 @@
 //! `dynvox diff` as a user meets it: one pixel, one stage, one setting, one frame fewer, and folders that are none.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, rig};
+use super::binary::{dynvox, rig};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;

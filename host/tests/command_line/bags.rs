@@ -1,9 +1,6 @@
 //! A street recorded as an MCAP file is the street of the folder.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, names, output_text};
+use super::binary::{dynvox, names, output_text};
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
 use std::fs;

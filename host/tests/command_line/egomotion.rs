@@ -1,9 +1,6 @@
 //! Where the camera's motion comes from: the depth tracker, a file of poses, and frames that are tracked but not fused.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, output_text};
+use super::binary::{dynvox, output_text};
 use std::fs;
 use std::process::Output;
 use tempfile::TempDir;

@@ -1,9 +1,6 @@
 //! A run always ends as a run: what stops it, what was mapped until then is there, marked as incomplete.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, names, output_text, rig};
+use super::binary::{dynvox, names, output_text, rig};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;

@@ -1,9 +1,6 @@
 //! What a run needed of its bounds: the least bounds hold the same run without a refusal, and smaller ones do not.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, output_text};
+use super::binary::{dynvox, output_text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

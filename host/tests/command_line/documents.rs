@@ -1,9 +1,6 @@
 //! Documents say what there is: files, keys and columns of a run folder, settings with their defaults, options.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, output_text};
+use super::binary::{dynvox, output_text};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

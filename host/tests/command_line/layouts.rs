@@ -1,9 +1,6 @@
 //! One clip of the street in every layout and format: equal digests for all names and places of the images.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, output_text};
+use super::binary::{dynvox, output_text};
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,6 @@
 //! Faults in the images: what is wrong is said, and the camera is found again.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, output_text};
+use super::binary::{dynvox, output_text};
 use tempfile::TempDir;
 
 /// What the report says of one fault from frame 8 on, in 18 frames of a small street.
@@ -65,7 +62,7 @@ fn a_frozen_camera_and_a_jump_are_not_taken_for_motion() {
 #[test]
 fn a_stream_and_a_data_set_without_poses_are_refused_with_a_sentence() {
     let root = TempDir::new().unwrap();
-    binary::rig(root.path(), 4);
+    super::binary::rig(root.path(), 4);
     let run =
         dynvox(root.path(), &["evaluate", "faults", "--at", "2", "--frames", "4", "--fault", "black@2", "--", "rig", "--profile", "tiny"]);
     assert!(!run.status.success() && output_text(&run).contains("has no true poses"), "{}", output_text(&run));

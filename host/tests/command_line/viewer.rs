@@ -1,13 +1,8 @@
 //! The viewer of finished runs, in a browser where one is installed: it draws, scrubs and toggles, without an error on the console.
-#![allow(missing_docs)]
 
-mod binary;
-mod browser;
-mod run_folder;
-
-use binary::{dynvox, output_text, rig};
-use browser::{Visit, Window};
-use run_folder::FakeRun;
+use super::binary::{dynvox, output_text, rig};
+use super::browser::{Visit, Window};
+use super::run_folder::FakeRun;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;

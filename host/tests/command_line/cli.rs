@@ -1,9 +1,6 @@
 //! The binary as a user meets it: exit codes, sentences, and nothing left behind when something is wrong.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{CALIB, dynvox, names, output_text, rig};
+use super::binary::{CALIB, dynvox, names, output_text, rig};
 use image::GrayImage;
 use std::fs;
 use std::process::Output;

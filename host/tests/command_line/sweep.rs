@@ -1,9 +1,6 @@
 //! A sweep as a user meets it: interrupted, resumed, divided into shares.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, names, output_text};
+use super::binary::{dynvox, names, output_text};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;

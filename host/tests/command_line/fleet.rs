@@ -1,9 +1,6 @@
 //! Many recordings, one map.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, names, output_text};
+use super::binary::{dynvox, names, output_text};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -97,7 +94,7 @@ fn the_sums_of_one_map_show_its_own_surface() {
 fn what_fails_is_named_and_can_be_repeated_alone() {
     let root = TempDir::new().unwrap();
     let root = root.path();
-    binary::rig(root, 4);
+    super::binary::rig(root, 4);
     let list = "[[recording]]\nname = \"rig\"\narguments = [\"rig\", \"--profile\", \"tiny\"]\n";
     fs::write(root.join("recordings.toml"), list).unwrap();
     done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);

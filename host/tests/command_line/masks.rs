@@ -1,9 +1,6 @@
 //! Moving objects without masks, and masks that are saved, taken again and compared.
-#![allow(missing_docs)]
 
-mod binary;
-
-use binary::{dynvox, names, output_text};
+use super::binary::{dynvox, names, output_text};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;

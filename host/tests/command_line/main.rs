@@ -1,0 +1,25 @@
+//! The binary as a user meets it, in one program that is compiled once: `cargo test -p dynvox --test command_line fleet::` runs one part.
+#![allow(missing_docs)]
+
+mod bags;
+mod binary;
+mod browser;
+mod capacity;
+mod cli;
+mod commands;
+mod diff;
+mod documents;
+mod egomotion;
+mod endings;
+mod export;
+mod faults;
+mod fixtures;
+mod fleet;
+mod layouts;
+mod masks;
+mod resume;
+mod run_folder;
+mod same_run;
+mod stream;
+mod sweep;
+mod viewer;
