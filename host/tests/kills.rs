@@ -98,6 +98,7 @@ fn complete(root: &Path, start: &[&str], counts: &mut Counts) {
     }
 }
 
+#[dynvox_needs::long("DYNVOX_KILL_TRIALS")]
 #[test]
 fn runs_killed_at_any_moment_equal_the_run_never_killed() {
     let trials = std::env::var("DYNVOX_KILL_TRIALS").ok().and_then(|text| text.parse().ok()).unwrap_or(TRIALS);
@@ -132,6 +133,7 @@ fn runs_killed_at_any_moment_equal_the_run_never_killed() {
     }
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_run_killed_while_it_removes_its_snapshots_is_complete_once_resumed() {
     let root = TempDir::new().unwrap();

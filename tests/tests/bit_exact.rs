@@ -14,6 +14,7 @@ fn digests(clip: &Clip, executor: &impl Executor) -> Vec<(u64, u64)> {
     })
 }
 
+#[dynvox_needs::long]
 #[test]
 fn one_two_and_eight_threads_give_the_same_digests_in_every_frame() {
     let clip = Clip::street(416, 128, 15);

@@ -117,6 +117,7 @@ fn a_covered_camera_is_found_again_in_its_map() {
     assert_eq!(reports.last().map(Report::severity), Some(Severity::Info));
 }
 
+#[dynvox_needs::long]
 #[test]
 fn the_c_interface_reports_the_same() {
     let street = street(3);

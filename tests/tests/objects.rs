@@ -15,6 +15,7 @@ use dynvox_core::{
 };
 use dynvox_tests::HeapSlab;
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 /// Width and height at which cars have matches enough.
 const SIZE: [u32; 2] = [1242, 375];
@@ -61,6 +62,9 @@ struct Sequence {
     street: Street,
     frames: Vec<(SynthFrame, Vec<Seen>)>,
 }
+
+/// Rendered once for all tests.
+static SEQUENCE: LazyLock<Sequence> = LazyLock::new(Sequence::new);
 
 impl Sequence {
     fn new() -> Self {
@@ -115,9 +119,10 @@ fn truth<'f>(frame: &'f SynthFrame, seen: &[Seen], track: &TrackReport) -> Optio
     frame.objects.get(seen.iter().min_by_key(near)?.truth)
 }
 
+#[dynvox_needs::long]
 #[test]
 fn moving_cars_leave_no_trail_in_the_static_map_and_do_without_masks() {
-    let sequence = Sequence::new();
+    let sequence = &*SEQUENCE;
     let trail = |dynamic| {
         let mut count = 0;
         sequence.run(dynamic, false, |index, _, mapper| {
@@ -133,9 +138,10 @@ fn moving_cars_leave_no_trail_in_the_static_map_and_do_without_masks() {
     assert_eq!(on, 0);
 }
 
+#[dynvox_needs::long]
 #[test]
 fn each_cars_state_and_motion_are_true_in_any_order_of_detections() {
-    let sequence = Sequence::new();
+    let sequence = &*SEQUENCE;
     let mut states: BTreeMap<u32, Vec<(bool, MotionState)>> = BTreeMap::new();
     let (mut errors_m, mut errors_deg) = (Vec::new(), Vec::new());
     let mut digests = Vec::new();
@@ -189,9 +195,10 @@ fn picture(seen: &Raycaster<'_>) -> Picture {
     depth_m.rows().flatten().zip(colour.rows().flatten()).zip(layer.rows().flatten()).map(|((d, c), l)| (*d, *c, *l)).collect()
 }
 
+#[dynvox_needs::long]
 #[test]
 fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_cars_where_they_are() {
-    let sequence = Sequence::new();
+    let sequence = &*SEQUENCE;
     let (mut cars, mut totals) = (Vec::new(), [0u32; 3]);
     sequence.run(true, false, |index, report, mapper| {
         if index < 6 || index % 3 > 0 {
@@ -246,9 +253,10 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
     assert!(shown * 10 > all * 8 && right * 10 > shown * 9);
 }
 
+#[dynvox_needs::long]
 #[test]
 fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
-    let sequence = Sequence::new();
+    let sequence = &*SEQUENCE;
     for (tracks, objects, object_blocks) in [(1, 1, 17), (1, 1, 1), (1, 0, 0)] {
         let capacity = Capacity { tracks, objects, object_blocks, ..CAPACITY };
         let (mut begun, mut refused, mut blocks) = (0, 0, 0);
@@ -265,9 +273,10 @@ fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
     }
 }
 
+#[dynvox_needs::long]
 #[test]
 fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_seen_of_them() {
-    let sequence = Sequence::new();
+    let sequence = &*SEQUENCE;
     let rig = sequence.street.rig();
     let mut sides: BTreeMap<u32, SeenSide> = BTreeMap::new();
     let (mut medians_m, mut complete) = (Vec::new(), Vec::new());

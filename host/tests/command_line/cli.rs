@@ -135,6 +135,7 @@ fn a_strict_run_ends_at_the_first_frame_that_affects_the_map_and_names_the_cause
     assert!(lenient.status.success(), "{}", output_text(&lenient));
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_full_disk_is_warned_of_once_and_counted_and_the_run_goes_on() {
     let root = TempDir::new().unwrap();
@@ -211,6 +212,7 @@ fn a_written_street_is_mapped_as_a_kitti_folder() {
     );
 }
 
+#[dynvox_needs::long]
 #[test]
 fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked() {
     let root = TempDir::new().unwrap();
@@ -266,6 +268,7 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
     assert!(output_text(&refused).contains("velodyne/") && !root.path().join("g").exists(), "{}", output_text(&refused));
 }
 
+#[dynvox_needs::long]
 #[test]
 fn what_moves_is_kept_apart_unless_no_masks_are_taken_or_all_goes_into_one_map() {
     let root = TempDir::new().unwrap();

@@ -66,6 +66,7 @@ fn poses_of_a_file_replace_egomotion_and_must_cover_the_frames() {
     assert!(!root.path().join("x").exists());
 }
 
+#[dynvox_needs::long]
 #[test]
 fn every_kth_frame_alone_is_fused_and_the_map_is_not_affected() {
     let root = TempDir::new().unwrap();

@@ -48,6 +48,7 @@ fn triangles(path: &Path) -> (BTreeMap<u32, u64>, [[f32; 3]; 2]) {
     (counts, bounds)
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_map_has_its_objects_where_they_were_last_seen() {
     let root = TempDir::new().unwrap();
@@ -131,6 +132,7 @@ fn glb_objects(path: &Path) -> ObjectCells {
     cells
 }
 
+#[dynvox_needs::long]
 #[test]
 fn cars_stand_in_both_maps_where_the_raycast_of_the_last_frame_shows_them() {
     let root = TempDir::new().unwrap();
@@ -240,6 +242,7 @@ fn completions_and_the_manual_know_every_command() {
     assert!(["Input:", "Frames:", "Mapping:", "Limits:", "Evaluation:", "Results:"].iter().all(|group| help.contains(group)), "{help}");
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_window_for_planners_is_a_map_for_nav2_with_heights_and_distances() {
     let root = TempDir::new().unwrap();

@@ -13,6 +13,7 @@ fn outcome(fault: &str) -> serde_json::Value {
     serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap()[0].clone()
 }
 
+#[dynvox_needs::long]
 #[test]
 fn after_blind_frames_the_camera_is_found_again() {
     for fault in ["black@8..11", "noise=60@8..11", "exchange@8", "occlude:left=0.95@8..11"] {
@@ -22,6 +23,7 @@ fn after_blind_frames_the_camera_is_found_again() {
     }
 }
 
+#[dynvox_needs::long]
 #[test]
 fn images_that_both_repeat_while_the_camera_moves_are_old() {
     for fault in ["freeze@8..12", "duplicate@8..10"] {
@@ -38,6 +40,7 @@ fn a_camera_a_frame_late_is_noticed() {
 }
 
 /// As docs/faults.md has it.
+#[dynvox_needs::long]
 #[test]
 fn no_pose_of_a_camera_a_frame_late_is_wrong_and_unreported() {
     let root = TempDir::new().unwrap();
@@ -50,6 +53,7 @@ fn no_pose_of_a_camera_a_frame_late_is_wrong_and_unreported() {
     assert_eq!(table.len(), 2);
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_frozen_camera_and_a_jump_are_not_taken_for_motion() {
     for fault in ["freeze:right@8..", "freeze:left@8..", "jump=20@8"] {

@@ -119,6 +119,7 @@ fn what_fails_is_named_and_can_be_repeated_alone() {
     );
 }
 
+#[dynvox_needs::long]
 #[test]
 fn recordings_are_aligned_carried_into_the_world_and_reported() {
     let root = TempDir::new().unwrap();
@@ -158,6 +159,7 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
     assert!(output_text(&other).contains("is not of these jobs. Align again"), "{}", output_text(&other));
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_recording_lies_where_its_fixes_or_its_poses_say() {
     let root = TempDir::new().unwrap();

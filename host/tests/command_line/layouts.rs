@@ -167,6 +167,7 @@ fn dress_formats(clip: &Clip) -> Vec<&'static str> {
     vec!["pgm", "tiff", "bmp", "png16"]
 }
 
+#[dynvox_needs::long]
 #[test]
 fn every_layout_and_every_lossless_format_gives_the_digest_of_the_plain_clip() {
     let clip = Clip::small();
@@ -202,6 +203,7 @@ fn names_without_padding_and_missing_images_keep_order_and_pairs() {
     assert!(notes.contains("3 left and 0 right images have no partner: skipped"), "{notes}");
 }
 
+#[dynvox_needs::long]
 #[test]
 fn jpeg_of_quality_90_keeps_the_trajectory_within_two_percent() {
     let clip = Clip::new(12, ["--set", "street.width=480", "--set", "street.height=144"]);

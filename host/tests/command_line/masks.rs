@@ -36,6 +36,7 @@ fn without_masks_what_moves_is_found_by_its_motion_and_reconstructed() {
     assert_eq!(street(root.path(), "none", &["--instances", "none"])["objects"].as_array().map(Vec::len), Some(0));
 }
 
+#[dynvox_needs::long]
 #[test]
 fn saved_masks_repeat_the_run_and_equal_themselves() {
     let root = TempDir::new().unwrap();

@@ -209,6 +209,7 @@ fn a_run_whose_last_snapshot_is_damaged_resumes_from_the_one_before() {
     assert_same(root.path(), "whole", "out/it");
 }
 
+#[dynvox_needs::long]
 #[test]
 fn objects_written_before_a_snapshot_are_checked() {
     let root = TempDir::new().unwrap();

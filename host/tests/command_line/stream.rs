@@ -108,6 +108,7 @@ fn a_camera_faster_than_the_mapper_loses_frames_that_are_counted() {
 }
 
 #[cfg(target_os = "linux")]
+#[dynvox_needs::long]
 #[test]
 fn memory_does_not_grow_with_the_stream() {
     const ROUNDS: usize = 200;

@@ -4,6 +4,7 @@ use super::binary::{dynvox, names, output_text};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::SystemTime;
 use tempfile::TempDir;
 
 const SWEEP: [&str; 24] = [
@@ -41,24 +42,45 @@ fn results(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Begins the sweep in folder `out` of `root` and kills it once two results are there.
-fn kill_after_two_results(root: &Path, out: &str) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_dynvox")).args(SWEEP).arg(out).current_dir(root).spawn().unwrap();
-    while results(&root.join(out)).len() < 2 && child.try_wait().unwrap().is_none() {
+/// Begins a sweep in folder `out` of `root` and kills it once `count` results are there.
+fn kill_after_results(root: &Path, args: &[&str], out: &str, count: usize) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).arg(out).current_dir(root).spawn().unwrap();
+    while results(&root.join(out)).len() < count && child.try_wait().unwrap().is_none() {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     child.kill().unwrap();
     child.wait().unwrap();
 }
 
+/// What tells whether a result was made anew.
+fn made(path: impl AsRef<Path>) -> (Vec<u8>, SystemTime) {
+    (fs::read(&path).unwrap(), fs::metadata(path).unwrap().modified().unwrap())
+}
+
+#[test]
+fn a_killed_sweep_does_not_repeat_what_was_done() {
+    let root = TempDir::new().unwrap();
+    let small = ["street.width=192", "street.height=64"].map(|set| ["--set", set]).concat();
+    let args = [&SWEEP[..2], &["--sweeps", "prune-weight", "--weights", "0,1,2"], &SWEEP[8..16], &small[..], &SWEEP[20..]].concat();
+    kill_after_results(root.path(), &args, "cut", 1);
+    let before = results(&root.path().join("cut"));
+    assert!((1..3).contains(&before.len()), "killed in the middle: {before:?}");
+    let kept: Vec<_> = before.iter().map(made).collect();
+    let resumed = dynvox(root.path(), &[&args[..], &["cut"]].concat());
+    assert!(resumed.status.success(), "{}", output_text(&resumed));
+    assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "finished runs are not repeated");
+    assert_eq!(results(&root.path().join("cut")).len(), 3, "three weights");
+    assert_eq!(names(&root.path().join("cut")), ["plan.json", "prune-weight.csv", "report.html", "runs"]);
+}
+
+#[dynvox_needs::long]
 #[test]
 fn a_killed_sweep_resumes_and_merged_shares_equal_the_whole() {
     let root = TempDir::new().unwrap();
     let results = |out: &str| results(&root.path().join(out));
-    kill_after_two_results(root.path(), "cut");
+    kill_after_results(root.path(), &SWEEP, "cut", 2);
     let before = results("cut");
     assert!((2..7).contains(&before.len()), "killed in the middle: {before:?}");
-    let made = |path: &PathBuf| (fs::read(path).unwrap(), fs::metadata(path).unwrap().modified().unwrap());
     let kept: Vec<_> = before.iter().map(made).collect();
     let resumed = dynvox(root.path(), &[&SWEEP[..], &["cut"]].concat());
     assert!(resumed.status.success(), "{}", output_text(&resumed));

@@ -3,8 +3,11 @@
 //!
 //! Clips are looked for in `DYNVOX_DATA`, an absolute path, else in `../shared/data` next to the checkout. A browser installed later is
 //! noticed when this crate is compiled again: `touch tests/needs/build.rs`.
+//!
+//! Time is missing too, mostly: a test that takes long runs where `DYNVOX_LONG` is set, as `.ci/run` does.
 
 use proc_macro::{TokenStream, TokenTree};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// Names of the browser, the first one found is taken.
@@ -62,6 +65,20 @@ pub fn browser(_: TokenStream, test: TokenStream) -> TokenStream {
     ignored(browser_found().is_none().then(|| "no Chromium is installed".to_owned()), test)
 }
 
+/// Why a long test does not run, for the values of `DYNVOX_LONG` and of variables that ask for more of it.
+fn too_long(asked: &[Option<OsString>]) -> Option<String> {
+    let is_asked = asked.iter().flatten().any(|value| !value.is_empty() && value != "0");
+    (!is_asked).then(|| "long: .ci/run and DYNVOX_LONG=1 run it".to_owned())
+}
+
+/// `#[long]` above `#[test]`: the test takes long, and shorter ones ask most of the same. `#[long("DYNVOX_KILL_TRIALS")]`: it runs where that
+/// is set, too.
+#[proc_macro_attribute]
+pub fn long(variables: TokenStream, test: TokenStream) -> TokenStream {
+    let variables = std::iter::once("DYNVOX_LONG".to_owned()).chain(strings(variables));
+    ignored(too_long(&variables.map(std::env::var_os).collect::<Vec<_>>()), test)
+}
+
 /// `data_folder!()`: the folder of the clips, a string literal.
 #[proc_macro]
 pub fn data_folder(_: TokenStream) -> TokenStream {
@@ -84,6 +101,17 @@ mod tests {
         let of = |paths: &[&str]| missing(here, &paths.iter().map(|&path| path.to_owned()).collect::<Vec<_>>());
         assert_eq!(of(&["src/lib.rs", "src"]), None);
         assert_eq!(of(&["src", "none", "neither"]).unwrap(), "no none, neither in DYNVOX_DATA or ../shared/data");
+    }
+
+    #[test]
+    fn long_tests_run_where_they_are_asked_for() {
+        let of = |value: &str| Some(OsString::from(value));
+        for asked in [[of("1"), None], [None, of("200")], [of("0"), of("200")]] {
+            assert_eq!(too_long(&asked), None);
+        }
+        for not in [[None, None], [of(""), None], [of("0"), of("")]] {
+            assert!(too_long(&not).unwrap().contains(".ci/run"));
+        }
     }
 
     #[test]
