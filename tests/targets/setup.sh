@@ -49,7 +49,7 @@ pack() {
   export DYNVOX_CLIP=$packed.clip DYNVOX_CONSTANTS=$packed.rs DYNVOX_DIGESTS=$fixture/digests.txt
   # The binary that the tests have built, or one built here.
   dynvox=$root/target/debug/dynvox
-  [ -x "$dynvox" ] || (cd "$root" && cargo build --quiet --locked)
+  [ -x "$dynvox" ] || (cd "$root" && cargo build --quiet --locked -p dynvox)
   # Digests are not in it.
   [ -s "$DYNVOX_CONSTANTS" ] && [ -z "$(find "$fixture" "$root/core/src" -newer "$DYNVOX_CONSTANTS" -type f ! -name '*.txt' -print -quit)" ] &&
     return 0
