@@ -23,8 +23,8 @@ pub enum GapEnds {
 }
 
 /// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving, [`StereoConfig::dynslam`] DynSLAM's, which fills wider
-/// gaps; [`Default`] fills wider ones still, but only within a surface (docs/decisions/0028-gaps-within-a-surface.md), and asks less of a
-/// support match.
+/// gaps; [`Default`] trusts the images more and the planes between support points less (docs/decisions/0042-less-trust-in-planes.md), fills
+/// gaps only within a surface, wide ones too (docs/decisions/0028-gaps-within-a-surface.md), and asks less of a support match.
 ///
 /// ```
 /// use dynvox_core::stereo::StereoConfig;
@@ -59,7 +59,7 @@ pub struct StereoConfig {
     pub grid_size: usize,
     /// Weight of the descriptor distance against the prior (beta), above 0. Published: 0.02.
     pub beta: f32,
-    /// Uniform share of the prior (gamma), above 0. Published: 3.
+    /// Uniform share of the prior (gamma), above 0: the larger, the less a disparity far from the plane costs. 6; published: 3.
     pub gamma: f32,
     /// Standard deviation of disparities about the prior plane (sigma), px, above 0. Published: 1.
     pub sigma: f32,
@@ -73,13 +73,13 @@ pub struct StereoConfig {
     /// Whether disparities are refined to fractions of a pixel before they are smoothed. Published: no. On KITTI 2012 it takes the median
     /// error from 0.268 to 0.257 px and the share off by more than 3 px from 4.8 to 4.5 %; on smooth surfaces it halves the error.
     pub subpixel: bool,
-    /// Largest difference between the disparities of left and right image, px. Published: 2.
+    /// Largest difference between the disparities of left and right image, px. 1; published: 2.
     pub consistency_threshold: u16,
     /// Neighbours that differ by at most this belong to one segment, px. Published: 1.
     pub speckle_similarity: u16,
     /// Segments smaller than this are removed, px; 0 or 1 keeps all. Published: 200.
     pub speckle_size: u32,
-    /// Widest gap filled along rows and columns, px; 0 fills none. 40; published: 3; DynSLAM: 21.
+    /// Widest gap filled along rows and columns, px; 0 fills none. 70; published: 3; DynSLAM: 21.
     pub gap_width: usize,
     /// Ends of a gap that differ by less than this are one surface, px. Published: 3.
     pub gap_discontinuity: u16,
@@ -157,7 +157,9 @@ impl Default for StereoConfig {
     fn default() -> Self {
         Self {
             support_ratio: 0.9,
-            gap_width: 40,
+            gamma: 6.0,
+            consistency_threshold: 1,
+            gap_width: 70,
             gap_ends: GapEnds::Surface,
             ..Self::robotics()
         }
