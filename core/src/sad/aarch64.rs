@@ -6,9 +6,9 @@
 use super::{Comparison, Descriptor, Eight, Functions, Inside, KEY_SCALE_BITS, Kernels, NO_FEATURE, OFFSET_BITS};
 use bytemuck::cast;
 use core::arch::aarch64::{
-    uint8x16_t, uint16x8_t, uint32x4_t, vabdq_u8, vaddq_u32, vandq_u32, vbslq_u32, vceqzq_u32, vcltq_u32, vdupq_n_u32, vget_low_u16,
-    vminq_u32, vmovl_high_u16, vmovl_u16, vorrq_u32, vpadalq_u8, vpaddlq_u8, vpaddq_u16, vqsubq_u16, vreinterpretq_u16_u32,
-    vreinterpretq_u32_u16, vshlq_n_u32, vsubq_u16,
+    int32x4_t, uint8x16_t, uint16x8_t, uint32x4_t, vabdq_u8, vaddq_u32, vandq_u32, vbslq_u32, vceqzq_u32, vcltq_u32, vcvtq_f32_s32,
+    vcvtq_s32_f32, vdivq_f32, vdupq_n_u32, vget_low_u16, vminq_u32, vmovl_high_u16, vmovl_u16, vorrq_u32, vpadalq_u8, vpaddlq_u8,
+    vpaddq_u16, vqsubq_u16, vreinterpretq_u16_u32, vreinterpretq_u32_u16, vshlq_n_u32, vsubq_u16,
 };
 
 /// Runs work with 128 bits.
@@ -58,6 +58,15 @@ pub fn with_neon(work: impl Comparison) {
         sums: |a: &Eight<Descriptor>, b: &Eight<Descriptor>| cast(sums(cast(*a), cast(*b))),
         sums_of: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&Descriptor>| {
             cast(sums(cast(*a), cast([*b, *c, *d, *e, *f, *g, *h, *i])))
+        },
+        sums_of_two: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&[Descriptor; 2]>| {
+            let first = cast(sums(cast(*a), cast([b[0], c[0], d[0], e[0], f[0], g[0], h[0], i[0]])));
+            [first, cast(sums(cast(*a), cast([b[1], c[1], d[1], e[1], f[1], g[1], h[1], i[1]])))]
+        },
+        quotients: |dividends: Eight<i32>, divisors: Eight<i32>| {
+            let ([a, b], [c, d]): ([int32x4_t; 2], [int32x4_t; 2]) = (cast(dividends), cast(divisors));
+            let quotient = |a, b| vcvtq_s32_f32(vdivq_f32(vcvtq_f32_s32(a), vcvtq_f32_s32(b)));
+            cast([quotient(a, c), quotient(b, d)])
         },
         least_inside,
         least,

@@ -64,6 +64,12 @@ pub(crate) trait Kernels {
     /// The same with descriptors from anywhere.
     fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32>;
 
+    /// Sums of eight descriptors with two each, which lie side by side anywhere: those with the first ones, and those with the second ones.
+    fn sums_of_two(&self, a: &Eight<Descriptor>, b: Eight<&[Descriptor; 2]>) -> [Eight<u32>; 2];
+
+    /// Quotients of integers below 2^24, without their fractions; no divisor is 0.
+    fn quotients(&self, dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32>;
+
     /// The lesser of `best` and of the keys of eight features that are compared with one: the sum of absolute differences of their two
     /// descriptors, at most 8,160, above [`OFFSET_BITS`] for their offsets. Features outside do not count.
     fn least_inside(&self, best: Eight<u32>, sought: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>) -> Eight<u32>;
@@ -85,9 +91,11 @@ pub(crate) trait Kernels {
     all(target_arch = "x86_64", target_feature = "sse2"),
     all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")
 ))]
-struct Functions<S, F, W, L, O, C> {
+struct Functions<S, F, T, Q, W, L, O, C> {
     sums: S,
     sums_of: F,
+    sums_of_two: T,
+    quotients: Q,
     least_inside: W,
     least: L,
     ordered: O,
@@ -98,10 +106,12 @@ struct Functions<S, F, W, L, O, C> {
     all(target_arch = "x86_64", target_feature = "sse2"),
     all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")
 ))]
-impl<S, F, W, L, O, C> Kernels for Functions<S, F, W, L, O, C>
+impl<S, F, T, Q, W, L, O, C> Kernels for Functions<S, F, T, Q, W, L, O, C>
 where
     S: Fn(&Eight<Descriptor>, &Eight<Descriptor>) -> Eight<u32>,
     F: Fn(&Eight<Descriptor>, Eight<&Descriptor>) -> Eight<u32>,
+    T: Fn(&Eight<Descriptor>, Eight<&[Descriptor; 2]>) -> [Eight<u32>; 2],
+    Q: Fn(Eight<i32>, Eight<i32>) -> Eight<i32>,
     W: Fn(Eight<u32>, &[Descriptor; 2], &Eight<[Descriptor; 2]>, &Inside<'_>) -> Eight<u32>,
     L: Fn(Eight<u32>, [&Eight<Descriptor>; 2], u32) -> Eight<u32>,
     O: Fn(Eight<u32>) -> Eight<u32>,
@@ -115,6 +125,16 @@ where
     #[inline(always)]
     fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32> {
         (self.sums_of)(a, b)
+    }
+
+    #[inline(always)]
+    fn sums_of_two(&self, a: &Eight<Descriptor>, b: Eight<&[Descriptor; 2]>) -> [Eight<u32>; 2] {
+        (self.sums_of_two)(a, b)
+    }
+
+    #[inline(always)]
+    fn quotients(&self, dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32> {
+        (self.quotients)(dividends, divisors)
     }
 
     #[inline(always)]
@@ -183,6 +203,23 @@ impl Kernels for Plain {
         let mut sums = [0; LANES];
         sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum = distance(a, b));
         sums
+    }
+
+    #[inline(always)]
+    fn sums_of_two(&self, a: &Eight<Descriptor>, b: Eight<&[Descriptor; 2]>) -> [Eight<u32>; 2] {
+        let mut sums = [[0; LANES]; 2];
+        for (step, sums) in sums.iter_mut().enumerate() {
+            let others = b.iter().filter_map(|two| two.get(step));
+            sums.iter_mut().zip(a.iter().zip(others)).for_each(|(sum, (a, b))| *sum = distance(a, b));
+        }
+        sums
+    }
+
+    #[inline(always)]
+    fn quotients(&self, mut dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32> {
+        // Such integers are exact, and so is their quotient once its fraction is cut off.
+        dividends.iter_mut().zip(divisors).for_each(|(a, b)| *a = (*a as f32 / b as f32) as i32);
+        dividends
     }
 
     #[inline(always)]
@@ -263,6 +300,15 @@ mod tests {
             let Self { a, b, most } = self;
             assert_eq!(kernels.sums(&a, &b), Plain.sums(&a, &b));
             assert_eq!(kernels.sums_of(&a, b.each_ref()), Plain.sums(&a, &b));
+            let twos = [[b[3], a[1]], [a[0], b[6]], [b[1], b[2]], [a[7], a[6]], [b[0], a[4]], [a[2], b[5]], [b[7], b[4]], [a[3], a[5]]];
+            let two = kernels.sums_of_two(&a, twos.each_ref());
+            assert_eq!(two, Plain.sums_of_two(&a, twos.each_ref()));
+            assert_eq!(two, [0, 1].map(|step| Plain.sums(&a, &twos.map(|two| two[step]))));
+            let dividends = [126_480, -126_480, 0, 31, -31, 30, -1, most as i32 >> 7];
+            let divisors = [4_080, 4_080, 1, 31, 32, 7, 1, 1 + (most as i32 >> 19)];
+            let quotients = kernels.quotients(dividends, divisors);
+            assert_eq!(quotients, Plain.quotients(dividends, divisors));
+            assert!((0..LANES).all(|lane| quotients[lane] == dividends[lane] / divisors[lane]));
             let (sought, others) = ([a[5], b[2]], bytemuck::cast([a, b]));
             for (at, offset) in [[[7u16, 9]; LANES], [[8, 65_535], [9, 0], [8, 0], [65_535, 65_535], [0, 0], [7, 9], [107, 9], [108, 12]]]
                 .iter()

@@ -6,12 +6,13 @@
 use super::{Comparison, Descriptor, Eight, Functions, Inside, KEY_SCALE_BITS, Kernels, NO_FEATURE, OFFSET_BITS};
 use bytemuck::cast;
 use core::arch::x86_64::{
-    __m128i, __m256i, _mm_add_epi32, _mm_and_si128, _mm_andnot_si128, _mm_cmpeq_epi32, _mm_cmplt_epi32, _mm_madd_epi16, _mm_or_si128,
-    _mm_packs_epi32, _mm_sad_epu8, _mm_set1_epi16, _mm_set1_epi32, _mm_setr_epi32, _mm_setzero_si128, _mm_slli_epi32, _mm_sub_epi16,
-    _mm_subs_epu16, _mm256_add_epi32, _mm256_and_si256, _mm256_andnot_si256, _mm256_broadcastsi128_si256, _mm256_castsi256_si128,
-    _mm256_cmpeq_epi32, _mm256_cmpgt_epi32, _mm256_extracti128_si256, _mm256_madd_epi16, _mm256_min_epi32, _mm256_or_si256,
-    _mm256_packs_epi32, _mm256_permute2x128_si256, _mm256_permutevar8x32_epi32, _mm256_sad_epu8, _mm256_set1_epi16, _mm256_set1_epi32,
-    _mm256_setr_epi32, _mm256_setzero_si256, _mm256_slli_epi32, _mm256_sub_epi16, _mm256_subs_epu16,
+    __m128i, __m256i, _mm_add_epi32, _mm_and_si128, _mm_andnot_si128, _mm_cmpeq_epi32, _mm_cmplt_epi32, _mm_cvtepi32_ps, _mm_cvttps_epi32,
+    _mm_div_ps, _mm_madd_epi16, _mm_or_si128, _mm_packs_epi32, _mm_sad_epu8, _mm_set1_epi16, _mm_set1_epi32, _mm_setr_epi32,
+    _mm_setzero_si128, _mm_slli_epi32, _mm_sub_epi16, _mm_subs_epu16, _mm256_add_epi32, _mm256_and_si256, _mm256_andnot_si256,
+    _mm256_broadcastsi128_si256, _mm256_castsi256_si128, _mm256_cmpeq_epi32, _mm256_cmpgt_epi32, _mm256_cvtepi32_ps, _mm256_cvttps_epi32,
+    _mm256_div_ps, _mm256_extracti128_si256, _mm256_madd_epi16, _mm256_min_epi32, _mm256_or_si256, _mm256_packs_epi32,
+    _mm256_permute2x128_si256, _mm256_permutevar8x32_epi32, _mm256_sad_epu8, _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setr_epi32,
+    _mm256_setzero_si256, _mm256_slli_epi32, _mm256_sub_epi16, _mm256_subs_epu16,
 };
 
 /// The sums' place in a key, as a factor: the addition of halves multiplies by it for nothing.
@@ -56,6 +57,15 @@ pub fn with_sse2(work: impl Comparison) {
             sums: |a: &Eight<Descriptor>, b: &Eight<Descriptor>| cast(sums(a, b, 1)),
             sums_of: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&Descriptor>| {
                 cast(sums(a, &[*b, *c, *d, *e, *f, *g, *h, *i], 1))
+            },
+            sums_of_two: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&[Descriptor; 2]>| {
+                let first = cast(sums(a, &[b[0], c[0], d[0], e[0], f[0], g[0], h[0], i[0]], 1));
+                [first, cast(sums(a, &[b[1], c[1], d[1], e[1], f[1], g[1], h[1], i[1]], 1))]
+            },
+            quotients: |dividends: Eight<i32>, divisors: Eight<i32>| {
+                let ([a, b], [c, d]): ([__m128i; 2], [__m128i; 2]) = (cast(dividends), cast(divisors));
+                let quotient = |a, b| _mm_cvttps_epi32(_mm_div_ps(_mm_cvtepi32_ps(a), _mm_cvtepi32_ps(b)));
+                cast([quotient(a, c), quotient(b, d)])
             },
             least_inside: |best: Eight<u32>, [first, second]: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>| {
                 let (first, second): (__m128i, __m128i) = (cast(*first), cast(*second));
@@ -117,6 +127,17 @@ pub fn with_avx2(work: impl Comparison) {
                 let low = half([sad(a[0], b), sad(a[1], c), sad(a[2], d), sad(a[3], e)]);
                 let high = half([sad(a[4], f), sad(a[5], g), sad(a[6], h), sad(a[7], i)]);
                 cast([low, high])
+            },
+            sums_of_two: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&[Descriptor; 2]>| {
+                let sad = |a: Descriptor, b: &[Descriptor; 2]| _mm256_sad_epu8(_mm256_broadcastsi128_si256(cast(a)), cast(*b));
+                // The sums of the first descriptors below those of the second.
+                let low = scaled([sad(a[0], b), sad(a[1], c), sad(a[2], d), sad(a[3], e)], 1);
+                let high = scaled([sad(a[4], f), sad(a[5], g), sad(a[6], h), sad(a[7], i)], 1);
+                cast([_mm256_permute2x128_si256(low, high, 0x20), _mm256_permute2x128_si256(low, high, 0x31)])
+            },
+            quotients: |dividends: Eight<i32>, divisors: Eight<i32>| {
+                let (a, b): (__m256i, __m256i) = (cast(dividends), cast(divisors));
+                cast(_mm256_cvttps_epi32(_mm256_div_ps(_mm256_cvtepi32_ps(a), _mm256_cvtepi32_ps(b))))
             },
             least_inside: |best: Eight<u32>, sought: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>| {
                 let (sought, others): (__m256i, Eight<__m256i>) = (cast(*sought), cast(*others));

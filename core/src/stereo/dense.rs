@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     part::{part, part_mut},
-    sad::{Comparison, Kernels, LANES},
+    sad::{Comparison, Eight, Kernels, LANES},
 };
 
 /// A disparity of the working images: 1/64 px.
@@ -106,10 +106,15 @@ impl DenseMatching<'_> {
         let sets = part(grid.cells, v / size * grid.columns..);
         let mut row = Row::<LEFT>::new(self.config, &self.cost, here, other);
         let mut list = [0; 256];
-        for (cell, (planes, set)) in planes.chunks_mut(size).zip(sets).enumerate() {
+        let mut cell = 0..size;
+        for set in sets {
             let listed = list_candidates(set, self.cost.elsewhere, &mut list);
-            for (i, planes) in planes.chunks_mut(LANES).enumerate() {
-                row.match_eight(cell * size + i * LANES, listed, planes, kernels);
+            for u in cell.clone().step_by(LANES) {
+                row.match_eight(u, cell.end - u, listed, planes, kernels);
+            }
+            cell = cell.end..cell.end + size;
+            if cell.start >= planes.len() {
+                break;
             }
         }
     }
@@ -132,18 +137,59 @@ fn list_candidates<'l>(set: &DisparitySet, cost: u32, list: &'l mut [u32; 256]) 
     part(list, ..list.len() - free)
 }
 
+/// Eight pixels of a row from column `u` on; those beyond it have no plane.
+#[inline(always)]
+fn load(row: &[i16], u: usize) -> Eight<i16> {
+    match row.get(u..).and_then(|row| row.first_chunk()) {
+        Some(all) => *all,
+        None => load_last(row, u),
+    }
+}
+
+/// As [`load`], where fewer than eight are left.
+#[cold]
+#[inline(never)]
+fn load_last(row: &[i16], u: usize) -> Eight<i16> {
+    let mut pixels = [NO_PLANE; LANES];
+    pixels.iter_mut().zip(row.iter().skip(u)).for_each(|(to, from)| *to = *from);
+    pixels
+}
+
+/// Writes eight pixels, those within the row.
+#[inline(always)]
+fn store(row: &mut [i16], u: usize, pixels: Eight<i16>) {
+    let rest = row.get_mut(u..).unwrap_or_default();
+    match rest.first_chunk_mut() {
+        Some(all) => *all = pixels,
+        None => rest.iter_mut().zip(pixels).for_each(|(to, from)| *to = from),
+    }
+}
+
+/// Pixels checked at once.
+const BLOCK: usize = 64;
+
 /// Takes from the left row what the right row contradicts; both in px, [`NO_PLANE`] where there is no disparity. Returns how many matches
 /// there were and how many of them went.
+#[inline(always)]
 fn check_consistency(left: &mut [i16], right: &[i16], threshold: u16) -> [u32; 2] {
     let (mut matched, mut contradicted) = (0, 0);
-    for (u, disparity) in left.iter_mut().enumerate() {
-        // Which pixels agree is a coin toss at edges: no branches.
-        let d = *disparity;
-        let back = right.get(u.wrapping_sub(usize::from(d.unsigned_abs()))).copied().unwrap_or(NO_PLANE);
-        let (is_match, agrees) = (d != NO_PLANE, (back != NO_PLANE) & (back.abs_diff(d) <= threshold));
-        matched += u32::from(is_match);
-        contradicted += u32::from(is_match & !agrees);
-        *disparity = if is_match & agrees { d } else { NO_PLANE };
+    for (i, left) in left.chunks_mut(BLOCK).enumerate() {
+        // First what cannot be done many at a time.
+        let mut partners = [NO_PLANE; BLOCK];
+        for ((u, partner), d) in (i * BLOCK..).zip(&mut partners).zip(&*left) {
+            *partner = right.get(u.wrapping_sub(usize::from(d.unsigned_abs()))).copied().unwrap_or(NO_PLANE);
+        }
+        let (mut matched_here, mut contradicted_here) = (0u16, 0u16);
+        for (disparity, &back) in left.iter_mut().zip(&partners) {
+            // Which pixels agree is a coin toss at edges: no branches.
+            let d = *disparity;
+            let (is_match, agrees) = (d != NO_PLANE, (back != NO_PLANE) & (back.abs_diff(d) <= threshold));
+            matched_here += u16::from(is_match);
+            contradicted_here += u16::from(is_match & !agrees);
+            *disparity = if is_match & agrees { d } else { NO_PLANE };
+        }
+        matched += u32::from(matched_here);
+        contradicted += u32::from(contradicted_here);
     }
     [matched, contradicted]
 }

@@ -4,6 +4,7 @@
 //! candidate's key has the energy above and the disparity below, so that the least key is the least energy and, of equal ones, the smallest
 //! disparity. Borders, where not all eight can have the same candidates, go another and slower way.
 
+use super::{load, store};
 use crate::{
     part::part,
     sad::{Eight, KEY_SCALE_BITS, Kernels, LANES},
@@ -55,16 +56,20 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
         }
     }
 
-    /// Replaces the planes of pixels `u..`, eight or fewer, by disparities in px, or [`NO_PLANE`] where no plane lies, the image is without
-    /// texture or no disparity can be.
+    /// Replaces the planes of a row's pixels `u..`, eight or `count`, by disparities in px, or [`NO_PLANE`] where no plane lies, the image is
+    /// without texture or no disparity can be.
     #[inline(always)]
-    pub fn match_eight(&mut self, u: usize, listed: &[u32], planes: &mut [i16], kernels: &impl Kernels) {
+    #[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
+    pub fn match_eight(&mut self, u: usize, count: usize, listed: &[u32], row: &mut [i16], kernels: &impl Kernels) {
         let [spare, spare_other] = &mut self.spare;
         let points = eight(self.here, u, spare);
         let texture = kernels.sums(points, &UNTEXTURED);
+        let mut planes = load(row, u);
+        let count = count.min(LANES) as i32;
         let mut own = [NOTHING; LANES];
-        for ((own, &plane), &texture) in own.iter_mut().zip(&*planes).zip(&texture) {
-            *own = if texture < self.least_texture { NOTHING } else { i32::from(plane) };
+        for lane in 0..LANES {
+            let is_matched = (texture[lane] >= self.least_texture) & ((lane as i32) < count);
+            own[lane] = if is_matched { i32::from(planes[lane]) } else { NOTHING };
         }
         let mut best = [BARRED; LANES];
         if own != [NOTHING; LANES] {
@@ -78,9 +83,13 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
             let candidates = Candidates { points, u, reach, reach_min, reach_max };
             best = candidates.least_keys::<LEFT>(self.other, self.cost, listed, own, spare_other, kernels);
         }
-        for ((plane, own), best) in planes.iter_mut().zip(own).zip(best) {
-            *plane = if (own != NOTHING) & (best < BARRED) { (best & 255) as i16 } else { NO_PLANE };
+        for lane in 0..LANES {
+            let is_found = (own[lane] != NOTHING) & (best[lane] < BARRED);
+            let disparity = if is_found { (best[lane] & 255) as i16 } else { NO_PLANE };
+            // Beyond them are planes of the next cell.
+            planes[lane] = if (lane as i32) < count { disparity } else { planes[lane] };
         }
+        store(row, u, planes);
     }
 }
 
@@ -96,14 +105,11 @@ impl Candidates<'_> {
         spare: &mut Eight<Descriptor>,
         kernels: &impl Kernels,
     ) -> Eight<u32> {
-        let mut best = [BARRED; LANES];
-        self.consider::<LEFT>(other, listed.iter().copied(), &mut best, spare, kernels);
-        if let Some(keys) = self.least_about_planes::<LEFT>(other, cost, planes, kernels) {
-            best.iter_mut().zip(keys).for_each(|(best, key)| *best = key.min(*best));
-        } else {
-            self.consider_planes::<LEFT>(other, cost, planes, &mut best, spare, kernels);
+        let best = self.consider::<LEFT>(other, listed, spare, kernels);
+        match self.least_about_planes::<LEFT>(other, cost, planes, kernels) {
+            Some(keys) => lesser(best, keys),
+            None => self.consider_planes::<LEFT>(other, cost, planes, best, spare, kernels),
         }
-        best
     }
 
     /// The least keys about each pixel's own plane; `None` where some are at a border, or a pixel's least or greatest disparity.
@@ -117,13 +123,13 @@ impl Candidates<'_> {
         kernels: &impl Kernels,
     ) -> Option<Eight<u32>> {
         let radius = cost.radius as i32;
-        let (mut firsts, mut is_steep) = ([0; LANES], [false; LANES]);
+        let (mut firsts, mut steep) = ([0; LANES], [0; LANES]);
         let mut outside = false;
         for lane in 0..LANES {
             // Any will do for pixels that have no plane.
             let mean = if planes[lane] == NOTHING { radius } else { planes[lane] & 255 };
             firsts[lane] = mean - radius;
-            is_steep[lane] = planes[lane] >= i32::from(STEEP);
+            steep[lane] = if planes[lane] >= i32::from(STEEP) { u32::MAX } else { 0 };
             outside |= (mean < radius) | (mean + radius > self.reach[lane]);
         }
         if outside {
@@ -136,27 +142,38 @@ impl Candidates<'_> {
             let start = if LEFT { (self.u + lane).wrapping_sub(first + last) } else { self.u + lane + first };
             rows[lane] = other.get(start..)?.first_chunk()?;
         }
+        // What a candidate's distance is added to; about a steep plane, which is not preferred, all cost the same.
+        let lowered = |mut best: Eight<u32>, sums: Eight<u32>, step: usize, about: u32| {
+            let d = if LEFT { last - step } else { step } as u32;
+            let more = (cost.elsewhere - about) << 8;
+            for lane in 0..LANES {
+                let key = (sums[lane] << KEY_SCALE_BITS) + (about << 8) + d + firsts[lane] as u32 + (steep[lane] & more);
+                best[lane] = if key < best[lane] { key } else { best[lane] };
+            }
+            best
+        };
         let mut best = [BARRED; LANES];
-        for (step, about) in cost.about_plane.into_iter().enumerate() {
-            if step > last {
+        // Their number is odd: two by two, and the last one.
+        for (i, &[about, about_next]) in cost.about_plane.as_chunks().0.iter().enumerate() {
+            let step = 2 * i;
+            if step >= last {
                 break;
             }
-            let mut others = [&Descriptor::UNTEXTURED; LANES];
+            let mut twos = [&[Descriptor::UNTEXTURED; 2]; LANES];
             for lane in 0..LANES {
-                others[lane] = &rows[lane][step];
+                twos[lane] = rows[lane].get(step..)?.first_chunk()?;
             }
-            let sums = kernels.sums_of(self.points, others);
-            let d = if LEFT { last - step } else { step } as u32;
-            let [about, elsewhere] = [about, cost.elsewhere].map(|cost| (cost << 8) + d);
-            for lane in 0..LANES {
-                let base = if is_steep[lane] { elsewhere } else { about } + firsts[lane] as u32;
-                best[lane] = ((sums[lane] << KEY_SCALE_BITS) + base).min(best[lane]);
-            }
+            let [one, two] = kernels.sums_of_two(self.points, twos);
+            best = lowered(lowered(best, one, step, about), two, step + 1, about_next);
         }
-        Some(best)
+        let mut lasts = [&Descriptor::UNTEXTURED; LANES];
+        for lane in 0..LANES {
+            lasts[lane] = rows[lane].get(last)?;
+        }
+        Some(lowered(best, kernels.sums_of(self.points, lasts), last, *cost.about_plane.get(last)?))
     }
 
-    /// Lowers keys to those about each pixel's own plane, wherever they are.
+    /// The lesser of keys and of those about each pixel's own plane, wherever they are.
     #[cold]
     #[inline(never)]
     fn consider_planes<const LEFT: bool>(
@@ -164,10 +181,10 @@ impl Candidates<'_> {
         other: &[Descriptor],
         cost: &PlaneCost,
         planes: Eight<i32>,
-        best: &mut Eight<u32>,
+        mut best: Eight<u32>,
         spare: &mut Eight<Descriptor>,
         kernels: &impl Kernels,
-    ) {
+    ) -> Eight<u32> {
         let mut start = 0;
         while let Some(&plane) = planes.get(start) {
             let run = planes.iter().skip(start).take_while(|other| **other == plane).count();
@@ -178,45 +195,47 @@ impl Candidates<'_> {
                 let outside = usize::try_from(-first).unwrap_or_default();
                 // A key holds no greater disparity.
                 let within = first.max(0) as u32..=u32::from(DISPARITY_LIMIT);
-                let bases = within.zip(part(costs, outside..)).map(|(d, &cost)| (cost << 8) + d);
-                let mut keys = [BARRED; LANES];
-                self.consider::<LEFT>(other, bases, &mut keys, spare, kernels);
+                let mut bases = [0; PLANE_WIDTH];
+                let mut count = 0;
+                for ((base, d), &cost) in bases.iter_mut().zip(within).zip(part(costs, outside..)) {
+                    *base = (cost << 8) + d;
+                    count += 1;
+                }
+                let keys = self.consider::<LEFT>(other, part(&bases, ..count), spare, kernels);
                 best.iter_mut().zip(keys).skip(start).take(run).for_each(|(best, key)| *best = key.min(*best));
             }
             start += run;
         }
+        best
     }
 
-    /// Lowers keys to the least of candidates, each told by what its distance is added to for its key, in ascending order of disparity.
+    /// The least keys of candidates, each told by what its distance is added to for its key, in ascending order of disparity.
     #[inline(always)]
     fn consider<const LEFT: bool>(
         &self,
         other: &[Descriptor],
-        bases: impl Iterator<Item = u32> + Clone,
-        best: &mut Eight<u32>,
+        bases: &[u32],
         spare: &mut Eight<Descriptor>,
         kernels: &impl Kernels,
-    ) {
+    ) -> Eight<u32> {
         let column = |base: u32| {
             let d = base as usize & 255;
             if LEFT { self.u.wrapping_sub(d) } else { self.u + d }
         };
-        let mut keys = [BARRED; LANES];
-        let mut rest = bases.clone();
         // Away from the images' borders all pixels can have all disparities.
-        let mut border = None;
-        for base in rest.by_ref() {
-            let others =
-                if (base & 255) as i32 <= self.reach_min { other.get(column(base)..).and_then(|row| row.first_chunk()) } else { None };
-            let Some(others) = others else {
-                border = Some(base);
+        let is_whole = |base: &u32| (base & 255) as i32 <= self.reach_min;
+        let whole = if bases.last().is_none_or(is_whole) { bases.len() } else { bases.partition_point(is_whole) };
+        let mut keys = [BARRED; LANES];
+        let mut border = whole;
+        for (i, &base) in part(bases, ..whole).iter().enumerate() {
+            let Some(others) = other.get(column(base)..).and_then(|row| row.first_chunk()) else {
+                border = i;
                 break;
             };
             keys = kernels.least(keys, [self.points, others], base);
         }
-        let keys = kernels.ordered(keys);
-        best.iter_mut().zip(keys).for_each(|(best, key)| *best = key.min(*best));
-        for base in border.into_iter().chain(rest) {
+        let mut best = kernels.ordered(keys);
+        for &base in part(bases, border..) {
             let d = (base & 255) as i32;
             if d > self.reach_max {
                 break;
@@ -226,5 +245,16 @@ impl Candidates<'_> {
                 *best = if d > reach { *best } else { key.min(*best) };
             }
         }
+        best
     }
+}
+
+/// The lesser of each two keys.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
+fn lesser(mut a: Eight<u32>, b: Eight<u32>) -> Eight<u32> {
+    for lane in 0..LANES {
+        a[lane] = if b[lane] < a[lane] { b[lane] } else { a[lane] };
+    }
+    a
 }

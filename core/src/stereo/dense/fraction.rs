@@ -1,7 +1,7 @@
 //! Fractions of a pixel: where between the disparities beside it the distance has its least value, if it falls and rises with the same
 //! slope.
 
-use super::{NONE, WORKING_ONE_PX};
+use super::{NONE, WORKING_ONE_PX, load, store};
 use crate::{
     sad::{Eight, Kernels, LANES},
     stereo::{
@@ -16,25 +16,26 @@ const MOST: i32 = WORKING_ONE_PX as i32 / 2 - 1;
 
 /// Turns a left row of disparities in px, or [`NO_PLANE`], into working units, or [`NONE`].
 #[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
 pub(super) fn refine_row(config: &StereoConfig, here: &[Descriptor], other: &[Descriptor], row: &mut [i16], kernels: &impl Kernels) {
     let mut spare = UNTEXTURED;
-    for (i, disparities) in row.chunks_mut(LANES).enumerate() {
-        let mut px = [NO_PLANE; LANES];
-        px.iter_mut().zip(&*disparities).for_each(|(px, d)| *px = *d);
+    for u in (0..row.len()).step_by(LANES) {
+        let mut disparities = load(row, u);
         let mut fractions = [0; LANES];
-        if config.subpixel && px != [NO_PLANE; LANES] {
-            let u = i * LANES;
-            fractions = find_fractions(config, eight(here, u, &mut spare), other, (u, px), kernels);
+        if config.subpixel && disparities != [NO_PLANE; LANES] {
+            fractions = find_fractions(config, eight(here, u, &mut spare), other, (u, disparities), kernels);
         }
-        for ((to, px), fraction) in disparities.iter_mut().zip(px).zip(fractions) {
-            *to = if px == NO_PLANE { NONE } else { px * WORKING_ONE_PX + fraction as i16 };
+        for lane in 0..LANES {
+            let px = disparities[lane];
+            disparities[lane] = if px == NO_PLANE { NONE } else { px * WORKING_ONE_PX + fractions[lane] as i16 };
         }
+        store(row, u, disparities);
     }
 }
 
 /// The fractions of eight pixels from column `u` on, in working units; 0 for those whose disparity has no neighbours to compare it with.
 #[inline(always)]
-#[expect(clippy::indexing_slicing, reason = "steps are below three")]
+#[expect(clippy::indexing_slicing, reason = "steps are below three, lanes below eight")]
 fn find_fractions(
     config: &StereoConfig,
     points: &Eight<Descriptor>,
@@ -50,18 +51,27 @@ fn find_fractions(
             *window = three;
         }
     }
-    let distances = |step: usize| kernels.sums_of(points, windows.map(|window| &window[step]));
-    let (after, at, before) = (distances(0), distances(1), distances(2));
-    let mut fractions = [0; LANES];
-    let distances = before.into_iter().zip(at).zip(after);
-    for (lane, ((fraction, px), ((before, at), after))) in fractions.iter_mut().zip(px).zip(distances).enumerate() {
-        let (before, at, after, d) = (before as i32, at as i32, after as i32, i32::from(px));
+    let (mut twos, mut lasts) = ([&[Descriptor::UNTEXTURED; 2]; LANES], [&Descriptor::UNTEXTURED; LANES]);
+    for lane in 0..LANES {
+        if let Some((two, [last])) = windows[lane].split_first_chunk() {
+            (twos[lane], lasts[lane]) = (two, last);
+        }
+    }
+    let ([after, at], before) = (kernels.sums_of_two(points, twos), kernels.sums_of(points, lasts));
+    let (mut dividends, mut divisors, mut counts) = ([0; LANES], [1; LANES], [false; LANES]);
+    for lane in 0..LANES {
+        let (before, at, after, d) = (before[lane] as i32, at[lane] as i32, after[lane] as i32, i32::from(px[lane]));
         let reach = (u + lane) as i32 - MARGIN as i32;
         let reach = if reach < i32::from(config.disparity_max) { reach } else { i32::from(config.disparity_max) };
         let (least, rise) = if before < after { (before, after - at) } else { (after, before - at) };
-        // The operands are integers below 2^17: the quotient is that of whole numbers, once its fraction is cut off.
-        let offset = ((MOST * (before - after)) as f32 / (if rise > 1 { rise } else { 1 }) as f32) as i32;
-        *fraction = if (d >= 1) & (d < reach) & (least >= at) { offset } else { 0 };
+        // Below 2^17.
+        dividends[lane] = MOST * (before - after);
+        divisors[lane] = if rise > 1 { rise } else { 1 };
+        counts[lane] = (d >= 1) & (d < reach) & (least >= at);
+    }
+    let mut fractions = kernels.quotients(dividends, divisors);
+    for lane in 0..LANES {
+        fractions[lane] = if counts[lane] { fractions[lane] } else { 0 };
     }
     fractions
 }
