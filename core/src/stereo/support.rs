@@ -33,8 +33,8 @@ pub(super) const fn candidates(length: usize, step: usize) -> usize {
     if step == 0 { 0 } else { length.div_ceil(step) }
 }
 
-/// Costs looked through at once.
-const BLOCK: usize = 32;
+/// Costs looked through at once. As many as disparities are whole blocks.
+const BLOCK: usize = 16;
 
 /// What is needed to match rows of candidates: the gradients of both images.
 #[derive(Clone, Copy)]
@@ -156,19 +156,58 @@ impl SupportMatching<'_> {
         // At most 64 x 255 = 16,320, so that costs fit i16, whose minimum is one instruction everywhere.
         let mut costs = [[i16::MAX; LANES]; (DISPARITY_LIMIT as usize + 1) / LANES];
         other.costs(&point, first, part_mut(&mut costs, ..count.div_ceil(LANES)), kernels);
-        self.distinct(part(costs.as_flattened(), ..count)).map(|i| first + i)
+        let costs = costs.as_flattened_mut();
+        // What is beyond the columns was compared with them.
+        part_mut(costs, count..count.next_multiple_of(LANES)).fill(i16::MAX);
+        let (blocks, _) = costs.as_chunks_mut();
+        self.distinct(part_mut(blocks, ..count.div_ceil(BLOCK))).map(|i| first + i)
     }
 
-    /// Position of the least cost, if it passes the ratio test.
+    /// Position of the least cost, if it passes the ratio test. Costs near it are overwritten.
     #[inline(always)]
-    fn distinct(&self, costs: &[i16]) -> Option<usize> {
-        let least = |costs: &[i16]| costs.iter().fold(i16::MAX, |a, &b| a.min(b));
-        let best = least(costs);
-        // By blocks, as looking for equals in one is done many at a time.
-        let block = costs.chunks(BLOCK).position(|block| block.iter().fold(false, |found, &cost| found | (cost == best)))?;
-        let at = block * BLOCK + costs.get(block * BLOCK..)?.iter().position(|&cost| cost == best)?;
-        let before = costs.get(..at.saturating_sub(NEIGHBOURHOOD)).map_or(i16::MAX, least);
-        let after = costs.get(at + NEIGHBOURHOOD + 1..).map_or(i16::MAX, least);
-        (f32::from(best) < self.config.support_ratio * f32::from(before.min(after))).then_some(at)
+    fn distinct(&self, blocks: &mut [[i16; BLOCK]]) -> Option<usize> {
+        // By whole blocks, as many at a time as there are lanes.
+        let least = |blocks: &[[i16; BLOCK]]| blocks.as_flattened().iter().fold(i16::MAX, |a, &b| a.min(b));
+        let best = least(blocks);
+        let block = blocks.iter().position(|block| block.iter().fold(false, |found, &cost| found | (cost == best)))?;
+        let at = block * BLOCK + blocks.get(block)?.iter().position(|&cost| cost == best)?;
+        // The second best is sought in what is left.
+        for near in blocks.as_flattened_mut().iter_mut().take(at + NEIGHBOURHOOD + 1).skip(at.saturating_sub(NEIGHBOURHOOD)) {
+            *near = i16::MAX;
+        }
+        (f32::from(best) < self.config.support_ratio * f32::from(least(blocks))).then_some(at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::vec::Vec;
+
+    /// The twin: one cost at a time.
+    fn plain(costs: &[i16], ratio: f32) -> Option<usize> {
+        let (at, &best) = costs.iter().enumerate().min_by_key(|(_, cost)| **cost)?;
+        let others = costs.iter().enumerate().filter(|(i, _)| i.abs_diff(at) > NEIGHBOURHOOD);
+        let second = others.map(|(_, &cost)| cost).min().unwrap_or(i16::MAX);
+        (f32::from(best) < ratio * f32::from(second)).then_some(at)
+    }
+
+    #[test]
+    fn the_distinct_one_of_whole_blocks_is_that_of_one_cost_at_a_time() {
+        let config = StereoConfig::robotics();
+        let flat = Gradients { du: &[], dv: &[], width: 0, height: 0 };
+        let matching = SupportMatching { config: &config, left: flat, right: flat };
+        let mut random = Random::new(71);
+        let mut found = 0;
+        for count in (1..=256).chain(1..=256) {
+            let costs: Vec<i16> = (0..count).map(|_| 400 + random.below(40 + 4_000 * (count as u32 % 3)) as i16).collect();
+            let mut blocks = [[i16::MAX; BLOCK]; 256 / BLOCK];
+            blocks.as_flattened_mut()[..count].copy_from_slice(&costs);
+            let distinct = matching.distinct(&mut blocks[..count.div_ceil(BLOCK)]);
+            assert_eq!(distinct, plain(&costs, config.support_ratio));
+            found += u32::from(distinct.is_some());
+        }
+        assert!(found > 50 && found < 462, "{found} of 512 are distinct");
     }
 }
