@@ -17,13 +17,15 @@ pub(super) fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width:
         for (u, point) in row.iter_mut().enumerate().filter(|(_, point)| **point != NO_MATCH) {
             let (left, columns) = (u.saturating_sub(window), u.min(window) + window + 1);
             let alike = |other: &&i16| **other != NO_MATCH && other.abs_diff(*point) <= threshold;
-            let company: usize = before
-                .chunks_exact(width)
-                .skip(top)
-                .take(rows)
-                .map(|row| part(row, left..).iter().take(columns).filter(alike).count())
-                .sum();
-            if company < usize::from(config.plausible_min) {
+            let mut missing = usize::from(config.plausible_min);
+            for row in before.chunks_exact(width).skip(top).take(rows) {
+                missing = missing.saturating_sub(part(row, left..).iter().take(columns).filter(alike).count());
+                // Most have found enough after a row or two.
+                if missing == 0 {
+                    break;
+                }
+            }
+            if missing > 0 {
                 *point = NO_MATCH;
                 removed += 1;
             }
@@ -66,10 +68,12 @@ fn thin(config: &StereoConfig, grid: &mut [i16], start: usize, stride: usize, le
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
+    use std::{vec, vec::Vec};
 
     #[test]
     fn a_lonely_point_goes_and_a_cluster_stays() {
-        let mut grid = std::vec![NO_MATCH; 20 * 20];
+        let mut grid = vec![NO_MATCH; 20 * 20];
         for (u, v) in [(2, 2), (3, 2), (2, 3), (3, 3), (4, 4)] {
             grid[v * 20 + u] = 30 + u as i16;
         }
@@ -81,8 +85,32 @@ mod tests {
     }
 
     #[test]
+    fn the_implausible_are_those_whose_whole_window_has_too_few_alike() {
+        let config = StereoConfig::robotics();
+        let (window, threshold) = (config.plausible_window as i32, config.plausible_threshold);
+        let mut random = Random::new(72);
+        for (width, height, sparse) in [(23i32, 17i32, 4), (40, 9, 9), (5, 30, 2)] {
+            let before: Vec<i16> =
+                (0..width * height).map(|_| if random.below(sparse) > 0 { NO_MATCH } else { random.below(60) as i16 }).collect();
+            let mut grid = before.clone();
+            let removed = remove_implausible(&config, &mut grid, width as usize, &mut vec![0; before.len()]);
+            let at = |u: i32, v: i32| before[(v * width + u) as usize];
+            for (u, v) in (0..width).flat_map(|u| (0..height).map(move |v| (u, v))).filter(|&(u, v)| at(u, v) != NO_MATCH) {
+                let rows = (v - window).max(0)..(v + window + 1).min(height);
+                let columns = (u - window).max(0)..(u + window + 1).min(width);
+                let alike = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+                let alike = alike.filter(|&(x, y)| at(x, y) != NO_MATCH && at(x, y).abs_diff(at(u, v)) <= threshold).count();
+                let expected = if alike < usize::from(config.plausible_min) { NO_MATCH } else { at(u, v) };
+                assert_eq!(grid[(v * width + u) as usize], expected);
+            }
+            assert_eq!(removed as usize, before.iter().zip(&grid).filter(|(a, b)| a != b).count());
+            assert!(removed > 0 && grid.iter().any(|&d| d != NO_MATCH));
+        }
+    }
+
+    #[test]
     fn a_flat_wall_is_thinned_but_its_corners_stay() {
-        let mut grid = std::vec![12i16; 31 * 17];
+        let mut grid = vec![12i16; 31 * 17];
         let removed = remove_redundant(&StereoConfig::robotics(), &mut grid, 31);
         assert_eq!(removed as usize, grid.iter().filter(|&&d| d == NO_MATCH).count());
         for corner in [0, 30, 16 * 31, 16 * 31 + 30] {
