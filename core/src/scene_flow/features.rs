@@ -150,15 +150,19 @@ impl<'s> Features<'s> {
         }
         let low = [u_min, v_min].map(|x| x.min(usize::from(u16::MAX)) as u16);
         let span = [u_max - u_min, v_max - v_min].map(|x| x.min(usize::from(u16::MAX)) as u16);
-        let (mut best, mut best_difference) = (None, u32::MAX);
+        let mut best = Best::default();
+        let (mut origin, mut keys) = (0, [NO_FEATURE; LANES]);
         for band in first_band..=last_band {
             let row = (class * self.bands + band) * self.cells;
             let (Some(&from), Some(&to)) = (self.start.get(row + first_cell), self.start.get(row + last_cell + 1)) else { continue };
-            // No 4 x 4 px hold two features of a class: a band's offsets fit.
-            let end = to.saturating_sub(from);
-            let mut keys = [NO_FEATURE; LANES];
-            for offset in (0..end).step_by(LANES) {
-                let start = (from + offset) as usize;
+            // No 4 x 4 px hold two features of a class: a band's offsets fit, and mostly all bands'.
+            if band == first_band || to.saturating_sub(origin) >> OFFSET_BITS != 0 {
+                best.take(origin, keys);
+                (origin, keys) = (from, [NO_FEATURE; LANES]);
+            }
+            let end = to.saturating_sub(origin);
+            for offset in (from.saturating_sub(origin)..end).step_by(LANES) {
+                let start = (origin + offset) as usize;
                 let inside = |at| Inside { at, low, span, offset, end };
                 keys = match (chunk(self.at, start), chunk(self.descriptor, start)) {
                     (Some(at), Some(others)) => kernels.least_inside(keys, descriptor, others, &inside(at)),
@@ -168,13 +172,9 @@ impl<'s> Features<'s> {
                     }
                 };
             }
-            let key = keys.into_iter().fold(NO_FEATURE, |a, b| a.min(b));
-            if key >> OFFSET_BITS < best_difference && key != NO_FEATURE {
-                best_difference = key >> OFFSET_BITS;
-                best = Some((from + (key & ((1 << OFFSET_BITS) - 1))) as usize);
-            }
         }
-        best
+        best.take(origin, keys);
+        best.index
     }
 
     /// The set's last features from `start` on, fewer than eight, and others that mean nothing.
@@ -185,6 +185,27 @@ impl<'s> Features<'s> {
         eight.0.iter_mut().zip(self.at.iter().skip(start)).for_each(|(to, at)| *to = *at);
         eight.1.iter_mut().zip(self.descriptor.iter().skip(start)).for_each(|(to, descriptor)| *to = *descriptor);
         eight
+    }
+}
+
+/// The nearest feature so far.
+#[derive(Default)]
+struct Best {
+    index: Option<usize>,
+    /// Its key without the offset; what else there is counts if it is less.
+    difference: u32,
+}
+
+impl Best {
+    /// Takes in the least keys of features that are counted from `origin` on and come after those before.
+    #[inline(always)]
+    fn take(&mut self, origin: u32, keys: Eight<u32>) {
+        let key = keys.into_iter().fold(NO_FEATURE, |a, b| a.min(b));
+        let difference = key >> OFFSET_BITS;
+        if key != NO_FEATURE && (self.index.is_none() || difference < self.difference) {
+            self.difference = difference;
+            self.index = Some((origin + (key & ((1 << OFFSET_BITS) - 1))) as usize);
+        }
     }
 }
 
