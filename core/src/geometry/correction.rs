@@ -73,16 +73,18 @@ impl ColumnCorrection {
 
     /// Corrects a row of disparities, 1/256 px, 0 none. What would be less than 1/256 px after it
     /// becomes none. The lowest bit stays: it marks what the matcher filled in.
+    #[inline(always)]
     pub(crate) fn correct_row(&self, disparity_q8: &mut [u16]) {
         const ONE_PX: f32 = DISPARITY_ONE_PX as f32;
-        let mut u = 0.0;
-        for disparity in disparity_q8 {
+        const MOST: f32 = u16::MAX as f32;
+        for (u, disparity) in (0i32..).zip(disparity_q8) {
             let px = f32::from(*disparity) / ONE_PX;
-            // Casts saturate, so that values below 0 become 0, which is none.
-            let corrected = ((px + self.at(u - px)) * ONE_PX + 0.5) as u16;
+            let value = (px + self.at(u as f32 - px)) * ONE_PX + 0.5;
+            // What is below 0, and no number, becomes 0, which is none. A cast to 32 bits is one that vectors have.
+            let held = if value > 0.0 { value } else { 0.0 };
+            let corrected = (if held < MOST { held } else { MOST }) as i32 as u16;
             let (corrected, mark) = (corrected & !DISPARITY_FILLED, *disparity & DISPARITY_FILLED);
-            *disparity = if *disparity == 0 || corrected == 0 { 0 } else { corrected | mark };
-            u += 1.0;
+            *disparity = if (*disparity == 0) | (corrected == 0) { 0 } else { corrected | mark };
         }
     }
 }
@@ -90,6 +92,8 @@ impl ColumnCorrection {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
+    use std::vec::Vec;
 
     const RIG: StereoRig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
 
@@ -114,5 +118,23 @@ mod tests {
         let mut row = [65_535, 0];
         far.correct_row(&mut row);
         assert_eq!(row, [65_535, 0], "held at the end");
+    }
+
+    #[test]
+    fn a_row_equals_its_twin_one_cast_at_a_time() {
+        let mut random = Random::new(51);
+        for (offset_px, slope_px, quartic_px) in
+            [(0.0, 0.0, 0.0), (-0.7, 0.3, 0.2), (3.0, -40.0, 9.0), (-200.0, 1.0, 0.0), (f64::NAN, 0.0, 0.0)]
+        {
+            let correction = DisparityCorrection { offset_px, slope_px, quartic_px }.for_rig(&RIG);
+            let row: Vec<u16> = (0..1_301).map(|_| random.below(65_536).saturating_sub(random.below(2) * 65_000) as u16).collect();
+            let mut corrected = row.clone();
+            correction.correct_row(&mut corrected);
+            for (u, (&before, after)) in row.iter().zip(corrected).enumerate() {
+                let px = f32::from(before) / 256.0;
+                let plain = ((px + correction.at(u as f32 - px)) * 256.0 + 0.5) as u16 & !DISPARITY_FILLED;
+                assert_eq!(after, if before == 0 || plain == 0 { 0 } else { plain | before & DISPARITY_FILLED });
+            }
+        }
     }
 }

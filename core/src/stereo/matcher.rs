@@ -16,7 +16,7 @@ use crate::{
     geometry::ColumnCorrection,
     image::{DISPARITY_ONE_PX, InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
-    parallel::{BANDS, Bands, Executor, each},
+    parallel::{BANDS, Bands, Executor, Work, each},
     problem::Problems,
 };
 
@@ -43,6 +43,22 @@ pub struct StereoMatcher<'s> {
     image_height: usize,
     width: usize,
     height: usize,
+}
+
+/// Takes a disparity error out of rows.
+struct CorrectRows<'a> {
+    correction: ColumnCorrection,
+    rows: &'a mut [u16],
+    width: usize,
+}
+
+impl Work for CorrectRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.rows.chunks_exact_mut(self.width.max(1)).for_each(|row| self.correction.correct_row(row));
+    }
 }
 
 impl core::fmt::Debug for StereoMatcher<'_> {
@@ -221,7 +237,7 @@ impl<'s> StereoMatcher<'s> {
     pub(crate) fn correct<E: Executor>(&mut self, correction: ColumnCorrection, executor: &E) {
         let (width, height) = (self.width, self.height);
         each(executor, Bands::of(height).split_mut(self.disparity, width), |rows: &mut [u16]| {
-            rows.chunks_exact_mut(width.max(1)).for_each(|row| correction.correct_row(row));
+            executor.vectors().run(CorrectRows { correction, rows, width });
         });
     }
 
