@@ -4,6 +4,8 @@
 //! Planes are rasterised, triangle by triangle, into the image that will receive the disparities: no memory of their own. The grid prior is a
 //! set of 256 bits per cell.
 
+use crate::{parallel::Work, sad::LANES};
+
 use super::{
     StereoConfig,
     config::{DISPARITY_LIMIT, MAX_PLANE_RADIUS},
@@ -20,7 +22,25 @@ pub(super) const PLANE_WIDTH: usize = 2 * MAX_PLANE_RADIUS + 1;
 
 /// Rasterises the planes into image rows `first..` of `out`, `width` wide: the disparity in whole px, plus [`STEEP`], or [`NO_PLANE`].
 /// Triangles are rasterised to the pixels beyond their edges; the later one wins.
-pub(super) fn rasterise_planes(mesh: &Triangulation<'_>, slope_max: f32, first: usize, width: usize, out: &mut [i16]) {
+pub(super) struct RasterisePlanes<'a, 'm> {
+    pub mesh: &'a Triangulation<'m>,
+    pub slope_max: f32,
+    pub first: usize,
+    pub width: usize,
+    pub out: &'a mut [i16],
+}
+
+impl Work for RasterisePlanes<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        rasterise_planes(self);
+    }
+}
+
+#[inline(always)]
+fn rasterise_planes(RasterisePlanes { mesh, slope_max, first, width, out }: RasterisePlanes<'_, '_>) {
     out.fill(NO_PLANE);
     let width = width.max(1);
     let rows = out.len() / width;
@@ -71,6 +91,14 @@ impl Edge {
     }
 }
 
+/// A disparity, held at the ends of what there can be.
+#[inline(always)]
+fn held(disparity: i32) -> i16 {
+    const MOST: i32 = DISPARITY_LIMIT as i32;
+    let low = if disparity > 0 { disparity } else { 0 };
+    (if low < MOST { low } else { MOST }) as i16
+}
+
 /// d(u, v) = d0 + slope_u (u - u0) + slope_v (v - v0).
 struct Plane {
     origin: SupportPoint,
@@ -92,14 +120,23 @@ impl Plane {
     }
 
     /// Fills a run of row `v` from column `left`.
+    #[inline(always)]
     fn rasterise(&self, left: i64, v: i64, mark: i16, span: &mut [i16]) {
         let offset = self.slope_u * (left - i64::from(self.origin.u)) + self.slope_v * (v - i64::from(self.origin.v));
         let start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
         let slope = self.slope_u as i32;
         // Within a triangle all fits; a pixel beyond the edge of a very steep one may wrap, and its plane is not preferred anyway.
-        for (i, out) in span.iter_mut().enumerate() {
-            let disparity = start.wrapping_add(slope.wrapping_mul(i as i32)) >> SHIFT;
-            *out = disparity.clamp(0, i32::from(DISPARITY_LIMIT)) as i16 + mark;
+        // Spans are short: eight pixels at a time, in the end as many of them as there are.
+        for (i, out) in span.chunks_mut(LANES).enumerate() {
+            let mut pixels = [0; LANES];
+            for (lane, pixel) in pixels.iter_mut().enumerate() {
+                let disparity = start.wrapping_add(slope.wrapping_mul((i * LANES + lane) as i32)) >> SHIFT;
+                *pixel = held(disparity) + mark;
+            }
+            match out.first_chunk_mut() {
+                Some(all) => *all = pixels,
+                None => out.iter_mut().zip(pixels).for_each(|(to, from)| *to = from),
+            }
         }
     }
 }

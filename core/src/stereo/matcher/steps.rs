@@ -16,7 +16,7 @@ use crate::{
         gaps::Filling,
         gradient::GradientRows,
         invalid, median, prior,
-        prior::{CellGrid, DisparitySet, PlaneCost},
+        prior::{CellGrid, DisparitySet, PlaneCost, RasterisePlanes},
         smooth::{Along, Smooth},
         speckle,
         speckle::Scratch,
@@ -108,8 +108,9 @@ impl StereoMatcher<'_> {
         let (left_mesh, right_mesh) = (&self.left_mesh, &self.right_mesh);
         each(executor, jobs.each_mut(), |band| {
             if let Some(band) = band {
-                prior::rasterise_planes(left_mesh, config.plane_slope_max, band.first, width, band.left);
-                prior::rasterise_planes(right_mesh, config.plane_slope_max, band.first, width, band.right);
+                for (mesh, out) in [(left_mesh, &mut *band.left), (right_mesh, &mut *band.right)] {
+                    executor.vectors().run(RasterisePlanes { mesh, slope_max: config.plane_slope_max, first: band.first, width, out });
+                }
                 compare(executor.vectors(), MatchBand { matching: &matching, band });
             }
         });
