@@ -63,17 +63,22 @@ pub fn with_neon(work: impl Comparison) {
             let first = cast(sums(cast(*a), cast([b[0], c[0], d[0], e[0], f[0], g[0], h[0], i[0]])));
             [first, cast(sums(cast(*a), cast([b[1], c[1], d[1], e[1], f[1], g[1], h[1], i[1]])))]
         },
-        quotients: |dividends: Eight<i32>, divisors: Eight<i32>| {
-            let ([a, b], [c, d]): ([int32x4_t; 2], [int32x4_t; 2]) = (cast(dividends), cast(divisors));
-            let quotient = |a, b| vcvtq_s32_f32(vdivq_f32(vcvtq_f32_s32(a), vcvtq_f32_s32(b)));
-            cast([quotient(a, c), quotient(b, d)])
-        },
+        quotients: |dividends: Eight<i32>, divisors: Eight<i32>| quotients(dividends, divisors),
         least_inside,
         least,
         ordered: |keys: Eight<u32>| keys,
         costs,
     };
     run(work, &kernels);
+}
+
+/// Quotients whose fraction is cut off.
+#[inline]
+#[target_feature(enable = "neon")]
+fn quotients(dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32> {
+    let ([a, b], [c, d]): ([int32x4_t; 2], [int32x4_t; 2]) = (cast(dividends), cast(divisors));
+    let quotient = |a, b| vcvtq_s32_f32(vdivq_f32(vcvtq_f32_s32(a), vcvtq_f32_s32(b)));
+    cast([quotient(a, c), quotient(b, d)])
 }
 
 /// Closures compiled for a level are known to compilers by the traits they implement.

@@ -62,11 +62,7 @@ pub fn with_sse2(work: impl Comparison) {
                 let first = cast(sums(a, &[b[0], c[0], d[0], e[0], f[0], g[0], h[0], i[0]], 1));
                 [first, cast(sums(a, &[b[1], c[1], d[1], e[1], f[1], g[1], h[1], i[1]], 1))]
             },
-            quotients: |dividends: Eight<i32>, divisors: Eight<i32>| {
-                let ([a, b], [c, d]): ([__m128i; 2], [__m128i; 2]) = (cast(dividends), cast(divisors));
-                let quotient = |a, b| _mm_cvttps_epi32(_mm_div_ps(_mm_cvtepi32_ps(a), _mm_cvtepi32_ps(b)));
-                cast([quotient(a, c), quotient(b, d)])
-            },
+            quotients: |dividends: Eight<i32>, divisors: Eight<i32>| quotients_sse2(dividends, divisors),
             least_inside: |best: Eight<u32>, [first, second]: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>| {
                 let (first, second): (__m128i, __m128i) = (cast(*first), cast(*second));
                 let others: [[__m128i; 2]; 8] = cast(*others);
@@ -117,17 +113,7 @@ pub fn with_avx2(work: impl Comparison) {
         work,
         &Functions {
             sums: |a: &Eight<Descriptor>, b: &Eight<Descriptor>| cast(whole(sads(a, b))),
-            // Two descriptors from two places are not worth a register.
-            sums_of: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&Descriptor>| {
-                let a: Eight<__m128i> = cast(*a);
-                let sad = |a: __m128i, b: &Descriptor| _mm_sad_epu8(a, cast(*b));
-                let half = |[a, b, c, d]: [__m128i; 4]| {
-                    _mm_madd_epi16(_mm_packs_epi32(_mm_packs_epi32(a, b), _mm_packs_epi32(c, d)), _mm_set1_epi16(1))
-                };
-                let low = half([sad(a[0], b), sad(a[1], c), sad(a[2], d), sad(a[3], e)]);
-                let high = half([sad(a[4], f), sad(a[5], g), sad(a[6], h), sad(a[7], i)]);
-                cast([low, high])
-            },
+            sums_of: |a: &Eight<Descriptor>, b: Eight<&Descriptor>| sums_of_avx2(a, b),
             sums_of_two: |a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&[Descriptor; 2]>| {
                 let sad = |a: Descriptor, b: &[Descriptor; 2]| _mm256_sad_epu8(_mm256_broadcastsi128_si256(cast(a)), cast(*b));
                 // The sums of the first descriptors below those of the second.
@@ -135,10 +121,7 @@ pub fn with_avx2(work: impl Comparison) {
                 let high = scaled([sad(a[4], f), sad(a[5], g), sad(a[6], h), sad(a[7], i)], 1);
                 cast([_mm256_permute2x128_si256(low, high, 0x20), _mm256_permute2x128_si256(low, high, 0x31)])
             },
-            quotients: |dividends: Eight<i32>, divisors: Eight<i32>| {
-                let (a, b): (__m256i, __m256i) = (cast(dividends), cast(divisors));
-                cast(_mm256_cvttps_epi32(_mm256_div_ps(_mm256_cvtepi32_ps(a), _mm256_cvtepi32_ps(b))))
-            },
+            quotients: |dividends: Eight<i32>, divisors: Eight<i32>| quotients_avx2(dividends, divisors),
             least_inside: |best: Eight<u32>, sought: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>| {
                 let (sought, others): (__m256i, Eight<__m256i>) = (cast(*sought), cast(*others));
                 let sad = |other: __m256i| _mm256_sad_epu8(sought, other);
@@ -153,6 +136,36 @@ pub fn with_avx2(work: impl Comparison) {
             costs,
         },
     );
+}
+
+/// Sums of descriptors from anywhere: two from two places are not worth a register.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn sums_of_avx2(a: &Eight<Descriptor>, [b, c, d, e, f, g, h, i]: Eight<&Descriptor>) -> Eight<u32> {
+    let a: Eight<__m128i> = cast(*a);
+    let sad = |a: __m128i, b: &Descriptor| _mm_sad_epu8(a, cast(*b));
+    let half =
+        |[a, b, c, d]: [__m128i; 4]| _mm_madd_epi16(_mm_packs_epi32(_mm_packs_epi32(a, b), _mm_packs_epi32(c, d)), _mm_set1_epi16(1));
+    let low = half([sad(a[0], b), sad(a[1], c), sad(a[2], d), sad(a[3], e)]);
+    let high = half([sad(a[4], f), sad(a[5], g), sad(a[6], h), sad(a[7], i)]);
+    cast([low, high])
+}
+
+/// Quotients whose fraction is cut off.
+#[inline]
+#[target_feature(enable = "sse2")]
+fn quotients_sse2(dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32> {
+    let ([a, b], [c, d]): ([__m128i; 2], [__m128i; 2]) = (cast(dividends), cast(divisors));
+    let quotient = |a, b| _mm_cvttps_epi32(_mm_div_ps(_mm_cvtepi32_ps(a), _mm_cvtepi32_ps(b)));
+    cast([quotient(a, c), quotient(b, d)])
+}
+
+/// The same.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn quotients_avx2(dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32> {
+    let (a, b): (__m256i, __m256i) = (cast(dividends), cast(divisors));
+    cast(_mm256_cvttps_epi32(_mm256_div_ps(_mm256_cvtepi32_ps(a), _mm256_cvtepi32_ps(b))))
 }
 
 /// The lesser of each two.
