@@ -174,7 +174,7 @@ impl<'s> MaskStore<'s> {
     }
 
     /// 64 pixels of a row from column `u` on, the first in the lowest bit.
-    fn bits(&self, mask: &MaskHandle, u: i32, v: i32) -> u64 {
+    pub(crate) fn bits(&self, mask: &MaskHandle, u: i32, v: i32) -> u64 {
         if mask.stride == 0 {
             let inside = |i: i32| u64::from(mask.pixels.contains(u + i, v)) << i;
             return (0..WORD).map(inside).fold(0, |bits, bit| bits | bit);

@@ -25,18 +25,29 @@ pub(crate) const CROPS_MAX: usize = 128;
 const BIN: u16 = 128;
 
 /// How far an edge spoils what is behind it, px.
-const EDGE_REACH_PX: i32 = 3;
+const EDGE_REACH_PX: isize = 3;
 /// A neighbour nearer by more disparity than this is across an edge: within that distance a surface has no such step unless it is viewed
 /// edge-on.
 const EDGE_Q8: u16 = 384;
 
-/// Whether a pixel of that disparity lies just behind an edge.
-fn is_behind_edge(disparity_q8: View<'_, u16>, u: i32, v: i32, disparity: u16) -> bool {
-    let nearer = |u: i32, v: i32| {
-        let pixel = usize::try_from(u).ok().zip(usize::try_from(v).ok());
-        pixel.and_then(|(u, v)| disparity_q8.get(u, v)).is_some_and(|other| other > disparity.saturating_add(EDGE_Q8))
-    };
-    (1..=EDGE_REACH_PX).any(|px| nearer(u - px, v) || nearer(u + px, v) || nearer(u, v - px) || nearer(u, v + px))
+/// Columns worked on at once: a word of a mask.
+const BLOCK: usize = 64;
+
+/// The largest disparity within [`EDGE_REACH_PX`] along row and column of each pixel of a block that begins at (`u`, `v`).
+fn nearest_around(disparity_q8: View<'_, u16>, u: usize, v: usize) -> [u16; BLOCK] {
+    let mut nearest = [0; BLOCK];
+    for px in 1..=EDGE_REACH_PX {
+        let beside = [(px, 0), (-px, 0), (0, px), (0, -px)];
+        for (du, dv) in beside {
+            let row = v.checked_add_signed(dv).map_or(&[][..], |v| disparity_q8.row(v));
+            // What would lie left of the image is skipped.
+            let outside = du.min(0).unsigned_abs().saturating_sub(u).min(BLOCK);
+            let row = row.get(u.saturating_add_signed(du)..).unwrap_or(&[]);
+            let nearest = part_mut(&mut nearest, outside..);
+            nearest.iter_mut().zip(row).for_each(|(nearest, &other)| *nearest = if other > *nearest { other } else { *nearest });
+        }
+    }
+    nearest
 }
 
 /// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 outside the mask, just behind edges, and where the depth is
@@ -54,10 +65,13 @@ pub(super) fn crop(
     let mut found = Histogram::new();
     for (v, row) in (0..height.max(0) as usize).zip(disparities.chunks_exact_mut(width.max(1) as usize)) {
         let from = disparity_q8.row(top_v + v).get(left_u..).unwrap_or(&[]);
-        for ((u, to), &disparity) in (left..).zip(row.iter_mut()).zip(from) {
-            *to = if masks.contains(mask, u, top + v as i32) { disparity } else { 0 };
-            if *to > 0 {
-                found.add(usize::from(*to / BIN));
+        for ((u, row), from) in (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)).zip(from.chunks(BLOCK)) {
+            let bits = masks.bits(mask, u, top + v as i32);
+            for (i, (to, &disparity)) in row.iter_mut().zip(from).enumerate() {
+                *to = if bits >> i & 1 == 1 { disparity } else { 0 };
+                if *to > 0 {
+                    found.add(usize::from(*to / BIN));
+                }
             }
         }
     }
@@ -67,12 +81,19 @@ pub(super) fn crop(
         if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
     });
     let mut kept = 0;
-    for (v, row) in (top..top + height.max(0)).zip(disparities.chunks_exact_mut(width.max(1) as usize)) {
-        for (u, disparity) in (left..).zip(row) {
+    for (v, row) in (top_v..).zip(disparities.chunks_exact_mut(width.max(1) as usize)).take(height.max(0) as usize) {
+        for (u, block) in (left_u..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
             // A pixel without a disparity lies below `low`, or is 0.
-            let is_near = *disparity >= low && *disparity <= high;
-            *disparity = if is_near && !is_behind_edge(disparity_q8, u, v, *disparity) { *disparity } else { 0 };
-            kept += u32::from(*disparity > 0);
+            let is_kept = |disparity: u16| (disparity >= low) & (disparity <= high);
+            if !block.iter().fold(false, |any, &disparity| any | (is_kept(disparity) & (disparity > 0))) {
+                block.fill(0);
+                continue;
+            }
+            for (disparity, nearest) in block.iter_mut().zip(nearest_around(disparity_q8, u, v)) {
+                let is_behind_edge = nearest > disparity.saturating_add(EDGE_Q8);
+                *disparity = if is_kept(*disparity) & !is_behind_edge { *disparity } else { 0 };
+                kept += u32::from(*disparity > 0);
+            }
         }
     }
     kept

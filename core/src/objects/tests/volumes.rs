@@ -1,7 +1,7 @@
 //! What gets into an object's volume, and what goes out of it.
 
 use super::*;
-use crate::volume::BlockCoord;
+use crate::{masks::MaskHandle, volume::BlockCoord};
 
 const SMALL: Board = Board { half_m: [0.8, 0.5], ..Board::CAR };
 /// The same as a mask twice too wide shows it.
@@ -176,6 +176,66 @@ fn what_the_matcher_lets_run_on_behind_an_edge_is_left_out_and_a_slope_is_not() 
     assert_eq!(step(1.6), (0..17).chain(20..40).chain(43..54).collect::<Vec<_>>());
     assert_eq!(step(1.4), (0..54).collect::<Vec<_>>());
     assert_eq!(cropped(|u| 14.0 + 0.3 * f64::from(u)), (0..54).collect::<Vec<_>>(), "the side of a car seen from behind");
+}
+
+/// A crop the obvious way: pixel by pixel.
+fn plain_crop(extent_m: f64, disparity: View<'_, u16>, is_set: impl Fn(i32, i32) -> bool, pixels: &PixelBox) -> Vec<u16> {
+    let at = |u: i32, v: i32| usize::try_from(u).ok().zip(usize::try_from(v).ok()).and_then(|(u, v)| disparity.get(u, v)).unwrap_or(0);
+    let places = (0..pixels.area() as i32).map(|i| (pixels.left + i % pixels.width, pixels.top + i / pixels.width));
+    let masked: Vec<_> = places.map(|(u, v)| (u, v, if is_set(u, v) { at(u, v) } else { 0 })).collect();
+    let mut known: Vec<u16> =
+        masked.iter().map(|pixel| pixel.2 / 128).zip(&masked).filter(|(_, pixel)| pixel.2 > 0).map(|(bin, _)| bin).collect();
+    known.sort_unstable();
+    let bin = if known.is_empty() { 0 } else { known[known.len() / 2] };
+    let depth_m = RIG.focal_baseline_px_m() / ((f64::from(bin) + 0.5) * 0.5);
+    let is_near = |disparity: u16| {
+        let disparity = f64::from(disparity);
+        let of = |depth_m: f64| RIG.focal_baseline_px_m() / depth_m * 256.0;
+        disparity >= of(depth_m + extent_m).floor() && (depth_m <= extent_m || disparity <= of(depth_m - extent_m).floor())
+    };
+    let is_behind_edge = |u: i32, v: i32, disparity: u16| {
+        let nearer = |u: i32, v: i32| i32::from(at(u, v)) > i32::from(disparity) + 384;
+        (1..=3).any(|px| nearer(u - px, v) || nearer(u + px, v) || nearer(u, v - px) || nearer(u, v + px))
+    };
+    let kept = |&(u, v, disparity): &(i32, i32, u16)| if is_near(disparity) && !is_behind_edge(u, v, disparity) { disparity } else { 0 };
+    masked.iter().map(kept).collect()
+}
+
+#[test]
+fn crops_equal_those_cut_pixel_by_pixel() {
+    let mut random = Random::new(5);
+    let mut kept = 0;
+    for round in 0..200 {
+        let mut level = 0;
+        let disparity: Vec<u16> = (0..WIDTH * HEIGHT)
+            .map(|_| {
+                level = if random.below(12) == 0 { 1_000 + random.below(1 + round * 15) } else { level };
+                if random.below(30) == 0 { 0 } else { (level + random.below(200)) as u16 }
+            })
+            .collect();
+        let disparity = View::new(&disparity, WIDTH, HEIGHT).unwrap();
+        let mut span = |size: usize| {
+            let first = random.below(size as u32 / 2);
+            let last = if random.below(3) == 0 { size as u32 } else { first + 1 + random.below(size as u32 / 2) };
+            [first as i32, (last - if random.below(3) == 0 { 0 } else { first }).min(size as u32 - first) as i32]
+        };
+        let ([left, width], [top, height]) = (span(WIDTH), span(HEIGHT));
+        let pixels = PixelBox { left, top, width, height };
+        let mut words = vec![0; 8 * HEIGHT];
+        let mut store = MaskStore::new(&mut words);
+        let boxed = round % 4 == 0;
+        let mask = if boxed { MaskHandle::full(pixels) } else { store.alloc(pixels).unwrap() };
+        if !boxed {
+            let bits: Vec<u8> = (0..WIDTH * HEIGHT).map(|_| u8::from(random.below(8) > 0)).collect();
+            (0..HEIGHT).for_each(|v| store.set_row(&mask, v as i32, 0, &bits[v * WIDTH..][..WIDTH]));
+        }
+        let mut crop = vec![7u16; pixels.area() as usize];
+        let count = crop::crop(&RIG, 3.0, disparity, &store, &mask, &mut crop);
+        assert_eq!(crop, plain_crop(3.0, disparity, |u, v| store.contains(&mask, u, v), &pixels), "round {round}");
+        assert_eq!(count as usize, crop.iter().filter(|disparity| **disparity > 0).count());
+        kept += count;
+    }
+    assert!(kept > 10_000, "{kept}");
 }
 
 #[test]
