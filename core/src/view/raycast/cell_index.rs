@@ -19,9 +19,6 @@ const BEYOND: u32 = 2 * INSIDE;
 /// Steps from one voxel to the next along each axis.
 const VOXEL_STRIDES: [usize; 3] = [1, 8, 64];
 
-/// Voxels from a cell's first corner to each of them.
-pub(super) const CORNER_STRIDES: [usize; 8] = [0, 1, 8, 9, 64, 65, 72, 73];
-
 /// How a cell's faces across one axis are laid out.
 #[derive(Debug)]
 pub(super) struct CellFace {
@@ -138,17 +135,11 @@ impl CellIndex {
         (block, Self { at: self.at & (INSIDE - INSIDE / 8) | INSIDE })
     }
 
-    /// What of a block begins with the cell's first corner and ends with its last, where all corners lie in the block:
-    /// [`CORNER_STRIDES`] tells them.
-    #[inline(always)]
-    pub fn window<T>(self, voxels: &[T; BLOCK_VOXELS]) -> Option<&[T; 74]> {
-        voxels.get(self.voxel()..)?.first_chunk()
-    }
-
     /// The corners of a cell whose corners all lie in the block.
     #[inline(always)]
     pub fn corner_values<T: Copy>(self, voxels: &[T; BLOCK_VOXELS]) -> Option<[T; 8]> {
-        let window = self.window(voxels)?;
+        // From the cell's first corner to its last.
+        let window: &[T; 74] = voxels.get(self.voxel()..)?.first_chunk()?;
         Some([window[0], window[1], window[8], window[9], window[64], window[65], window[72], window[73]])
     }
 }

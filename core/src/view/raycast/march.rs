@@ -2,9 +2,10 @@
 
 use super::{
     cell::{Corners, Field, NO_AXIS, RaySegment, mean, within},
-    cell_index::{CORNER_STRIDES, CellFace, CellIndex, FACES},
+    cell_index::{CellFace, CellIndex, FACES},
+    colour::{self, Colour},
     ray_camera::{Depth, Ray, RayCamera, depth_from_m, depth_in_m},
-    surface::Surface,
+    surface::{NONE, Surface},
 };
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks, Slot};
 
@@ -71,6 +72,27 @@ struct PreviousSample {
     depth: Depth,
 }
 
+/// The cell in which a ray met the surface last: those of the pixels beside it often meet it in the same.
+pub(super) struct SeenCell {
+    /// The block's.
+    slot: Slot,
+    cell: CellIndex,
+    field: Field,
+    colours: [Colour; 8],
+}
+
+impl SeenCell {
+    /// None yet.
+    pub fn none() -> Self {
+        Self {
+            slot: NONE,
+            cell: CellIndex::new([0; 3]),
+            field: Field::new(&[0.0; 8]),
+            colours: Default::default(),
+        }
+    }
+}
+
 /// Where the surface was met.
 struct Crossing<'a> {
     slots: &'a [Slot; 8],
@@ -86,7 +108,7 @@ impl Marcher<'_, '_> {
     /// The first point between two depths at which the ray comes from seen free space through the surface.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "a layer is below 8, axes are below 3")]
-    pub fn cast(&self, u: usize, v: usize, [from_m, to_m]: [f32; 2]) -> Option<Hit> {
+    pub fn cast(&self, u: usize, v: usize, [from_m, to_m]: [f32; 2], seen: &mut SeenCell) -> Option<Hit> {
         let ray = &self.ray_camera.ray(u, v);
         let (mut from, last) = (depth_from_m(from_m), depth_from_m(to_m));
         let [delta_x, delta_y, delta_z] =
@@ -120,8 +142,8 @@ impl Marcher<'_, '_> {
                 if layer.crossed >> bit & 1 == 1 && to > from {
                     let fully_observed = layer.fully_observed >> bit & 1 == 1;
                     let step = Step { cell, fully_observed, from, to, axes: [entered, axis] };
-                    if let Some(crossing) = self.through(&block_context, step, &mut previous) {
-                        return (crossing.depth_m <= to_m).then(|| self.hit(&crossing));
+                    if let Some(crossing) = self.through(&block_context, step, &mut previous, seen) {
+                        return (crossing.depth_m <= to_m).then(|| self.hit(&crossing, seen));
                     }
                 }
                 match axis {
@@ -147,7 +169,13 @@ impl Marcher<'_, '_> {
     /// Looks for the surface in a crossed cell: the field must fall from above 0 to 0 or below.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    fn through<'h>(&self, block_context: &BlockContext<'h>, step: Step, previous: &mut PreviousSample) -> Option<Crossing<'h>> {
+    fn through<'h>(
+        &self,
+        block_context: &BlockContext<'h>,
+        step: Step,
+        previous: &mut PreviousSample,
+        seen: &mut SeenCell,
+    ) -> Option<Crossing<'h>> {
         let axis = step.axes[1];
         let last = self.face_value(block_context, step, axis, step.to, block_context.ray.ahead[axis] as u32);
         let before = core::mem::replace(previous, PreviousSample { value: last, depth: step.to });
@@ -155,7 +183,7 @@ impl Marcher<'_, '_> {
             return None;
         }
         let first = self.first_value(block_context, step, before);
-        if first > 0.0 { self.crossing(block_context, step, first, last) } else { None }
+        if first > 0.0 { self.crossing(block_context, step, [first, last], seen) } else { None }
     }
 
     /// The field where the ray enters a cell.
@@ -234,20 +262,25 @@ impl Marcher<'_, '_> {
 
     /// The point in a cell at which the field falls to 0.
     #[inline(never)]
-    fn crossing<'h>(&self, block_context: &BlockContext<'h>, step: Step, first: f32, last: f32) -> Option<Crossing<'h>> {
-        let field = Field::new(&self.corners(block_context, step)?);
+    fn crossing<'h>(
+        &self,
+        block_context: &BlockContext<'h>,
+        step: Step,
+        [first, last]: [f32; 2],
+        seen: &mut SeenCell,
+    ) -> Option<Crossing<'h>> {
+        let (slots, cell) = (block_context.slots, step.cell);
+        if seen.slot != slots[0] || seen.cell != cell {
+            let field = Field::new(&self.corners(block_context, step)?);
+            *seen = SeenCell { slot: slots[0], cell, field, colours: self.corner_colours(slots, cell) };
+        }
+        let field = &seen.field;
         let segment = segment(block_context, step);
-        let share = segment.root(&field, first, last);
+        let share = segment.root(field, first, last);
         let point = segment.at(share);
         let (from_m, to_m) = (depth_in_m(step.from), depth_in_m(step.to));
         let depth_m = from_m + (to_m - from_m) * share;
-        Some(Crossing {
-            slots: block_context.slots,
-            cell: step.cell,
-            gradient: field.gradient(point),
-            point,
-            depth_m,
-        })
+        Some(Crossing { slots, cell, gradient: field.gradient(point), point, depth_m })
     }
 
     #[inline]
@@ -282,82 +315,34 @@ impl Marcher<'_, '_> {
 
     /// Turns a crossing into what the images keep.
     #[inline]
-    fn hit(&self, crossing: &Crossing<'_>) -> Hit {
+    #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
+    fn hit(&self, crossing: &Crossing<'_>, seen: &SeenCell) -> Hit {
         let gradient = crossing.gradient;
         let [right, down, forward] = self.ray_camera.rotation.map(|row| row[0] * gradient[0] + row[1] * gradient[1] + row[2] * gradient[2]);
         let length = libm::sqrtf(right * right + down * down + forward * forward);
         let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
-        let (colour, weight) = self.colour(crossing);
+        let nearest = crossing.cell.plus(CellIndex::steps(crossing.point.map(|c| u32::from(c >= 0.5))));
+        let weight = self.blocks.weight(crossing.slots[nearest.block() & 7]).map_or(0, |weights| weights[nearest.voxel() & 511]);
         Hit {
             depth_m: crossing.depth_m,
             normal: [right * scale, down * scale, forward * scale],
-            colour,
+            colour: colour::mean(&seen.colours, crossing.point),
             weight,
         }
     }
 
-    /// The mean of the coloured corners, by nearness in 256ths, and the weight of the nearest.
-    #[inline(never)]
+    /// The colours at the corners of a cell.
+    #[inline]
     #[expect(clippy::indexing_slicing, reason = "the masks keep blocks below 8 and voxels below 512")]
-    fn colour(&self, crossing: &Crossing<'_>) -> ([u8; 3], u8) {
-        let (cell, slots) = (crossing.cell, crossing.slots);
-        let nearest = cell.plus(CellIndex::steps(crossing.point.map(|c| u32::from(c >= 0.5))));
-        let weight = self.blocks.weight(slots[nearest.block() & 7]).map_or(0, |weights| weights[nearest.voxel() & 511]);
-        let mut colours = Colours::default();
-        let counts = counts(crossing.point);
-        if cell.shares_block(CellIndex::FAR) {
-            let window = |plane| CellIndex::window(cell, plane);
-            if let Some([red, green, blue]) = self.blocks.colour(slots[0])
-                && let (Some(red), Some(green), Some(blue)) = (window(red), window(green), window(blue))
-            {
-                for (corner, stride) in CORNER_STRIDES.into_iter().enumerate() {
-                    colours.add([red[stride], green[stride], blue[stride]], counts[corner]);
-                }
-            }
-        } else {
-            for (point, count) in cell.corners().into_iter().zip(counts) {
-                if let Some([red, green, blue]) = self.blocks.colour(slots[point.block() & 7]) {
-                    let voxel = point.voxel() & 511;
-                    colours.add([red[voxel], green[voxel], blue[voxel]], count);
-                }
+    fn corner_colours(&self, slots: &[Slot; 8], cell: CellIndex) -> [Colour; 8] {
+        let mut colours = [Colour::default(); 8];
+        for (colour, point) in colours.iter_mut().zip(cell.corners()) {
+            if let Some([red, green, blue]) = self.blocks.colour(slots[point.block() & 7]) {
+                let voxel = point.voxel() & 511;
+                *colour = Colour::new([red[voxel], green[voxel], blue[voxel]]);
             }
         }
-        (colours.mean(), weight)
-    }
-}
-
-/// What each corner of a cell counts at a point in it, in 256ths.
-#[inline(always)]
-fn counts(point: [f32; 3]) -> [u32; 8] {
-    let [x, y, z] = [(point[0] * 256.0) as i32 as u32, (point[1] * 256.0) as i32 as u32, (point[2] * 256.0) as i32 as u32];
-    let (nx, ny, nz) = (256 - x, 256 - y, 256 - z);
-    let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
-    let count = |area: u32, height: u32| (area * height) >> 16;
-    [count(a, nz), count(b, nz), count(c, nz), count(d, nz), count(a, z), count(b, z), count(c, z), count(d, z)]
-}
-
-/// Red, green and blue summed at once, 20 bits each: counts of 256 in all make sums below 2^16.
-#[derive(Default)]
-struct Colours {
-    sum: u64,
-    total: u32,
-}
-
-impl Colours {
-    #[inline(always)]
-    fn add(&mut self, [red, green, blue]: [u8; 3], count: u32) {
-        let colour = u64::from(red) | u64::from(green) << 20 | u64::from(blue) << 40;
-        self.sum += colour * u64::from(count);
-        // All 0 is no colour.
-        self.total += if colour == 0 { 0 } else { count };
-    }
-
-    /// The mean; sums are so small that a float's division rounds as an integer's.
-    #[inline(always)]
-    fn mean(&self) -> [u8; 3] {
-        let scale = if self.total > 0 { 1.0 / self.total as f32 } else { 0.0 };
-        let channel = |shift: u32| ((self.sum >> shift & 0xF_FFFF) as i32 as f32 * scale + 0.5) as i32 as u8;
-        [channel(0), channel(20), channel(40)]
+        colours
     }
 }
 

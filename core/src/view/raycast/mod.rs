@@ -20,6 +20,7 @@
 
 mod cell;
 mod cell_index;
+mod colour;
 mod config;
 mod march;
 mod ranges;
@@ -40,7 +41,7 @@ use crate::{
     volume::{Slot, Viewpoint, Volume},
 };
 use core::fmt;
-use march::Marcher;
+use march::{Marcher, SeenCell};
 use ranges::Ranges;
 use ray_camera::RayCamera;
 use surface::Surface;
@@ -308,7 +309,7 @@ fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: Layer, band: Band
         .zip(band.normal.chunks_mut(width))
         .zip(band.colour.chunks_mut(width).zip(band.weight.chunks_mut(width)))
         .zip(band.layer.chunks_mut(width));
-    let mut hits = 0;
+    let (mut hits, mut seen) = (0, SeenCell::none());
     for (v, (((depth_m, normal), (colour, weight)), layers)) in (band.first_row..).zip(images) {
         let ranges = ranges.row(v);
         let pixels = depth_m.iter_mut().zip(normal).zip(colour.iter_mut().zip(weight)).zip(layers).enumerate();
@@ -316,7 +317,7 @@ fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: Layer, band: Band
             let nearer = |than_m: f32| matches!(layer, Layer::Ground) || *depth_m == 0.0 || than_m < *depth_m;
             // A ray meets nothing before its range begins.
             let range = ranges.get(u >> ranges::TILE_SHIFT).filter(|range| range[0] <= range[1] && nearer(range[0]));
-            let hit = range.and_then(|&range| marcher.cast(u, v, range)).filter(|hit| nearer(hit.depth_m));
+            let hit = range.and_then(|&range| marcher.cast(u, v, range, &mut seen)).filter(|hit| nearer(hit.depth_m));
             match (hit, layer) {
                 (Some(hit), _) => {
                     *depth_m = hit.depth_m;

@@ -86,3 +86,35 @@ fn agrees_to_the_bit_with_a_walk_through_every_cell() {
     }
     assert!(hits > 10_000, "{hits}");
 }
+
+#[test]
+fn what_is_kept_of_a_cell_changes_no_pixel() {
+    let (mut hits, mut kept) = (0, 0);
+    for (seed, view) in (0..).zip([at([0.0; 3], [0.0; 3]), at([0.1, -0.4, 0.2], [0.9, -0.3, 0.2])]) {
+        let volume = rough(seed);
+        let mut caster = raycaster(6_000, &RaycastConfig::default());
+        caster.cast(&volume, &view, &Serial).unwrap();
+        let ray_camera = RayCamera::new(&view, VOXEL_M).unwrap();
+        let marcher = Marcher {
+            surface: &caster.surface,
+            blocks: volume.blocks(),
+            ray_camera: &ray_camera,
+            min_weight: 1,
+        };
+        let mut before = [0; 3];
+        for at in 0..160 * 96 {
+            let (u, v) = (at % 160, at / 160);
+            let range = caster.ranges.row(v)[u >> ranges::TILE_SHIFT];
+            let hit = if range[0] <= range[1] { marcher.cast(u, v, range, &mut SeenCell::none()) } else { None };
+            let shown = (caster.depth_m[at], caster.normal[at], caster.colour[at], caster.weight[at]);
+            let alone = hit.map(|hit| (hit.depth_m, hit.normal.map(|c| (c * NORMAL_ONE) as i8), hit.colour, hit.weight));
+            assert_eq!(shown, alone.unwrap_or_default(), "scene {seed}, pixel {u} {v}");
+            hits += u32::from(alone.is_some());
+            let point = AXES.map(|axis| ray_camera.origin[axis] + ray_camera.ray(u, v).slope[axis] * shown.0);
+            let cell = point.map(|c| c.floor() as i32);
+            kept += u32::from(alone.is_some() && cell == before);
+            before = cell;
+        }
+    }
+    assert!(hits > 10_000 && kept > 1_000, "{hits} {kept}");
+}
