@@ -72,13 +72,16 @@ impl Records {
         Ok(())
     }
 
-    /// Changes all records in their order, and writes what has changed.
+    /// Changes each record once, and writes what has changed: first what is in memory, so that no more is read than is not.
     pub fn finish(mut self, mut change: impl FnMut(&mut [u8])) -> io::Result<File> {
-        for at in 0..self.len {
-            self.change(at, &mut change)?;
-        }
-        for slot in 0..CHUNKS {
-            self.write(slot)?;
+        let in_memory: Vec<u64> = self.chunks.iter().flatten().map(|chunk| chunk.number).collect();
+        let read = (0..self.len.div_ceil(CHUNK_RECORDS)).filter(|number| !in_memory.contains(number));
+        for number in in_memory.iter().copied().chain(read) {
+            let size = self.size;
+            let chunk = self.chunk(number * CHUNK_RECORDS)?;
+            chunk.changed = true;
+            chunk.bytes.chunks_exact_mut(size).for_each(&mut change);
+            self.write(number as usize % CHUNKS)?;
         }
         Ok(self.file)
     }

@@ -12,6 +12,10 @@ use std::path::{Path, PathBuf};
 
 /// Vertices remembered for sharing.
 const WINDOW: usize = 1 << 19;
+/// Those of them that are looked at first, since they fit the processor's fastest memory. A divisor of [`WINDOW`].
+const LATEST: usize = 1 << 10;
+/// Bytes of faces written at once.
+const FACES: usize = 1 << 17;
 /// Digits of a count in the header.
 const DIGITS: usize = 10;
 /// Bytes of a vertex: position and normal of three floats, three bytes of colour, the weight, the object's number.
@@ -57,6 +61,9 @@ impl Mesh {
     }
 }
 
+/// A vertex as bits (position; colour and weight), and the number of the record behind its own. All 0 where there is none.
+type Recent = [u32; 5];
+
 /// Writes one PLY.
 pub struct PlyWriter {
     vertices: Records,
@@ -65,7 +72,13 @@ pub struct PlyWriter {
     axes: Axes,
     vertex_count_at: u64,
     face_count_at: u64,
-    window: Vec<Option<(MeshVertex, u32)>>,
+    /// Recent vertices, each in the slot of its hash. Untouched slots cost no memory.
+    window: Vec<Recent>,
+    /// The vertices that entered the window last, or were found in it, each in the slot of its hash. What leaves the window leaves this too: the slot of
+    /// the one decides that of the other.
+    latest: Vec<Recent>,
+    /// Vertices written before the object: they are not its own.
+    others: u32,
     /// Number of the object that triangles belong to; 0 for the static map.
     object: u32,
     mesh: Mesh,
@@ -101,12 +114,14 @@ impl PlyWriter {
         let faces = options().open(&faces_path)?;
         Ok(Self {
             vertices: Records::new(file, start, 0, VERTEX_BYTES),
-            faces: BufWriter::new(faces),
+            faces: BufWriter::with_capacity(FACES, faces),
             faces_path,
             axes,
             vertex_count_at,
             face_count_at,
-            window: vec![None; WINDOW],
+            window: vec![[0; 5]; WINDOW],
+            latest: vec![[0; 5]; LATEST],
+            others: 0,
             object: 0,
             mesh: Mesh::default(),
             failed: None,
@@ -116,8 +131,7 @@ impl PlyWriter {
     /// Triangles from here on belong to an object: the number of its track.
     pub fn begin_object(&mut self, number: u32) {
         self.object = number;
-        // Its vertices are its own.
-        self.window.fill(None);
+        self.others = self.vertices.len().try_into().unwrap_or(u32::MAX);
     }
 
     /// Adds a triangle. [`PlyWriter::finish`] returns a failure, so that callbacks need no error path.
@@ -146,13 +160,23 @@ impl PlyWriter {
 
     /// The position of a vertex in the file; it is written if it is not among the recent ones.
     fn index_of(&mut self, vertex: MeshVertex) -> io::Result<u32> {
-        let key = vertex.position_m.iter().fold(0u32, |key, value| (key ^ value.to_bits()).wrapping_mul(0x9E37_79B1).rotate_left(13));
-        let slot = &mut self.window[key as usize % WINDOW];
-        if let Some((_, index)) = slot.filter(|(known, _)| *known == vertex) {
+        let MeshVertex { position_m: [x, y, z], colour: [red, green, blue], weight } = vertex;
+        let bits = [x.to_bits(), y.to_bits(), z.to_bits(), u32::from_le_bytes([red, green, blue, weight])];
+        let key = bits[..3].iter().fold(0u32, |key, bits| (key ^ bits).wrapping_mul(0x9E37_79B1).rotate_left(13)) as usize;
+        let known = |[x, y, z, rest, next]: Recent| ([x, y, z, rest] == bits && next > self.others).then(|| next.wrapping_sub(1));
+        let latest = &mut self.latest[key % LATEST];
+        if let Some(index) = known(*latest) {
             return Ok(index);
         }
-        let index = u32::try_from(self.vertices.len()).map_err(|_| io::Error::other("a PLY holds at most 2^32 vertices"))?;
-        *slot = Some((vertex, index));
+        let slot = &mut self.window[key % WINDOW];
+        if let Some(index) = known(*slot) {
+            *latest = *slot;
+            return Ok(index);
+        }
+        let next = u32::try_from(self.vertices.len() + 1).map_err(|_| io::Error::other("a PLY holds at most 2^32 - 1 vertices"))?;
+        *slot = [bits[0], bits[1], bits[2], bits[3], next];
+        *latest = *slot;
+        let index = next - 1;
         let MeshVertex { position_m, colour, weight } = vertex;
         let mut record = [0; VERTEX_BYTES];
         for (bytes, value) in record.chunks_exact_mut(4).zip(position_m) {
