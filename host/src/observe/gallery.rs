@@ -1,6 +1,6 @@
 //! Pictures of some frames and of the finished map as files, for the viewer: a fixed number, however long the run.
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, keyframes, pictures, spread};
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
 use crate::scene::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -105,17 +105,11 @@ fn folder(setup: &Setup<'_>) -> PathBuf {
 /// Writes the pictures of a frame. One that cannot be made leaves no file.
 fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
     std::fs::create_dir_all(folder).map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
-    let t_world_camera = frame.row.report.t_world_camera;
     let disparity_q8 = frame.view.mapper().disparity_q8();
     let masks = pictures::masks(frame.view.mapper(), disparity_q8.width(), disparity_q8.height());
-    let disparity = pictures::jpeg(&pictures::disparity(&disparity_q8));
-    let composed = pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera);
-    let map = composed
-        .or_else(|| pictures::map(pictures::SMALL_PX, frame.view, &t_world_camera))
-        .as_ref()
-        .map(pictures::jpeg)
-        .unwrap_or_default();
-    let left = keyframes::left(frame).as_ref().map(pictures::jpeg).unwrap_or_default();
+    let composed = frame.composed_jpeg();
+    let map = if composed.is_empty() { frame.map_jpeg() } else { composed };
+    let (left, disparity) = (frame.left_jpeg(), frame.disparity_jpeg());
     let number = frame.row.frame;
     for (kind, picture) in PictureKind::ALL.into_iter().zip([left, masks, disparity, map]) {
         if !picture.is_empty() {

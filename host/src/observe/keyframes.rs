@@ -1,9 +1,6 @@
 //! Pictures of some frames, and of the finished map.
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
-use crate::formats::Image;
-use dynvox_core::geometry::Transform;
-use image::RgbImage;
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, spread};
 use serde::{Deserialize, Serialize};
 
 /// Frames shown in the report.
@@ -67,28 +64,16 @@ impl Observer for KeyframesObserver {
     }
 }
 
-/// The left image of a frame: in colour where that lies on the image that was matched.
-pub(super) fn left(frame: &FrameContext<'_, '_>) -> Option<RgbImage> {
-    let rectified = frame.view.mapper().rectified_pair().map(|[left, _]| left);
-    let colour = frame.images.colour.as_ref().filter(|_| rectified.is_none()).and_then(Image::view);
-    let grey = rectified.or_else(|| frame.images.left.view())?;
-    Some(pictures::input(&grey, colour.as_ref()))
-}
-
-/// A picture as a JPEG file; empty without a picture.
-fn jpeg(picture: Option<RgbImage>) -> Vec<u8> {
-    picture.as_ref().map(pictures::jpeg).unwrap_or_default()
-}
-
 fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
-    let t_world_camera: Transform = frame.row.report.t_world_camera;
-    let input_jpeg = jpeg(Some(left(frame)?));
-    let disparity_jpeg = jpeg(Some(pictures::disparity(&frame.view.mapper().disparity_q8())));
+    let (input_jpeg, disparity_jpeg, raycast_jpeg) = (frame.left_jpeg(), frame.disparity_jpeg(), frame.map_jpeg());
+    if input_jpeg.is_empty() || raycast_jpeg.is_empty() {
+        return None;
+    }
     Some(Keyframe {
         frame: frame.row.frame,
         input_jpeg,
         disparity_jpeg,
-        raycast_jpeg: pictures::jpeg(&pictures::map(pictures::SMALL_PX, frame.view, &t_world_camera)?),
-        composed_jpeg: jpeg(pictures::composed(pictures::SMALL_PX, frame.view, &t_world_camera)),
+        raycast_jpeg,
+        composed_jpeg: frame.composed_jpeg(),
     })
 }

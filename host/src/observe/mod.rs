@@ -7,6 +7,7 @@ mod bounds;
 mod chart_values;
 mod frame;
 mod frame_log;
+mod frame_pictures;
 mod gallery;
 mod growing_file;
 mod health;
@@ -34,6 +35,7 @@ pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
 pub use chart_values::{ChartValues, Charted};
 pub use frame::{FrameRow, STAGES, StageTime};
 pub use frame_log::{FrameLog, StageStatistics};
+pub use frame_pictures::FramePictures;
 pub use gallery::GalleryObserver;
 pub use growing_file::GrowingFile;
 pub use health::{HealthObserver, HealthSection};
@@ -151,6 +153,8 @@ pub struct FrameContext<'a, 's> {
     pub evicted: &'a HashSet<BlockCoord>,
     /// The map.
     pub view: &'a mut dyn MapView<'s>,
+    /// Pictures of it that were made already.
+    pub pictures: FramePictures,
 }
 
 /// The end of a run: every frame is mapped, and the map is still in memory.

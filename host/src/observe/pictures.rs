@@ -39,9 +39,17 @@ pub fn png(picture: &RgbImage) -> Vec<u8> {
     file(|out| PngEncoder::new(out).write_image(picture, picture.width(), picture.height(), ExtendedColorType::Rgb8))
 }
 
-/// A picture as a JPEG file.
+/// A picture as a JPEG file: without planes of colour where it has none, which show the same pixels.
 pub fn jpeg(picture: &RgbImage) -> Vec<u8> {
-    file(|out| JpegEncoder::new_with_quality(out, JPEG_QUALITY).encode_image(picture))
+    let grey: Option<Vec<u8>> = picture.pixels().map(|&Rgb([red, green, blue])| (red == green && green == blue).then_some(red)).collect();
+    let (width, height) = picture.dimensions();
+    file(|out| {
+        let encoder = JpegEncoder::new_with_quality(out, JPEG_QUALITY);
+        match grey {
+            Some(grey) => encoder.write_image(&grey, width, height, ExtendedColorType::L8),
+            None => encoder.write_image(picture, width, height, ExtendedColorType::Rgb8),
+        }
+    })
 }
 
 /// What an encoder writes. A picture that cannot be encoded is left out of the report.
@@ -248,4 +256,18 @@ fn turbo(share: f32) -> [u8; 3] {
         polynomial([0.106_673_3, 12.641_946, -60.582_048, 110.362_77, -89.903_11, 27.348_25]),
     ]
     .map(|value| (value.clamp(0.0, 1.0) * 255.0) as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grey_picture_shows_the_same_with_and_without_planes_of_colour() {
+        let grey = RgbImage::from_fn(75, 41, |u, v| Rgb([(u * u + 3 * v * v + u * v) as u8; 3]));
+        let [one_plane, three_planes] = [jpeg(&grey), file(|out| JpegEncoder::new_with_quality(out, JPEG_QUALITY).encode_image(&grey))];
+        let [one, three] = [&one_plane, &three_planes].map(|bytes| image::load_from_memory(bytes).unwrap());
+        assert_eq!((one.color().channel_count(), three.color().channel_count()), (1, 3));
+        assert!(one.into_rgb8() == three.into_rgb8() && one_plane.len() < three_planes.len());
+    }
 }

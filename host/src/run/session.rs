@@ -8,7 +8,8 @@ use super::view::LiveMap;
 use super::{FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes, stereo_frame};
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
-    EndContext, FrameContext, FrameRow, ObserveError, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy, from_first, overview,
+    EndContext, FrameContext, FramePictures, FrameRow, ObserveError, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy,
+    from_first, overview,
 };
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
@@ -191,6 +192,7 @@ impl<'p, 's> Session<'p, 's> {
             retired: &retired,
             evicted: &evicted,
             view: &mut view,
+            pictures: FramePictures::default(),
         };
         let observed = observers.frame(&self.setup, &mut context);
         row.stages[Stage::Raycast as usize] = view.first_raycast.unwrap_or_default();

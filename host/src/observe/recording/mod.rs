@@ -4,7 +4,7 @@
 mod messages;
 mod schemas;
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup, keyframes, pictures};
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup, frame_pictures, pictures};
 use dynvox_core::geometry::Transform;
 use dynvox_core::view::RaycastView;
 use mcap::records::MessageHeader;
@@ -82,7 +82,7 @@ impl Recording {
         self.note_pose(frame.position, &t_world_camera);
         self.write(Topic::Transform, time_ns, &messages::transform(stamp, &t_world_camera))?;
         self.write(Topic::Pose, time_ns, &messages::pose(stamp, &t_world_camera))?;
-        if let Some(left) = keyframes::left(frame) {
+        if let Some(left) = frame_pictures::left(frame) {
             self.write(
                 Topic::Calibration,
                 time_ns,
@@ -90,7 +90,7 @@ impl Recording {
             )?;
             self.write(Topic::Left, time_ns, &messages::image(stamp, &pictures::jpeg(&left)))?;
         }
-        let disparity = pictures::jpeg(&pictures::disparity(&frame.view.mapper().disparity_q8()));
+        let disparity = frame.disparity_jpeg();
         self.write(Topic::Disparity, time_ns, &messages::image(stamp, &disparity))?;
         self.write(Topic::Objects, time_ns, &messages::objects(stamp, frame.view.mapper()))?;
         self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
