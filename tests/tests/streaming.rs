@@ -1,6 +1,6 @@
 //! A map that outgrows its pool, with a file for the blocks that leave.
 
-use dynvox::run::store::{BlockFile, mesh};
+use dynvox::run::store::{BlockFile, PoolAndFile, mesh};
 use dynvox_core::objects::NoSink;
 use dynvox_core::volume::{BlockStore, NoStore};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, Severity};
@@ -61,6 +61,13 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let evicted = sum(&reports, |report| report.allocation.eviction.kept);
     assert!(evicted > 2_000, "{evicted} blocks left: the pool is outgrown");
     assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0);
+    let (mut cube, mut in_place) = (HeapSlab::of(&Capacity::TINY), Vec::new());
+    let (how, memory) = ((&config.volume, &config.mesh), (cube.bytes(), false));
+    let mut source = PoolAndFile::new(mapper.background(), &mut store);
+    let count = mesh::triangles(&mut source, how, memory, &hashbrown::HashSet::new(), &mut |triangle| {
+        in_place.push(bits(triangle.map(|corner| (corner.position_m, corner.colour))));
+    });
+    assert_eq!(count.ok(), Some(in_place.len() as u64));
     mapper.stream_out(&mut store);
     drop(mapper);
     let count =
@@ -69,6 +76,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
         });
     assert_eq!(count.ok(), Some(streamed.len() as u64));
     assert!(unbounded.len() > 100_000, "{} triangles", unbounded.len());
+    assert!(in_place == streamed, "the pool's blocks where they are, and stored first, in one order");
     unbounded.sort_unstable();
     streamed.sort_unstable();
     assert!(unbounded == streamed, "{} triangles against {}", unbounded.len(), streamed.len());

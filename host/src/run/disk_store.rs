@@ -1,10 +1,12 @@
 //! The store of evicted blocks during a run, and the mesh made of pool and store.
 
 use super::map_objects::{MapObjects, add_objects};
-use super::store::{self, BlockFile, Position, StoreError};
+use super::store::{self, BlockFile, PoolAndFile, Position, StoreError};
 use super::{FolderError, RunFolder};
 use crate::formats::{Axes, MAP_FILE, Mesh, MeshVertex, PlyWriter};
 use crate::observe::{StoreStats, weighed_triangles};
+use crate::slab::HostSlab;
+use dynvox_core::memory::SlabError;
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
 use dynvox_core::{Capacity, Config, Mapper};
 use hashbrown::HashSet;
@@ -88,27 +90,40 @@ pub struct MeshOutput {
     /// Or why there is no file.
     ply: std::io::Result<PlyWriter>,
     store: DiskStore,
+    /// Whether blocks of the file are not in the mesh yet.
+    file_is_due: bool,
     /// Blocks that are in the mesh already.
     meshed: HashSet<BlockCoord>,
+    failed: Option<std::io::Error>,
     report: EvictionReport,
 }
 
 impl MeshOutput {
-    /// Begins `map.ply`. Meshes the pool's blocks when none was evicted and the file is not kept, or when nothing more can be stored; otherwise evicts
-    /// them to the store.
-    pub fn begin(mapper: &mut Mapper<'_>, (mut store, streaming): (DiskStore, Option<Streaming>), folder: &RunFolder, axes: Axes) -> Self {
+    /// Begins `map.ply`. Where the file of blocks is kept, the pool's blocks are evicted to it; otherwise they are meshed where they are, with those of
+    /// the file around them.
+    pub fn begin(
+        mapper: &mut Mapper<'_>,
+        (mut store, streaming): (DiskStore, Option<Streaming>),
+        folder: &RunFolder,
+        (axes, colour): (Axes, bool),
+    ) -> Self {
         let mut ply = PlyWriter::begin_in(&folder.file(MAP_FILE), "the first camera", axes);
-        let mut report = EvictionReport::default();
-        let mut meshed = HashSet::new();
+        let (mut report, mut meshed, mut failed) = (EvictionReport::default(), HashSet::new(), None);
         let keeps_file = streaming.is_some_and(|streaming| streaming.keep_file);
-        if store.file.as_ref().is_none_or(|file| file.records() == 0 && !keeps_file || file.failure().is_some()) {
-            let volume = mapper.background();
-            weighed_triangles(volume, &mapper.config().mesh, |_| true, &mut |corners| add(&mut ply, corners));
-            meshed.extend(volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)));
-        } else {
-            report = mapper.stream_out(&mut store);
+        let mut file_is_due = true;
+        match store.file.as_mut().filter(|file| (file.records() > 0 || keeps_file) && file.failure().is_none()) {
+            None => {
+                let volume = mapper.background();
+                weighed_triangles(volume, &mapper.config().mesh, |_| true, &mut |corners| add(&mut ply, corners));
+                meshed.extend(volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)));
+            }
+            Some(file) if !keeps_file => {
+                failed = pool_and_file(mapper, (file, colour), &mut ply).err();
+                file_is_due = false;
+            }
+            Some(_) => report = mapper.stream_out(&mut store),
         }
-        Self { ply, store, meshed, report }
+        Self { ply, store, file_is_due, meshed, failed, report }
     }
 
     /// Adds the stored blocks, reading them piece by piece into `slab`, and the objects, and ends the file. What cannot be written leaves no file, and the reason.
@@ -119,12 +134,14 @@ impl MeshOutput {
         (folder, objects): (&RunFolder, MapObjects),
     ) -> (Result<Mesh, FolderError>, StoreStats) {
         let mut stats = StoreStats { end: self.report, failure: self.store.failure(), ..StoreStats::default() };
-        let mut failed = None;
+        let mut failed = self.failed;
         if let Some(file) = self.store.file.as_mut() {
             let ply = &mut self.ply;
             let (how, memory) = ((&config.volume, &config.mesh), (slab, capacity.colour));
-            let meshed = store::mesh::triangles(file, how, memory, &self.meshed, &mut |corners| add(ply, corners));
-            failed = meshed.err().map(|error| std::io::Error::other(format!("the slab is too small for a piece of the map: {error:?}")));
+            if self.file_is_due {
+                let meshed = store::mesh::triangles(file, how, memory, &self.meshed, &mut |corners| add(ply, corners));
+                failed = meshed.err().map(too_small);
+            }
             (stats.records, stats.bytes, stats.unreadable) = (file.records(), file.bytes(), file.unreadable());
         }
         let written = failed.map_or(Ok(()), Err).and_then(|()| {
@@ -140,6 +157,23 @@ impl MeshOutput {
         });
         (written, stats)
     }
+}
+
+/// Adds the mesh of a mapper's pool and of the blocks that were evicted from it.
+fn pool_and_file(
+    mapper: &Mapper<'_>,
+    (file, colour): (&mut BlockFile<File>, bool),
+    ply: &mut std::io::Result<PlyWriter>,
+) -> std::io::Result<()> {
+    let mut slab = HostSlab::map(store::mesh::slab_bytes(colour)).ok_or(std::io::ErrorKind::OutOfMemory)?;
+    let (how, memory) = ((&mapper.config().volume, &mapper.config().mesh), (slab.bytes_mut(), colour));
+    let mut source = PoolAndFile::new(mapper.background(), file);
+    let meshed = store::mesh::triangles(&mut source, how, memory, &HashSet::new(), &mut |corners| add(ply, corners));
+    meshed.map(drop).map_err(too_small)
+}
+
+fn too_small(error: SlabError) -> std::io::Error {
+    std::io::Error::other(format!("the slab is too small for a piece of the map: {error:?}"))
 }
 
 fn add(ply: &mut std::io::Result<PlyWriter>, corners: [MeshVertex; 3]) {

@@ -91,7 +91,7 @@ fn map<'p>(plan: &'p Plan, slab: &mut [u8], folder: &'p RunFolder, checkpoint: O
         regions: mapper.footprint().regions().to_vec(),
         blocks: mapper.background().pool().len(),
         pruned,
-        output: MeshOutput::begin(&mut mapper, (store, plan.streaming), folder, plan.export.axes),
+        output: MeshOutput::begin(&mut mapper, (store, plan.streaming), folder, (plan.export.axes, plan.capacity.colour)),
         incomplete,
         setup,
         state,

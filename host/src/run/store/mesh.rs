@@ -1,12 +1,12 @@
-//! A map on disk as triangles, cube by cube: in memory at once are a cube of 8 blocks a side and the layer behind it.
+//! A map outside a pool as triangles, cube by cube: in memory at once are a cube of 8 blocks a side and the layer behind it.
 
-use super::BlockFile;
+use super::{BlockFile, Tile};
 use crate::formats::MeshVertex;
 use crate::observe::weighed_triangles;
 use dynvox_core::Capacity;
 use dynvox_core::memory::{Carver, SlabError};
 use dynvox_core::view::MeshConfig;
-use dynvox_core::volume::{BlockCoord, NoStore, Volume, VolumeConfig};
+use dynvox_core::volume::{BlockCoord, BlockStore, NoStore, Volume, VolumeConfig};
 use hashbrown::HashSet;
 use std::io::{Read, Seek, Write};
 
@@ -28,14 +28,38 @@ const fn cube_capacity(colour: bool) -> Capacity {
 
 const _: () = assert!(Volume::bytes(&cube_capacity(true)) < Capacity::TINY.bytes(), "any profile's slab is large enough for a cube");
 
+/// Blocks that are read tile by tile.
+pub trait BlockSource: BlockStore {
+    /// The tiles in which there are blocks, ascending.
+    fn tiles(&self) -> Vec<Tile>;
+
+    /// The blocks in a tile, ascending.
+    fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord>;
+}
+
+impl<F: Read + Write + Seek> BlockSource for BlockFile<F> {
+    fn tiles(&self) -> Vec<Tile> {
+        Self::tiles(self)
+    }
+
+    fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord> {
+        Self::blocks_of(self, tile)
+    }
+}
+
+/// Bytes of the slab that a cube needs.
+pub fn slab_bytes(colour: bool) -> usize {
+    Volume::bytes(&cube_capacity(colour))
+}
+
 /// Hands the triangles of all blocks in `store` but those in `without` to `sink`, in an order that depends on the blocks alone. `slab` holds
 /// a cube at a time: any profile's is large enough. Returns the number of triangles.
 ///
 /// # Errors
 ///
 /// A slab too small.
-pub fn triangles<F: Read + Write + Seek>(
-    store: &mut BlockFile<F>,
+pub fn triangles(
+    store: &mut impl BlockSource,
     (volume, mesh): (&VolumeConfig, &MeshConfig),
     (slab, colour): (&mut [u8], bool),
     without: &HashSet<BlockCoord>,

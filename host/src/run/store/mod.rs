@@ -3,9 +3,11 @@
 mod block_index;
 mod file;
 pub mod mesh;
+mod pool;
 mod record;
 #[cfg(test)]
 mod tests;
 
 pub use block_index::Tile;
 pub use file::{BlockFile, Opened, Position, StoreError};
+pub use pool::PoolAndFile;
