@@ -181,8 +181,8 @@ fn what_the_matcher_lets_run_on_behind_an_edge_is_left_out_and_a_slope_is_not() 
 /// A crop the obvious way: pixel by pixel.
 fn plain_crop(extent_m: f64, disparity: View<'_, u16>, is_set: impl Fn(i32, i32) -> bool, pixels: &PixelBox) -> Vec<u16> {
     let at = |u: i32, v: i32| usize::try_from(u).ok().zip(usize::try_from(v).ok()).and_then(|(u, v)| disparity.get(u, v)).unwrap_or(0);
-    let places = (0..pixels.area() as i32).map(|i| (pixels.left + i % pixels.width, pixels.top + i / pixels.width));
-    let masked: Vec<_> = places.map(|(u, v)| (u, v, if is_set(u, v) { at(u, v) } else { 0 })).collect();
+    let pixels_of_box = (0..pixels.area() as i32).map(|i| (pixels.left + i % pixels.width, pixels.top + i / pixels.width));
+    let masked: Vec<_> = pixels_of_box.map(|(u, v)| (u, v, if is_set(u, v) { at(u, v) } else { 0 })).collect();
     let mut known: Vec<u16> =
         masked.iter().map(|pixel| pixel.2 / 128).zip(&masked).filter(|(_, pixel)| pixel.2 > 0).map(|(bin, _)| bin).collect();
     known.sort_unstable();

@@ -61,7 +61,7 @@ impl Mesh {
     }
 }
 
-/// A vertex as bits (position; colour and weight), and the number of the record behind its own. All 0 where there is none.
+/// A vertex as bits (position; colour and weight), and the number of the record behind its own. All 0 where no vertex was seen.
 type Recent = [u32; 5];
 
 /// Writes one PLY.
