@@ -22,8 +22,8 @@ const CORRELATION_MIN: f64 = 0.25;
 const ASIDE_M: f64 = 0.5;
 /// How far around what the map shows, to the left and to the right, it must, rad.
 const ASIDE_RAD: f64 = 0.04;
-/// How much less: factor on the correlation. Small images change little over half a metre.
-const CORRELATION_FACTOR: f64 = 1.05;
+/// How much less: factor on signal to noise. Small images change little over half a metre.
+const SIGNAL_FACTOR: f64 = 1.07;
 /// Least share of the image that the map must show.
 const SHOWN_MIN: f64 = 0.1;
 /// How often the pose is refined.
@@ -76,7 +76,7 @@ impl Localization<'_, '_> {
         let (correlation, t_world_camera, depth_m) = best;
         let is_less_like = |aside: &Transform| {
             let there = self.correlation_at(grey, &(t_world_camera * *aside).normalized(), executor);
-            correlation >= CORRELATION_FACTOR * there.unwrap_or(0.0)
+            is_clearer(correlation, there.unwrap_or(0.0))
         };
         let ahead = |way_m: f64| Transform::from_translation([0.0, 0.0, way_m]);
         let around = |angle_rad: f64| ahead(depth_m) * Transform::new([0.0, angle_rad, 0.0], [0.0; 3]) * ahead(-depth_m);
@@ -96,6 +96,12 @@ impl Localization<'_, '_> {
         let (sum, count) = depths.fold((0.0, 0u32), |(sum, count), &depth_m| (sum + f64::from(depth_m), count + 1));
         sum / f64::from(count.max(1))
     }
+}
+
+/// Whether one correlation says that signal to noise is larger by the factor than the other says. Two images of one scene with noise of their own
+/// correlate by S / (S + N): near 1 a small step of correlation is a large one of signal to noise.
+fn is_clearer(correlation: f64, other: f64) -> bool {
+    correlation * (1.0 - other) >= SIGNAL_FACTOR * other * (1.0 - correlation)
 }
 
 /// The correlation of brightness differences, across and down, of a picture with a grey image of its size; `None` where the picture, which is
@@ -140,6 +146,12 @@ mod tests {
 
     const WIDTH: usize = 64;
     const HEIGHT: usize = 32;
+
+    #[test]
+    fn a_small_step_of_a_high_correlation_is_clear() {
+        assert!(is_clearer(0.7, 0.68) && !is_clearer(0.3, 0.29), "1.1 and 1.05 times the signal");
+        assert!(is_clearer(0.3, 0.28) && is_clearer(0.3, -0.2) && !is_clearer(0.68, 0.7));
+    }
 
     #[test]
     fn an_image_is_like_itself_brighter_or_darker_and_unlike_itself_moved() {
