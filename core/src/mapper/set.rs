@@ -160,7 +160,7 @@ section!(disparity_correction: DisparityCorrection { offset_px, slope_px, quarti
 section!(stereo: StereoConfig {
     disparity_max, support_ratio, support_texture, candidate_step, plausible_window, plausible_threshold, plausible_min, redundant_distance,
     redundant_threshold, grid_size, beta, gamma, sigma, plane_radius_sigmas, plane_slope_max, match_texture, subpixel, consistency_threshold,
-    speckle_similarity, speckle_size, gap_width, gap_discontinuity, gap_ends,
+    speckle_similarity, speckle_size, lone_share, lone_gap, gap_width, gap_discontinuity, gap_ends,
     adaptive_mean, median,
 });
 section!(scene_flow: SceneFlowConfig {

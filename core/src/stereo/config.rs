@@ -79,14 +79,20 @@ pub struct StereoConfig {
     pub speckle_similarity: u16,
     /// Segments smaller than this are removed, px; 0 or 1 keeps all. Published: 200.
     pub speckle_size: u32,
+    /// Lone segments smaller than this share of the image are removed as well: no pixel of another one that is as similar is within `lone_gap`
+    /// px along a row or column. 0..=1; 0 keeps all. 0.002 (docs/decisions/0043-lone-segments.md); published: 0.
+    pub lone_share: f32,
+    /// Widest gap between two segments of which none is lone, px; at most `gap_width` of it counts. 32.
+    pub lone_gap: usize,
     /// Widest gap filled along rows and columns, px; 0 fills none. 70; published: 3; DynSLAM: 21.
     pub gap_width: usize,
     /// Ends of a gap that differ by less than this are one surface, px. Published: 3.
     pub gap_discontinuity: u16,
     /// What fills a gap between two surfaces. Nothing; published: the farther one.
     pub gap_ends: GapEnds,
-    /// Whether an edge-preserving mean smooths the result; published: yes. It also yields fractions of a pixel.
-    pub adaptive_mean: bool,
+    /// How often an edge-preserving mean smooths the result, 0..=4. It also yields fractions of a pixel. 2
+    /// (docs/decisions/0043-lone-segments.md); published: 1.
+    pub adaptive_mean: u8,
     /// Whether a 3 x 3 median follows. Published: no.
     pub median: bool,
 }
@@ -115,10 +121,12 @@ impl StereoConfig {
             consistency_threshold: 2,
             speckle_similarity: 1,
             speckle_size: 200,
+            lone_share: 0.0,
+            lone_gap: 32,
             gap_width: 3,
             gap_discontinuity: 3,
             gap_ends: GapEnds::Farther,
-            adaptive_mean: true,
+            adaptive_mean: 1,
             median: false,
         }
     }
@@ -144,7 +152,10 @@ impl StereoConfig {
         let radius = self.sigma * self.plane_radius_sigmas;
         check((0.0..=MAX_PLANE_RADIUS as f32).contains(&radius), "stereo.plane_radius_sigmas", "times sigma must be within 0..=16 px");
         check((0.0..=1e3).contains(&self.plane_slope_max), "stereo.plane_slope_max", "must be within 0..=1000");
+        check((0.0..=1.0).contains(&self.lone_share), "stereo.lone_share", "must be within 0..=1");
+        check(self.lone_gap <= 4_096, "stereo.lone_gap", "must be at most 4096 px");
         check(self.gap_width <= 4_096, "stereo.gap_width", "must be at most 4096 px");
+        check(self.adaptive_mean <= 4, "stereo.adaptive_mean", "must be at most 4");
     }
 
     /// Disparities searched to each side of the prior plane, px.
@@ -159,8 +170,10 @@ impl Default for StereoConfig {
             support_ratio: 0.9,
             gamma: 6.0,
             consistency_threshold: 1,
+            lone_share: 0.002,
             gap_width: 70,
             gap_ends: GapEnds::Surface,
+            adaptive_mean: 2,
             ..Self::robotics()
         }
     }

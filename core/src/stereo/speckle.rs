@@ -4,7 +4,7 @@
 //! the sizes. Where runs end is remembered, so that a second walk over runs, not pixels, blanks the small ones. Memory: six bytes a pixel
 //! (in the worst case each is a run) and two a column. Time: one walk over the image in bytes side by side, and one over its runs.
 
-use super::dense::NONE;
+use super::dense::{FILLED, NONE};
 
 /// Working memory.
 pub(super) struct Scratch<'a> {
@@ -54,16 +54,26 @@ impl Runs<'_> {
     }
 }
 
-/// Blanks segments of fewer than `smallest` pixels in an image `width` wide; neighbours differ by at most `similarity`, in the unit of
-/// the pixels and less than NONE is away from any. Returns the pixels blanked.
-pub(super) fn remove_speckles(disparity: &mut [i16], width: usize, similarity: i16, smallest: u32, scratch: Scratch<'_>) -> u32 {
+/// Pixels that were blanked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Blanked {
+    /// Measured ones.
+    pub measured: u32,
+    /// Filled ones.
+    pub filled: u32,
+}
+
+/// Blanks segments of fewer than `smallest` pixels, measured or filled, in an image `width` wide; neighbours differ by at most `similarity`,
+/// in the unit of the pixels and less than NONE is away from any.
+pub(super) fn remove_speckles(disparity: &mut [i16], width: usize, similarity: i16, smallest: u32, scratch: Scratch<'_>) -> Blanked {
     let (pixels, width, Scratch { runs, ends, flags }) = (disparity.len(), width.max(1), scratch);
+    let mut blanked = Blanked::default();
     if smallest <= 1 || runs.len() < pixels || ends.len() < pixels || flags.len() < 2 * width {
-        return 0;
+        return blanked;
     }
     let mut runs = Runs(runs);
     find_segments(disparity, width, similarity.unsigned_abs(), &mut runs, ends, flags);
-    let (mut run, mut blanked) = (0, 0);
+    let mut run = 0;
     for (row, ends) in disparity.chunks_exact_mut(width).zip(ends.chunks_exact(width)) {
         let mut start = 0;
         for &end in ends {
@@ -73,8 +83,10 @@ pub(super) fn remove_speckles(disparity: &mut [i16], width: usize, similarity: i
                 && runs.0.get(root).is_some_and(|&size| size.unsigned_abs() < smallest)
                 && pixels.first().is_some_and(|&d| d != NONE)
             {
+                let filled = pixels.iter().filter(|&&d| d & FILLED != 0).count() as u32;
+                blanked.filled += filled;
+                blanked.measured += pixels.len() as u32 - filled;
                 pixels.fill(NONE);
-                blanked += pixels.len() as u32;
             }
             start = usize::from(end);
             if start == width {
@@ -83,6 +95,11 @@ pub(super) fn remove_speckles(disparity: &mut [i16], width: usize, similarity: i
         }
     }
     blanked
+}
+
+/// How far apart two pixels are, whether filled or not. NONE is far from every disparity with its bit of filled pixels taken, too.
+fn difference(a: i16, b: i16) -> u16 {
+    (a & !FILLED).abs_diff(b & !FILLED)
 }
 
 /// Finds the runs of all rows, numbered in scan order, those without disparity included, and unites them.
@@ -107,7 +124,7 @@ fn find_segments(disparity: &[i16], width: usize, similarity: u16, runs: &mut Ru
         let ends_here: &[u16] = ends_here;
         if !ends_above.is_empty() {
             for (touch, (&up, &here)) in touches.iter_mut().zip(above.iter().zip(here)) {
-                *touch = u8::from(up.abs_diff(here) <= similarity) & u8::from(here != NONE);
+                *touch = u8::from(difference(up, here) <= similarity) & u8::from(here != NONE);
             }
             // Both rows' runs side by side, by the pieces on which they overlap.
             let (mut a, mut b, mut start) = (0, 0, 0);
@@ -133,7 +150,7 @@ fn find_segments(disparity: &[i16], width: usize, similarity: u16, runs: &mut Ru
 /// Calls `run` with the end of each run of a row.
 fn break_up(row: &[i16], similarity: u16, breaks: &mut [u8], mut run: impl FnMut(u16)) {
     for (flag, (&a, &b)) in breaks.iter_mut().zip(row.iter().zip(row.iter().skip(1))) {
-        *flag = u8::from(a.abs_diff(b) > similarity);
+        *flag = u8::from(difference(a, b) > similarity);
     }
     if let Some(last) = breaks.last_mut() {
         *last = 1;
@@ -173,7 +190,7 @@ mod tests {
                 let u = i % width;
                 let beside = [(u > 0).then(|| i - 1), (u + 1 < width).then_some(i + 1), i.checked_sub(width), Some(i + width)];
                 for j in beside.into_iter().flatten().filter(|&j| j < disparity.len()) {
-                    if !visited[j] && disparity[j] != NONE && disparity[i].abs_diff(disparity[j]) <= similarity as u16 {
+                    if !visited[j] && disparity[j] != NONE && difference(disparity[i], disparity[j]) <= similarity as u16 {
                         visited[j] = true;
                         segment.push(j);
                     }
@@ -190,15 +207,19 @@ mod tests {
     fn equals_a_flood_fill_on_noise_of_every_roughness() {
         let mut random = Random::new(21);
         for (width, height, levels, smallest) in [(31, 17, 3, 5), (40, 30, 6, 12), (64, 9, 2, 30), (1, 50, 3, 4), (50, 1, 3, 4)].repeat(8) {
-            let pixel = |random: &mut Random| if random.below(6) == 0 { NONE } else { random.below(levels) as i16 * 64 };
+            let pixel = |random: &mut Random| match random.below(6) {
+                0 => NONE,
+                1 => (random.below(levels) as i16 * 64) | FILLED,
+                _ => random.below(levels) as i16 * 64,
+            };
             let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
             let mut fast = image.clone();
             let (mut runs, mut ends, mut flags) = (vec![7; image.len()], vec![7; image.len()], vec![7; 2 * width]);
             let scratch = Scratch { runs: &mut runs, ends: &mut ends, flags: &mut flags };
             let blanked = remove_speckles(&mut fast, width, 64, smallest, scratch);
             assert!(fast == plain(&image, width, 64, smallest as usize));
-            let removed = image.iter().zip(&fast).filter(|(a, b)| a != b).count();
-            assert_eq!(blanked as usize, removed);
+            let removed = |bit| image.iter().zip(&fast).filter(|(a, b)| a != b && **a & FILLED == bit).count() as u32;
+            assert_eq!(blanked, Blanked { measured: removed(0), filled: removed(FILLED) });
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::{
     part::{part, part_mut},
     sad::compare,
     stereo::{
-        StereoConfig, StereoReport,
+        GapEnds, StereoConfig, StereoReport,
         config::DISPARITY_LIMIT,
         delaunay::{SupportPoint, Triangulation},
         dense::{DenseBand, DenseMatching, FILLED, MatchBand, NONE, WORKING_ONE_PX},
@@ -19,7 +19,7 @@ use crate::{
         prior::{CellGrid, DisparitySet, PlaneCost, RasterisePlanes},
         smooth::{Along, Smooth},
         speckle,
-        speckle::Scratch,
+        speckle::{Blanked, Scratch},
         support,
         support::{MatchRows, NO_MATCH, SupportMatching},
     },
@@ -121,6 +121,31 @@ impl StereoMatcher<'_> {
     }
 
     pub(super) fn remove_speckles(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+        report.speckles = self.remove_segments(config, config.speckle_size).measured;
+        let lone_size = (config.lone_share * (self.width * self.height) as f32) as u32;
+        if lone_size > 1 {
+            let filling = Filling {
+                width: config.lone_gap.min(config.gap_width),
+                discontinuity: working(config.speckle_similarity) as u16 + 1,
+                ends: GapEnds::Surface,
+            };
+            report.filled = self.fill(filling);
+            let blanked = self.remove_segments(config, lone_size);
+            report.speckles += blanked.measured;
+            report.filled -= blanked.filled;
+        }
+    }
+
+    pub(super) fn fill_gaps(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+        report.filled += self.fill(Filling {
+            width: config.gap_width,
+            discontinuity: working(config.gap_discontinuity) as u16,
+            ends: config.gap_ends,
+        });
+    }
+
+    /// Removes segments of fewer than `smallest` pixels.
+    fn remove_segments(&mut self, config: &StereoConfig, smallest: u32) -> Blanked {
         let similarity = working(config.speckle_similarity);
         let image = image_of(self.disparity, self.width * self.height);
         let scratch = Scratch {
@@ -128,28 +153,24 @@ impl StereoMatcher<'_> {
             ends: bytemuck::cast_slice_mut(self.other),
             flags: bytemuck::cast_slice_mut(self.columns),
         };
-        report.speckles = speckle::remove_speckles(image, self.width, similarity, config.speckle_size, scratch);
+        speckle::remove_speckles(image, self.width, similarity, smallest, scratch)
     }
 
-    pub(super) fn fill_gaps(&mut self, config: &StereoConfig, report: &mut StereoReport) {
-        let filling = Filling {
-            width: config.gap_width,
-            discontinuity: working(config.gap_discontinuity) as u16,
-            ends: config.gap_ends,
-        };
+    /// Fills gaps along rows, then along columns; returns the pixels filled.
+    fn fill(&mut self, filling: Filling) -> u32 {
         let image = image_of(self.disparity, self.width * self.height);
-        report.filled = gaps::fill_rows(image, self.width, filling) + gaps::fill_columns(image, self.width, filling, self.columns);
+        gaps::fill_rows(image, self.width, filling) + gaps::fill_columns(image, self.width, filling, self.columns)
     }
 
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
         let (width, pixels, bands) = (self.width, self.width * self.height, Bands::of(self.height));
         let image = image_of(self.disparity, pixels);
         let other = part_mut(self.other, ..pixels);
-        if config.adaptive_mean {
-            let smooth = |from: &[i16], along, to: &mut [i16]| {
-                let rows = zip2(bands.first(), bands.split_mut(to, width));
-                each(executor, rows, |(first, to)| executor.vectors().run(Smooth { from, width, along, first, to }));
-            };
+        let smooth = |from: &[i16], along, to: &mut [i16]| {
+            let rows = zip2(bands.first(), bands.split_mut(to, width));
+            each(executor, rows, |(first, to)| executor.vectors().run(Smooth { from, width, along, first, to }));
+        };
+        for _ in 0..config.adaptive_mean {
             smooth(image, Along::Rows, other);
             smooth(other, Along::Columns, image);
         }

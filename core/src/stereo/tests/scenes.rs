@@ -121,3 +121,48 @@ fn a_pillar_before_a_wall_keeps_its_edges() {
     // What only the left camera sees, to the left of the pillar, is filled with the wall behind.
     assert!(share(60..150, 15.0) > 0.9, "wall to its left: {}", share(60..150, 15.0));
 }
+
+#[test]
+fn a_lone_patch_goes_and_one_of_the_wall_behind_a_gap_stays() {
+    let (wall, near) = (Texture::new(660, 120, 6), Texture::new(660, 120, 7));
+    // A patch of 24 x 20 px floats before the wall; another of the wall's own is framed by 20 px without texture.
+    let (floating, framed, frame) = ((94.0..118.0, 50..70), (274.0..298.0, 50..70), (254.0..318.0, 30..90));
+    let image = |shift: f32| Grey {
+        width: 400,
+        height: 120,
+        pixels: (0..400 * 120)
+            .map(|i| {
+                let (u, v) = ((i % 400) as f32, i / 400);
+                let inside = |(columns, rows): &(std::ops::Range<f32>, std::ops::Range<usize>), d: f32| {
+                    columns.contains(&(u + shift * d)) && rows.contains(&v)
+                };
+                if inside(&floating, 40.0) {
+                    near.at(u + shift * 40.0, v) as u8
+                } else if inside(&frame, 15.0) && !inside(&framed, 15.0) {
+                    120
+                } else {
+                    wall.at(u + shift * 15.0, v) as u8
+                }
+            })
+            .collect(),
+    };
+    let (left, right) = (image(0.0), image(1.0));
+    let shown = |lone_share: f32, lone_gap: usize| {
+        let config = StereoConfig { lone_share, lone_gap, gap_width: lone_gap, ..StereoConfig::default() };
+        let (report, disparity) = disparity(&config, &left, &right, &Serial);
+        let count = |columns: std::ops::Range<usize>, expected: i32| {
+            let pixels = disparity.chunks(400).skip(50).take(20).flat_map(|row| &row[columns.clone()]);
+            pixels.filter(|&&d| (i32::from(d) - 256 * expected).abs() <= 256).count()
+        };
+        assert!(count(150..230, 15) > 1_500, "the wall stays");
+        (count(98..114, 40), count(278..294, 15), report)
+    };
+    let (floating, framed, report) = shown(0.0, 32);
+    assert!(floating > 250 && framed > 250, "{floating}, {framed}: {report:?}");
+    // Both, and what their edges add, have less than a fiftieth of the image: 960 px.
+    let (floating, framed, removed) = shown(0.02, 32);
+    assert!(floating == 0 && framed > 250, "{floating}, {framed}: {removed:?}");
+    assert!(removed.speckles > report.speckles + 400);
+    let (floating, framed, _) = shown(0.02, 8);
+    assert!(floating == 0 && framed == 0, "{floating}, {framed}");
+}

@@ -128,7 +128,8 @@ fn extremes() -> Vec<StereoConfig> {
             ..base
         },
         StereoConfig { speckle_size: u32::MAX, ..base },
-        StereoConfig { speckle_size: 0, gap_width: 0, adaptive_mean: false, ..base },
+        StereoConfig { lone_share: 1.0, lone_gap: 4_096, gap_width: 4_096, adaptive_mean: 4, ..base },
+        StereoConfig { speckle_size: 0, gap_width: 0, adaptive_mean: 0, ..base },
     ]
 }
 
