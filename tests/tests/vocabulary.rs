@@ -105,22 +105,23 @@ fn joined(prose: &str) -> (String, Vec<usize>) {
 /// Each banned word in a file and the byte where it stands.
 fn banned(path: &Path, content: &str, rules: &[Rule]) -> Vec<(String, usize)> {
     let (code, prose) = match path.extension().is_some_and(|extension| extension == "rs") {
-        true => (parts(content).code, parts(content).prose),
+        true => {
+            let parts = parts(content);
+            (parts.code, parts.prose)
+        }
         false => (String::new(), content.to_owned()),
     };
     let (joined, places) = joined(&prose);
+    let code_names: Vec<(usize, &str)> = names(&code).collect();
+    let words_of = |(at, name)| words(name).into_iter().map(move |word| (word, at));
+    let all_words: Vec<(String, usize)> = code_names.iter().copied().chain(names(&prose)).flat_map(words_of).collect();
     let mut found = Vec::new();
     for rule in rules.iter().filter(|rule| rule.covers(path)) {
         match rule.kind {
-            Kind::Word => {
-                for text in [&code, &prose] {
-                    let of_text = names(text).flat_map(|(at, name)| words(name).into_iter().map(move |word| (word, at)));
-                    found.extend(of_text.filter(|(word, _)| rule.words.contains(word)));
-                }
-            }
+            Kind::Word => found.extend(all_words.iter().filter(|(word, _)| rule.words.contains(word)).cloned()),
             Kind::Name => {
-                let of_code = names(&code).filter(|&(at, name)| rule.words.contains(name) && is_defined_here(&code, at));
-                found.extend(of_code.map(|(at, name)| (name.to_owned(), at)));
+                let of_code = code_names.iter().filter(|&&(at, name)| rule.words.contains(name) && is_defined_here(&code, at));
+                found.extend(of_code.map(|&(at, name)| (name.to_owned(), at)));
             }
             Kind::Phrase => {
                 for phrase in &rule.words {
