@@ -6,7 +6,10 @@ use dynvox_core::volume::{BlockStore, NoStore};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, Severity};
 use dynvox_tests::{Clip, HeapSlab};
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
+/// Rendered once: that takes longer than to map it.
+static STREET: LazyLock<Clip> = LazyLock::new(|| Clip::street(320, 96, 40));
 const VOXEL_M: f32 = 0.1;
 /// Holds what is in view and some metres more.
 const SMALL: Capacity = Capacity { blocks: 4_000, visible_blocks: 4_000, ..Capacity::TINY };
@@ -44,12 +47,11 @@ fn sum(reports: &[Report], of: fn(&Report) -> u32) -> u32 {
 
 #[test]
 fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
-    let clip = Clip::street(320, 96, 60);
-    let config = config(&clip);
+    let (clip, config) = (&*STREET, config(&STREET));
     let mut unbounded = Vec::new();
     let mut slab = HeapSlab::of(&LARGE);
     let mut mapper = Mapper::new(&LARGE, &config, slab.bytes()).expect("a slab that fits");
-    let reports = map_clip(&clip, &mut mapper, &mut NoStore);
+    let reports = map_clip(clip, &mut mapper, &mut NoStore);
     assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0, "the large pool holds it all");
     mapper.triangles(&mut |triangle| unbounded.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour)))));
 
@@ -57,9 +59,9 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let (mut store, mut streamed) = (file(&folder), Vec::new());
     let mut slab = HeapSlab::of(&SMALL);
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
-    let reports = map_clip(&clip, &mut mapper, &mut store);
+    let reports = map_clip(clip, &mut mapper, &mut store);
     let evicted = sum(&reports, |report| report.allocation.eviction.kept);
-    assert!(evicted > 2_000, "{evicted} blocks left: the pool is outgrown");
+    assert!(evicted > 1_000, "{evicted} blocks left: the pool is outgrown");
     assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0);
     let (mut cube, mut in_place) = (HeapSlab::of(&Capacity::TINY), Vec::new());
     let (how, memory) = ((&config.volume, &config.mesh), (cube.bytes(), false));
@@ -75,7 +77,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
             streamed.push(bits(triangle.map(|corner| (corner.position_m, corner.colour))))
         });
     assert_eq!(count.ok(), Some(streamed.len() as u64));
-    assert!(unbounded.len() > 100_000, "{} triangles", unbounded.len());
+    assert!(unbounded.len() > 50_000, "{} triangles", unbounded.len());
     assert!(in_place == streamed, "the pool's blocks where they are, and stored first, in one order");
     unbounded.sort_unstable();
     streamed.sort_unstable();
@@ -84,14 +86,13 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
 
 #[test]
 fn a_full_disk_is_told_from_the_first_lost_block_on_and_the_drive_goes_on() {
-    let clip = Clip::street(320, 96, 40);
-    let config = config(&clip);
+    let (clip, config) = (&*STREET, config(&STREET));
     let folder = tempfile::TempDir::new().expect("a folder for the blocks");
     let mut store = file(&folder);
     store.limit(300_000);
     let mut slab = HeapSlab::of(&SMALL);
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
-    let reports = map_clip(&clip, &mut mapper, &mut store);
+    let reports = map_clip(clip, &mut mapper, &mut store);
     assert!(store.failure().is_some() && store.bytes() <= 300_000);
     let kept = sum(&reports, |report| report.allocation.eviction.kept);
     assert!(kept > 0 && sum(&reports, |report| report.allocation.eviction.lost) > 0);
