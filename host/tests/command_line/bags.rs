@@ -122,8 +122,9 @@ fn a_recorded_street_has_the_digests_of_the_folder_and_broken_ones_a_sentence() 
     let root = root.path();
     let size = ["--set", "street.width=320", "--set", "street.height=96"];
     assert!(dynvox(root, &[&["synth", "--out", "street", "--frames", "5"], &size[..]].concat()).status.success());
+    let coarse = ["--profile", "tiny", "--instances", "none", "--set", "volume.voxel_size_m=0.2"];
     let digest = |path: &str, out: &str, more: &[&str]| {
-        let run = dynvox(root, &[&["run", path, "--profile", "tiny", "--instances", "none", "--json", "--out", out], more].concat());
+        let run = dynvox(root, &[&["run", path, "--json", "--out", out], &coarse[..], more].concat());
         assert!(run.status.success(), "{path}: {}", output_text(&run));
         serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap()["digest"].clone()
     };

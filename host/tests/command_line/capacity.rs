@@ -7,7 +7,7 @@ use std::path::Path;
 use tempfile::TempDir;
 
 /// A street with traffic, exact masks and no block on disk.
-const STREET: [&str; 12] = [
+const STREET: [&str; 14] = [
     "run",
     "--quiet",
     "--no-stream",
@@ -16,7 +16,9 @@ const STREET: [&str; 12] = [
     "--set",
     "street.height=96",
     "--set",
-    "street.frames=16",
+    "street.frames=12",
+    "--set",
+    "volume.voxel_size_m=0.2",
     "--instances",
     "exact",
     "--overwrite",
@@ -59,8 +61,8 @@ fn the_least_bounds_hold_the_same_run() {
     for column in ["input", "disparity", "matches", "egomotion", "background", "objects"] {
         assert_eq!(digests(&root.join("least"), column), digests(&root.join("large"), column), "{column}");
     }
-    let console =
-        dynvox(root, &["run", "--capacity", "least.toml", "--set", "street.width=320", "--set", "street.height=96", "--frames", "2"]);
+    let street = ["street.width=320", "street.height=96", "volume.voxel_size_m=0.2"].map(|set| ["--set", set]).concat();
+    let console = dynvox(root, &[&["run", "--capacity", "least.toml", "--frames", "2"], &street[..]].concat());
     assert!(
         String::from_utf8_lossy(&console.stdout).contains("MiB would have held this run without a refusal"),
         "{}",

@@ -130,7 +130,7 @@ fn files_are_evaluated_without_a_run() {
 #[test]
 fn a_run_of_some_frames_is_evaluated_against_the_true_poses_of_all() {
     let root = TempDir::new().unwrap();
-    let street = ["--set", "street.width=160", "--set", "street.height=64", "--set", "street.frames=14"];
+    let street = ["street.width=160", "street.height=64", "street.frames=14", "volume.voxel_size_m=0.2"].map(|set| ["--set", set]).concat();
     let run = |more: &[&str]| {
         let done = dynvox(root.path(), &[&["run", "--profile", "tiny", "--quiet"], &street[..], more].concat());
         assert!(done.status.success(), "{}", output_text(&done));

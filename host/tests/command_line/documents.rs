@@ -102,8 +102,9 @@ fn files(folder: &Path, prefix: &str, found: &mut Vec<String>) {
 }
 
 /// A run that leaves every kind of file.
-fn run(root: &Path) {
-    let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=14"];
+fn run(root: &Path, frames: u32) {
+    let frames = format!("street.frames={frames}");
+    let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", &frames];
     let all = ["--profile", "tiny", "--evaluate", "exact", "--instances", "exact", "--mcap", "--planning", "40x40x8", "--keep-blocks"];
     let done = dynvox(root, &[&["run", "--quiet", "--out", "result"], &street[..], &all[..]].concat());
     assert!(done.status.success(), "{}", output_text(&done));
@@ -112,7 +113,7 @@ fn run(root: &Path) {
 #[test]
 fn every_file_key_and_column_of_a_run_folder_is_on_its_page() {
     let root = TempDir::new().unwrap();
-    run(root.path());
+    run(root.path(), 14);
     let (page, folder) = (document("docs/run_folder.md"), root.path().join("result"));
     let mut written = Vec::new();
     files(&folder, "", &mut written);
@@ -159,7 +160,7 @@ fn leaves(prefix: &str, table: &toml::Table, found: &mut BTreeMap<String, String
 #[test]
 fn every_setting_is_on_its_page_once_with_its_default() {
     let root = TempDir::new().unwrap();
-    run(root.path());
+    run(root.path(), 1);
     let config: toml::Table = fs::read_to_string(root.path().join("result/config.toml")).unwrap().parse().unwrap();
     let mut settings = BTreeMap::new();
     leaves("", &config, &mut settings);

@@ -38,7 +38,8 @@ fn the_depth_tracker_tracks_a_slow_camera_and_reports_tracking_failures() {
 #[test]
 fn poses_of_a_file_replace_egomotion_and_must_cover_the_frames() {
     let root = TempDir::new().unwrap();
-    let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=4", "--profile", "small", "--json"];
+    let street = ["street.width=320", "street.height=96", "street.frames=4", "volume.voxel_size_m=0.2"].map(|set| ["--set", set]).concat();
+    let street = [&street[..], &["--profile", "small", "--json"]].concat();
     let run = |out: &str, more: &[&str]| dynvox(root.path(), &[&["run", "--out", out], &street[..], more].concat());
     let summary = |output: Output| -> serde_json::Value {
         assert!(output.status.success(), "{}", output_text(&output));

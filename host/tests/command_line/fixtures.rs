@@ -9,7 +9,7 @@ use tempfile::TempDir;
 /// A street, and a fixture of six of its frames.
 fn pinned() -> TempDir {
     let root = TempDir::new().unwrap();
-    let size = ["--set", "street.width=416", "--set", "street.height=128"];
+    let size = ["--set", "street.width=320", "--set", "street.height=96"];
     assert!(dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "8"], &size[..]].concat()).status.success());
     let made = dynvox(
         root.path(),
@@ -89,7 +89,7 @@ fn bounds_and_settings_are_packed_as_rust_beside_the_clip() {
     let packed = dynvox(root.path(), &["fixtures", "pack", "pinned", "--out", "clip.bin", "--rust", "clip.rs"]);
     assert!(packed.status.success(), "{}", output_text(&packed));
     let text = fs::read_to_string(root.path().join("clip.rs")).unwrap();
-    for line in ["image_width: 416,", "image_height: 128,", "voxel_size_m: 0.1,", "pub const CAPACITY: Capacity = Capacity {"] {
+    for line in ["image_width: 320,", "image_height: 96,", "voxel_size_m: 0.1,", "pub const CAPACITY: Capacity = Capacity {"] {
         assert!(text.contains(line), "{line} in {text}");
     }
     let clip = fs::read(root.path().join("clip.bin")).unwrap();
@@ -113,8 +113,8 @@ fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
     verify("objects.voxel_sise_m = 0.05: there is no such setting");
     fs::write(&settings, &text).unwrap();
     let bounds = fs::read_to_string(root.join("pinned/fixture.toml")).unwrap();
-    fs::write(root.join("pinned/fixture.toml"), bounds.replace("image_height = 128", "image_height = 96")).unwrap();
-    verify("its bounds do not hold images of 416 x 128 px");
+    fs::write(root.join("pinned/fixture.toml"), bounds.replace("image_height = 96", "image_height = 64")).unwrap();
+    verify("its bounds do not hold images of 320 x 96 px");
     let again = dynvox(root, &["fixtures", "new", "pinned", "--from", "street"]);
     assert!(output_text(&again).contains("pinned exists"), "{}", output_text(&again));
     let refused = dynvox(root, &["fixtures", "new", "other", "--from", "street", "--memory", "1MiB"]);

@@ -58,7 +58,8 @@ impl Clip {
 
     /// Digest and notes of a run.
     fn run(&self, path: &str, more: &[&str]) -> (String, String) {
-        let args = ["run", path, "--profile", "tiny", "--instances", "none", "--json", "--overwrite", "--out", "result"];
+        let coarse = ["--profile", "tiny", "--instances", "none", "--set", "volume.voxel_size_m=0.2"];
+        let args = [&["run", path, "--json", "--overwrite", "--out", "result"], &coarse[..]].concat();
         let run = dynvox(self.root.path(), &[&args[..], more].concat());
         assert!(run.status.success(), "{path}: {}", output_text(&run));
         let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();

@@ -10,16 +10,15 @@ use tempfile::TempDir;
 
 const FRAMES: usize = 6;
 const SMALL: [&str; 4] = ["--set", "street.width=160", "--set", "street.height=64"];
+/// How it is mapped: what is asked here is not in the map.
+const COARSE: [&str; 6] = ["--profile", "tiny", "--instances", "none", "--set", "volume.voxel_size_m=0.2"];
 
 /// A written street, and its run from the folder.
 fn street() -> TempDir {
     let root = TempDir::new().unwrap();
     let written = dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "6"], &SMALL[..]].concat());
     assert!(written.status.success(), "{}", output_text(&written));
-    let run = dynvox(
-        root.path(),
-        &["run", "street", "--images", "grey", "--profile", "tiny", "--instances", "none", "--quiet", "--out", "folder"],
-    );
+    let run = dynvox(root.path(), &[&["run", "street", "--images", "grey", "--quiet", "--out", "folder"], &COARSE[..]].concat());
     assert!(run.status.success(), "{}", output_text(&run));
     root
 }
@@ -53,9 +52,9 @@ fn stacked(root: &Path, top_bottom: bool) -> Vec<u8> {
 
 /// Runs on the bytes of a stream.
 fn piped(root: &Path, bytes: &[u8], out: &str, more: &[&str]) -> Output {
-    let base = ["run", "-", "--calibration", "street/sequences/00/calib.txt", "--profile", "tiny", "--instances", "none", "--out", out];
+    let base = ["run", "-", "--calibration", "street/sequences/00/calib.txt", "--out", out];
     let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
-        .args([&base[..], more].concat())
+        .args([&base[..], &COARSE, more].concat())
         .current_dir(root)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -113,8 +112,8 @@ fn a_camera_faster_than_the_mapper_loses_frames_that_are_counted() {
 fn memory_does_not_grow_with_the_stream() {
     const ROUNDS: usize = 200;
     let root = street();
-    let coarse = ["--quiet", "--threads", "1", "--set", "volume.voxel_size_m=0.2", "--set", "volume.prune_lag=5"];
-    let run = piped(root.path(), &in_turn(root.path()).repeat(ROUNDS), "result", &coarse);
+    let one_thread = ["--quiet", "--threads", "1", "--set", "volume.prune_lag=5"];
+    let run = piped(root.path(), &in_turn(root.path()).repeat(ROUNDS), "result", &one_thread);
     assert!(run.status.success(), "{}", output_text(&run));
     let csv = fs::read_to_string(root.path().join("result/frames.csv")).unwrap();
     let mut lines = csv.lines();
@@ -164,7 +163,7 @@ fn what_a_stream_cannot_do_is_refused_with_a_sentence() {
 fn a_signal_is_the_usual_end_of_a_stream() {
     let root = street();
     let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
-        .args(["run", "-", "--calibration", "street/sequences/00/calib.txt", "--profile", "tiny", "--out", "result"])
+        .args([&["run", "-", "--calibration", "street/sequences/00/calib.txt", "--out", "result"], &COARSE[..]].concat())
         .current_dir(root.path())
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
