@@ -242,12 +242,12 @@ fn completions_and_the_manual_know_every_command() {
     assert!(["Input:", "Frames:", "Mapping:", "Limits:", "Evaluation:", "Results:"].iter().all(|group| help.contains(group)), "{help}");
 }
 
-#[dynvox_needs::long]
-#[test]
-fn a_window_for_planners_is_a_map_for_nav2_with_heights_and_distances() {
+/// Counts of a window's cells that are occupied, unknown and free, in a run that is the same without it.
+fn window(input: &[&str], columns: u32, rows: u32) -> [usize; 3] {
     let root = TempDir::new().unwrap();
-    run(root.path(), &[&STREET[..], &["--planning", "80x60x16", "--out", "with"]].concat());
-    run(root.path(), &[&STREET[..], &["--out", "without"]].concat());
+    rig(root.path(), 4);
+    run(root.path(), &[input, &["--planning", &format!("{columns}x{rows}x16"), "--out", "with"]].concat());
+    run(root.path(), &[input, &["--out", "without"]].concat());
     assert!(!root.path().join("without/planning").exists());
     let digests = |name: &str| {
         fs::read_to_string(root.path().join(name).join("summary.json"))
@@ -259,25 +259,38 @@ fn a_window_for_planners_is_a_map_for_nav2_with_heights_and_distances() {
     assert_eq!(digests("with"), digests("without"), "a window changes nothing else");
     let folder = root.path().join("with/planning");
     assert_eq!(names(&folder), ["distance.png", "height.png", "map.pgm", "map.yaml", "window.json", "window.png"]);
-    let pgm = fs::read(folder.join("map.pgm")).unwrap();
-    let (head, pixels) = pgm.split_at(b"P5\n80 60\n255\n".len());
-    assert_eq!((head, pixels.len()), (&b"P5\n80 60\n255\n"[..], 80 * 60));
-    let count = |grey: u8| pixels.iter().filter(|pixel| **pixel == grey).count();
+    let (pgm, header) = (fs::read(folder.join("map.pgm")).unwrap(), format!("P5\n{columns} {rows}\n255\n"));
+    let (head, pixels) = pgm.split_at(header.len());
+    assert_eq!((head, pixels.len()), (header.as_bytes(), (columns * rows) as usize));
+    let counts = [0, 205, 254].map(|grey| pixels.iter().filter(|pixel| **pixel == grey).count());
     let window: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("window.json")).unwrap()).unwrap();
-    assert_eq!(count(0) + count(205) + count(254), 80 * 60);
-    assert_eq!(window["report"]["obstacles"], count(0));
-    assert!(count(0) > 20 && count(254) > 100 && count(205) > 100, "{window}");
+    assert_eq!(counts.iter().sum::<usize>(), pixels.len());
+    assert_eq!(window["report"]["obstacles"], counts[0]);
     let yaml = fs::read_to_string(folder.join("map.yaml")).unwrap();
     let origin = window["origin_m"][0].as_f64().unwrap();
     assert!(yaml.contains("image: map.pgm") && yaml.contains(&format!("origin: [{origin}, ")) && yaml.contains("mode: trinary"), "{yaml}");
     let picture = |name: &str| image::open(folder.join(name)).unwrap().into_luma16();
     let (heights, distances) = (picture("height.png"), picture("distance.png"));
-    assert_eq!((heights.dimensions(), distances.dimensions()), ((80, 60), (80, 60)));
+    assert_eq!((heights.dimensions(), distances.dimensions()), ((columns, rows), (columns, rows)));
     let ground = heights.pixels().filter(|height| height.0[0] != u16::MAX).count();
     assert_eq!(window["report"]["ground"], ground);
     for (pixel, distance) in pixels.iter().zip(distances.pixels()) {
         assert_eq!(*pixel == 0, distance.0[0] < 32_768, "a distance is below 0 inside obstacles alone");
     }
+    counts
+}
+
+#[test]
+fn a_window_for_planners_is_a_map_for_nav2_with_heights_and_distances() {
+    let [occupied, unknown, free] = window(&["run", "rig", "--profile", "tiny", "--quiet", "--set", "volume.voxel_size_m=0.1"], 80, 60);
+    assert!(occupied > 5 && free > 50 && unknown > 100, "a wall ahead: {occupied} occupied, {unknown} unknown, {free} free");
+}
+
+#[dynvox_needs::long]
+#[test]
+fn a_window_of_a_street_shows_its_obstacles() {
+    let [occupied, unknown, free] = window(&STREET, 80, 60);
+    assert!(occupied > 20 && free > 100 && unknown > 100, "{occupied} occupied, {unknown} unknown, {free} free");
 }
 
 #[test]

@@ -159,11 +159,8 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
     assert!(output_text(&other).contains("is not of these jobs. Align again"), "{}", output_text(&other));
 }
 
-#[dynvox_needs::long]
-#[test]
-fn a_recording_lies_where_its_fixes_or_its_poses_say() {
-    let root = TempDir::new().unwrap();
-    let root = root.path();
+/// A list of two recordings: one lies along its fixes, the other's poses are those in the world.
+fn georeferenced(root: &Path) {
     let shared =
         RECORDINGS.split("[[recording]]").next().unwrap().replace("\"--profile\"", "\"--set\", \"street.frames=14\", \"--profile\"");
     // On the equator, from 50 m north of the world's origin on, 0.88 m a frame; the first two frames have no fix.
@@ -175,11 +172,27 @@ fn a_recording_lies_where_its_fixes_or_its_poses_say() {
     let list = "[[recording]]\nname = \"fixed\"\narguments = []\ngnss = \"fixes.txt\"\n\n[[recording]]\nname = \"posed\"\nposes_in_world = true\n\
                 arguments = [\"--start\", \"5\", \"--frames\", \"3\", \"--egomotion\", \"file:poses.txt\"]\n";
     fs::write(root.join("recordings.toml"), format!("origin = [0, 8, 92]\n{shared}{list}")).unwrap();
+}
+
+#[test]
+fn a_plan_knows_where_fixes_and_poses_place_a_recording() {
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    georeferenced(root);
     done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
     let jobs: serde_json::Value = serde_json::from_slice(&fs::read(root.join("jobs/jobs.json")).unwrap()).unwrap();
     assert_eq!((&jobs["jobs"][0]["gnss"]["origin"][2], &jobs["jobs"][1]["t_world_camera"][11]), (&92.0.into(), &4.0.into()), "{jobs}");
     let open: serde_json::Value = serde_json::from_str(&done(root, &["fleet", "status", "jobs", "--json"])).unwrap();
     assert!(open[0]["sums"].is_null() && open[1]["sums"].is_string(), "{open}");
+}
+
+#[dynvox_needs::long]
+#[test]
+fn a_recording_lies_where_its_fixes_or_its_poses_say() {
+    let root = TempDir::new().unwrap();
+    let root = root.path();
+    georeferenced(root);
+    done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
     let ran = done(root, &["fleet", "run", "jobs"]);
     assert!(ran.contains("fixed lies along its fixes, with standard deviations of 0."), "{ran}");
     done(root, &["fleet", "align", "jobs"]);

@@ -34,6 +34,31 @@ const SWEEP: [&str; 24] = [
     "--out",
 ];
 
+/// One of three frames.
+const SMALL_SWEEP: [&str; 21] = [
+    "sweep",
+    "street",
+    "--sweeps",
+    "prune-weight",
+    "--prune-lag",
+    "1",
+    "--evaluation-delay",
+    "1",
+    "--profile",
+    "tiny",
+    "--frames",
+    "3",
+    "--set",
+    "street.width=192",
+    "--set",
+    "street.height=64",
+    "--set",
+    "street.frames=3",
+    "--set",
+    "volume.voxel_size_m=0.2",
+    "--quiet",
+];
+
 /// The results in a sweep's folder, by name.
 fn results(folder: &Path) -> Vec<PathBuf> {
     let list = fs::read_dir(folder.join("runs")).into_iter().flatten().flatten();
@@ -60,8 +85,7 @@ fn made(path: impl AsRef<Path>) -> (Vec<u8>, SystemTime) {
 #[test]
 fn a_killed_sweep_does_not_repeat_what_was_done() {
     let root = TempDir::new().unwrap();
-    let small = ["street.width=192", "street.height=64"].map(|set| ["--set", set]).concat();
-    let args = [&SWEEP[..2], &["--sweeps", "prune-weight", "--weights", "0,1,2"], &SWEEP[8..16], &small[..], &SWEEP[20..]].concat();
+    let args = [&SMALL_SWEEP[..], &["--weights", "0,1,2", "--out"]].concat();
     kill_after_results(root.path(), &args, "cut", 1);
     let before = results(&root.path().join("cut"));
     assert!((1..3).contains(&before.len()), "killed in the middle: {before:?}");
@@ -71,6 +95,25 @@ fn a_killed_sweep_does_not_repeat_what_was_done() {
     assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "finished runs are not repeated");
     assert_eq!(results(&root.path().join("cut")).len(), 3, "three weights");
     assert_eq!(names(&root.path().join("cut")), ["plan.json", "prune-weight.csv", "report.html", "runs"]);
+}
+
+#[test]
+fn shares_of_a_sweep_are_merged_to_the_tables_of_the_whole() {
+    let root = TempDir::new().unwrap();
+    let args = [&SMALL_SWEEP[..], &["--weights", "0,1", "--out"]].concat();
+    let done = |args: &[&str]| {
+        let run = dynvox(root.path(), args);
+        assert!(run.status.success(), "{args:?}: {}", output_text(&run));
+    };
+    done(&[&args[..], &["alone"]].concat());
+    for (machine, share) in [("1", "0/2"), ("2", "1/2")] {
+        done(&[&args[..], &[machine, "--plan"]].concat());
+        done(&["fleet", "run", machine, "--shard", share]);
+        assert_eq!(results(&root.path().join(machine)).len(), 1);
+    }
+    done(&["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
+    let [whole, alone] = ["whole", "alone"].map(|out| fs::read_to_string(root.path().join(out).join("prune-weight.csv")).unwrap());
+    assert_eq!((whole.lines().count(), whole), (3, alone));
 }
 
 #[dynvox_needs::long]
