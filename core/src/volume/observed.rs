@@ -69,12 +69,16 @@ impl ObservedDepth<'_> {
     fn write_block(&self, first: usize, v: usize, depths: &mut [f32]) {
         let here = self.tap(first, v, 0, 0);
         let [behind, spoiling] = self.farthest(first, v);
-        let slopes = match self.config.distance {
-            DistanceAlong::Ray => None,
-            DistanceAlong::Normal => Some([[(SLOPE_REACH, 0), (-SLOPE_REACH, 0)], [(0, SLOPE_REACH), (0, -SLOPE_REACH)]]),
+        // Not by `map` of an array, which compilers leave as a call for the baseline.
+        let tap = |du, dv| self.tap(first, v, du, dv);
+        let levels = match self.config.distance {
+            DistanceAlong::Ray => [LEVELS - 1; BLOCK],
+            DistanceAlong::Normal => {
+                let along_u = slope(&here, &tap(SLOPE_REACH, 0), &tap(-SLOPE_REACH, 0));
+                let along_v = slope(&here, &tap(0, SLOPE_REACH), &tap(0, -SLOPE_REACH));
+                self.levels(first, v, &here, [&along_u, &along_v])
+            }
         };
-        let slopes = slopes.map(|pairs| pairs.map(|pair| slope(&here, pair.map(|(du, dv)| self.tap(first, v, du, dv)))));
-        let levels = slopes.map_or([LEVELS - 1; BLOCK], |slopes| self.levels(first, v, &here, &slopes));
         let scale = (self.rig.focal_baseline_px_m() * 256.0) as f32;
         let (near_m, far_m) = (self.config.near_m, self.config.far_m);
         let edges = behind.iter().zip(&spoiling);
@@ -131,7 +135,7 @@ impl ObservedDepth<'_> {
 
     /// Levels of obliqueness of a block with these slopes along columns and rows.
     #[inline(always)]
-    fn levels(&self, first: usize, v: usize, here: &[u16; BLOCK], [along_u, along_v]: &[[f32; BLOCK]; 2]) -> [u32; BLOCK] {
+    fn levels(&self, first: usize, v: usize, here: &[u16; BLOCK], [along_u, along_v]: [&[f32; BLOCK]; 2]) -> [u32; BLOCK] {
         let focal = self.rig.focal_px as f32;
         let y = (v as f64 - self.rig.center_v_px) as f32;
         let x_first = (first as f64 - self.rig.center_u_px) as f32;
@@ -183,10 +187,10 @@ fn least_of(a: u16, b: u16) -> u16 {
 
 /// Slopes, px per px, from those of the two neighbours that lie on the same surface.
 #[inline(always)]
-fn slope(here: &[u16; BLOCK], [after, before]: [[u16; BLOCK]; 2]) -> [f32; BLOCK] {
+fn slope(here: &[u16; BLOCK], after: &[u16; BLOCK], before: &[u16; BLOCK]) -> [f32; BLOCK] {
     const HALF: f32 = 0.5 / (SLOPE_REACH as f32 * 256.0);
     let mut slopes = [0.0; BLOCK];
-    for (slope, ((&here, after), before)) in slopes.iter_mut().zip(here.iter().zip(after).zip(before)) {
+    for (slope, ((&here, &after), &before)) in slopes.iter_mut().zip(here.iter().zip(after).zip(before)) {
         let has_after = (after > 0) & (after.abs_diff(here) < SLOPE_MOST_Q8);
         let has_before = (before > 0) & (before.abs_diff(here) < SLOPE_MOST_Q8);
         // Differences so small have 16 bits with their signs.
