@@ -154,59 +154,87 @@ struct Block<'a, const SIGN: i16> {
 
 impl<const SIGN: i16> Block<'_, SIGN> {
     /// The peak, if there is one: all flagged pixels are as strong, so that the first in scan order alone may be one.
+    #[inline(always)]
     fn peak(&self) -> Option<Candidate> {
         let row = (0..BLOCK).find(|row| self.columns(*row) != 0)?;
         self.peak_at(self.left + self.columns(row).trailing_zeros() as usize / 8, row)
     }
 
     /// Which columns a row has flags in, a byte each.
+    #[inline(always)]
     fn columns(&self, row: usize) -> u32 {
         self.flagged >> row & 0x0101_0101
     }
 
     /// Whether no pixel within [`DENSE_RADIUS`] that is as strong comes earlier in scan order.
-    fn is_first(&self, u: usize, v: usize) -> Option<bool> {
-        const COLUMNS: usize = 2 * DENSE_RADIUS + 1;
-        let row = |y: usize| self.field.response.get(y * self.field.width + u - DENSE_RADIUS..)?.first_chunk::<COLUMNS>();
-        let here = row(v)?;
-        let (before, own) = here.split_first_chunk::<DENSE_RADIUS>()?;
-        let strongest = own.first()?;
-        let mut earlier = before.contains(strongest);
-        for y in v - DENSE_RADIUS..v {
-            earlier |= row(y)?.iter().fold(false, |found, x| found | (x == strongest));
-        }
-        Some(!earlier)
+    #[inline(always)]
+    fn is_first(&self, u: usize, v: usize, response: i16) -> Option<bool> {
+        // Eight columns of a row are one vector; those that are later, or too far, count as different.
+        const EARLIER: [i16; 8] = [0, 0, 0, -1, -1, -1, -1, -1];
+        const ABOVE: [i16; 8] = [0, 0, 0, 0, 0, 0, 0, -1];
+        let equal_in = |y: usize, ignored: [i16; 8]| {
+            let row = self.field.response.get(y * self.field.width + u - DENSE_RADIUS..)?.first_chunk::<8>()?;
+            Some(row.iter().zip(ignored).fold(false, |found, (x, ignored)| found | ((x ^ response) | ignored == 0)))
+        };
+        let above = equal_in(v - 3, ABOVE)? | equal_in(v - 2, ABOVE)? | equal_in(v - 1, ABOVE)?;
+        Some(!(above | equal_in(v, EARLIER)?))
     }
 
+    #[inline(always)]
     fn peak_at(&self, u: usize, row: usize) -> Option<Candidate> {
         let (width, v) = (self.field.width, self.top + row);
-        let strongest = SIGN * self.field.response.get(v * width + u)?;
-        if !self.is_first(u, v)? {
+        let response = *self.field.response.get(v * width + u)?;
+        if !self.is_first(u, v, response)? {
             return None;
         }
         // Most are weaker than a pixel of the seven rows about them.
-        let end = if u + SPARSE_RADIUS < width { u + SPARSE_RADIUS + 1 } else { width };
-        let about = row * width + u.saturating_sub(SPARSE_RADIUS)..row * width + end;
-        let beaten = self.strongest.get(about)?.iter().fold(false, |beaten, &x| beaten | (x * SIGN > strongest));
-        let sparse = !beaten && is_peak::<SIGN>(self.field, u, v, strongest);
+        let about = Surroundings::of(u, width);
+        let beaten = about.any(self.strongest, row, |x| x * SIGN > SIGN * response)?;
+        let sparse = !beaten && is_peak::<SIGN>(self.field, u, v, SIGN * response);
         Some(Candidate { u: u as u16, v: v as u16, class: 0, sparse: u8::from(sparse) })
     }
 }
 
+/// The columns within [`SPARSE_RADIUS`] of a pixel: more than a vector of 16 has, and fewer than two.
+#[derive(Clone, Copy)]
+struct Surroundings {
+    left: usize,
+    columns: usize,
+    width: usize,
+}
+
+impl Surroundings {
+    #[inline(always)]
+    fn of(u: usize, width: usize) -> Self {
+        let left = u.saturating_sub(SPARSE_RADIUS);
+        let end = if u + SPARSE_RADIUS < width { u + SPARSE_RADIUS + 1 } else { width };
+        Self { left, columns: end - left, width }
+    }
+
+    /// Whether any of them is so in a row. `None` where there is no such row.
+    #[inline(always)]
+    fn any(&self, rows: &[i16], row: usize, is_so: impl Fn(i16) -> bool) -> Option<bool> {
+        let row = rows.get(row * self.width + self.left..)?.get(..self.columns)?;
+        let (first, last) = (row.first_chunk::<16>()?, row.last_chunk::<16>()?);
+        Some(first.iter().zip(last).fold(false, |any, (&a, &b)| any | is_so(a) | is_so(b)))
+    }
+}
+
 /// Whether no response within [`SPARSE_RADIUS`] of (u, v) is stronger, nor as strong and earlier.
+#[inline(always)]
 fn is_peak<const SIGN: i16>(field: Field<'_>, u: usize, v: usize, strongest: i16) -> bool {
-    let (left, top) = (u.saturating_sub(SPARSE_RADIUS), v.saturating_sub(SPARSE_RADIUS));
-    let columns = if u + SPARSE_RADIUS < field.width { u + SPARSE_RADIUS + 1 - left } else { field.width - left };
-    for y in top..=v + SPARSE_RADIUS {
-        let Some(row) = field.response.get(y * field.width + left..).and_then(|rest| rest.get(..columns)) else { break };
+    let about = Surroundings::of(u, field.width);
+    for y in v.saturating_sub(SPARSE_RADIUS)..=v + SPARSE_RADIUS {
         // As strong is too strong before (u, v) in scan order, and allowed from there on.
         let bound = if y < v { strongest } else { strongest + 1 };
-        let beaten = row.iter().fold(false, |beaten, &x| beaten | (x * SIGN >= bound));
-        if beaten || (y == v && row.iter().take(u - left).any(|&x| x * SIGN == strongest)) {
-            return false;
+        match about.any(field.response, y, |x| x * SIGN >= bound) {
+            Some(true) => return false,
+            Some(false) => {}
+            None => break,
         }
     }
-    true
+    let before = field.response.get(v * field.width + about.left..).unwrap_or_default();
+    !before.iter().take(u - about.left).any(|&x| x * SIGN == strongest)
 }
 
 #[cfg(test)]
