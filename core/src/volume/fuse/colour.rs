@@ -18,20 +18,15 @@ impl Fusion<'_> {
     #[inline(always)]
     pub(super) fn colour_layer(&self, scratch: &Scratch, [red, green, blue]: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
         let near = self.near_surface(scratch);
-        let mut bits = packed(&near);
+        let bits = packed(&near);
         if bits == 0 {
             return;
         }
         let share = self.colour_shares(scratch, &near, [red, green, blue], weight);
         let (mut reds, mut greens, mut blues) = ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
-        while bits != 0 {
-            let i = bits.trailing_zeros() as usize & (LAYER_VOXELS - 1);
-            bits &= bits - 1;
-            let (u, v) = (scratch.column[i] as usize, scratch.row[i] as usize);
-            match self.seen.colour {
-                Some(image) => [reds[i], greens[i], blues[i]] = image.get(u, v).unwrap_or_default(),
-                None => reds[i] = self.seen.grey.get(u, v).unwrap_or_default(),
-            }
+        match self.seen.colour {
+            Some(image) => scratch.pixels_at(bits, image, |i, pixel| [reds[i], greens[i], blues[i]] = pixel),
+            None => scratch.pixels_at(bits, self.seen.grey, |i, pixel| reds[i] = pixel),
         }
         // What was grey stays grey: one plane is the others.
         let grey = self.seen.colour.is_none() && red == green && green == blue;

@@ -6,6 +6,7 @@
 use super::{Fusion, SHARES};
 use crate::{
     geometry::scalar::clamp_f32,
+    image::View,
     volume::{
         BLOCK_SIDE,
         block::{LAYER_VOXELS, Layer},
@@ -98,6 +99,19 @@ impl Scratch {
             share: [0; LAYER_VOXELS],
         }
     }
+
+    /// What an image of the depths' size shows at the voxels of these bits, each of which falls into it.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "the mask keeps voxels below LAYER_VOXELS, the length of every layer")]
+    pub(super) fn pixels_at<T: Copy + Default>(&self, mut bits: u64, image: View<'_, T>, mut visit: impl FnMut(usize, T)) {
+        let (pixels, stride) = image.strided();
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize & (LAYER_VOXELS - 1);
+            bits &= bits - 1;
+            let at = self.row[i] as usize * stride + self.column[i] as usize;
+            visit(i, pixels.get(at).copied().unwrap_or_default());
+        }
+    }
 }
 
 impl Fusion<'_> {
@@ -147,12 +161,16 @@ impl Fusion<'_> {
     /// Reads the depths observed. Whether there is any.
     #[inline(always)]
     fn observe(&self, scratch: &mut Scratch) -> bool {
-        let mut any = 0;
-        for (observed_m, &pixel) in scratch.observed_m.iter_mut().zip(&scratch.pixel) {
-            *observed_m = self.depth_m.get(pixel as usize).copied().unwrap_or(0.0);
-            any |= observed_m.to_bits();
+        let depth_m = self.depth_m;
+        // Eight loads in a row, and one store: a loop of single ones is all jumps.
+        for (observed_m, pixels) in scratch.observed_m.as_chunks_mut::<BLOCK_SIDE>().0.iter_mut().zip(scratch.pixel.as_chunks().0) {
+            let mut row = [0.0; BLOCK_SIDE];
+            for (observed_m, &pixel) in row.iter_mut().zip::<&[u32; BLOCK_SIDE]>(pixels) {
+                *observed_m = depth_m.get(pixel as usize).copied().unwrap_or(0.0);
+            }
+            *observed_m = row;
         }
-        any != 0
+        scratch.observed_m.iter().fold(0, |any, observed_m| any | observed_m.to_bits()) != 0
     }
 
     /// Compares voxels with what is observed. Whether any is neither unobserved nor hidden.
