@@ -32,8 +32,9 @@ pub(super) struct Row<'a, const LEFT: bool> {
 }
 
 /// What the eight pixels at hand may match.
-struct Candidates<'p> {
-    points: &'p Eight<Descriptor>,
+struct Candidates {
+    /// A copy, so that compilers keep it in registers.
+    points: Eight<Descriptor>,
     /// Column of the first pixel.
     u: usize,
     /// Greatest disparity of each pixel: beyond it the other row has no descriptors.
@@ -62,8 +63,8 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
     #[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
     pub fn match_eight(&mut self, u: usize, count: usize, listed: &[u32], row: &mut [i16], kernels: &impl Kernels) {
         let [spare, spare_other] = &mut self.spare;
-        let points = eight(self.here, u, spare);
-        let texture = kernels.sums(points, &UNTEXTURED);
+        let points = *eight(self.here, u, spare);
+        let texture = kernels.sums(&points, &UNTEXTURED);
         let mut planes = load(row, u);
         let count = count.min(LANES) as i32;
         let mut own = [NOTHING; LANES];
@@ -93,7 +94,7 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
     }
 }
 
-impl Candidates<'_> {
+impl Candidates {
     /// The least key of each pixel, [`BARRED`] where it has none.
     #[inline(always)]
     fn least_keys<const LEFT: bool>(
@@ -163,14 +164,14 @@ impl Candidates<'_> {
             for lane in 0..LANES {
                 twos[lane] = rows[lane].get(step..)?.first_chunk()?;
             }
-            let [one, two] = kernels.sums_of_two(self.points, twos);
+            let [one, two] = kernels.sums_of_two(&self.points, twos);
             best = lowered(lowered(best, one, step, about), two, step + 1, about_next);
         }
         let mut lasts = [&Descriptor::UNTEXTURED; LANES];
         for lane in 0..LANES {
             lasts[lane] = rows[lane].get(last)?;
         }
-        Some(lowered(best, kernels.sums_of(self.points, lasts), last, *cost.about_plane.get(last)?))
+        Some(lowered(best, kernels.sums_of(&self.points, lasts), last, *cost.about_plane.get(last)?))
     }
 
     /// The lesser of keys and of those about each pixel's own plane, wherever they are.
@@ -232,7 +233,7 @@ impl Candidates<'_> {
                 border = i;
                 break;
             };
-            keys = kernels.least(keys, [self.points, others], base);
+            keys = kernels.least(keys, [&self.points, others], base);
         }
         let mut best = kernels.ordered(keys);
         for &base in part(bases, border..) {
@@ -240,7 +241,7 @@ impl Candidates<'_> {
             if d > self.reach_max {
                 break;
             }
-            let keys = kernels.ordered(kernels.least([BARRED; LANES], [self.points, eight(other, column(base), spare)], base));
+            let keys = kernels.ordered(kernels.least([BARRED; LANES], [&self.points, eight(other, column(base), spare)], base));
             for ((best, key), &reach) in best.iter_mut().zip(keys).zip(&self.reach) {
                 *best = if d > reach { *best } else { key.min(*best) };
             }
