@@ -74,30 +74,60 @@ impl Digest {
 
     /// Takes in a run of bytes. Its last stripe is filled up with zeros; the length goes in as well.
     pub fn bytes(&mut self, bytes: &[u8]) {
-        // A copy, so that lanes stay in registers from stripe to stripe.
-        let mut lanes = self.lanes;
         let (stripes, rest) = bytes.as_chunks();
-        stripes.iter().for_each(|stripe| take(&mut lanes, stripe));
+        self.stripes(stripes);
         if !rest.is_empty() {
             let mut stripe = [0; STRIPE_BYTES];
             stripe.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
-            take(&mut lanes, &stripe);
+            self.stripes(&[stripe]);
+        }
+        self.end_run(bytes.len());
+    }
+
+    /// As [`Digest::bytes`] of whole stripes, to be compiled for its caller's vectors.
+    #[inline(always)]
+    pub(crate) fn whole_bytes<const N: usize>(&mut self, bytes: &[u8; N]) {
+        const { assert!(N.is_multiple_of(STRIPE_BYTES)) }
+        self.stripes(bytes.as_chunks().0);
+        self.end_run(N);
+    }
+
+    /// As [`Digest::i16s`] of whole stripes, to be compiled for its caller's vectors.
+    #[inline(always)]
+    pub(crate) fn whole_i16s<const N: usize>(&mut self, values: &[i16; N]) {
+        const { assert!(N.is_multiple_of(STRIPE_BYTES / 2)) }
+        self.i16_stripes(values.as_chunks().0);
+        self.end_run(2 * N);
+    }
+
+    #[inline(always)]
+    fn stripes(&mut self, stripes: &[[u8; STRIPE_BYTES]]) {
+        // A copy, so that lanes stay in registers from stripe to stripe.
+        let mut lanes = self.lanes;
+        for stripe in stripes {
+            take(&mut lanes, stripe);
         }
         self.lanes = lanes;
-        self.end_run(bytes.len());
+    }
+
+    #[inline(always)]
+    fn i16_stripes(&mut self, stripes: &[[i16; STRIPE_BYTES / 2]]) {
+        let mut lanes = self.lanes;
+        for stripe in stripes {
+            take(&mut lanes, &low_bytes_first(stripe));
+        }
+        self.lanes = lanes;
     }
 
     /// Takes in a run of 16-bit integers: as one of bytes, two for each integer, the low one first.
     pub fn i16s(&mut self, values: &[i16]) {
-        let mut lanes = self.lanes;
         let (stripes, rest) = values.as_chunks();
-        stripes.iter().for_each(|stripe| take(&mut lanes, &low_bytes_first(stripe)));
+        self.i16_stripes(stripes);
         if !rest.is_empty() {
             let mut stripe = [0; STRIPE_BYTES / 2];
             stripe.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
-            take(&mut lanes, &low_bytes_first(&stripe));
+            self.i16_stripes(&[stripe]);
         }
-        self.lanes = lanes;
         self.end_run(2 * values.len());
     }
 
@@ -120,7 +150,7 @@ impl Digest {
 }
 
 /// A stripe of 16-bit integers as bytes. Where memory is laid out that way already, compilers leave nothing of it.
-#[inline]
+#[inline(always)]
 fn low_bytes_first(values: &[i16; STRIPE_BYTES / 2]) -> [u8; STRIPE_BYTES] {
     let mut stripe = [0; STRIPE_BYTES];
     stripe.as_chunks_mut().0.iter_mut().zip(values).for_each(|(to, from)| *to = from.to_le_bytes());
@@ -128,7 +158,7 @@ fn low_bytes_first(values: &[i16; STRIPE_BYTES / 2]) -> [u8; STRIPE_BYTES] {
 }
 
 /// Takes a stripe into the lanes.
-#[inline]
+#[inline(always)]
 fn take(lanes: &mut [u64; LANES], stripe: &[u8; STRIPE_BYTES]) {
     for (lane, &word) in lanes.iter_mut().zip(stripe.as_chunks().0) {
         *lane = mixed(*lane ^ u64::from_le_bytes(word));
@@ -136,7 +166,7 @@ fn take(lanes: &mut [u64; LANES], stripe: &[u8; STRIPE_BYTES]) {
 }
 
 /// The product of both halves, and the halves swapped. Two shifts in place of one rotation: that, compilers put into vectors.
-#[inline]
+#[inline(always)]
 const fn mixed(x: u64) -> u64 {
     let (low, high) = (x & 0xFFFF_FFFF, x >> 32);
     low.wrapping_mul(high).wrapping_add(high | x << 32)

@@ -273,3 +273,16 @@ fn digests_are_those_that_files_hold() {
         assert_eq!(found, expected, "digest {at}");
     }
 }
+
+#[test]
+fn whole_stripes_are_runs_like_any_other() {
+    let bytes: [u8; 128] = core::array::from_fn(|i| (i * 37) as u8);
+    let values: [i16; 64] = core::array::from_fn(|i| (i * 977) as i16);
+    let [mut whole, mut run] = [Digest::default(); 2];
+    whole.whole_bytes(&bytes);
+    run.bytes(&bytes);
+    assert_eq!(whole, run);
+    whole.whole_i16s(&values);
+    run.i16s(&values);
+    assert_eq!(whole, run);
+}

@@ -221,11 +221,14 @@ impl Fusion<'_> {
 }
 
 /// Digest of a block's coordinates and content.
+#[inline(always)]
 pub(super) fn block_digest(coord: BlockCoord, Voxels { sdf, weight }: &Voxels, colour: Option<&Colour>) -> u64 {
     let mut digest = Digest::default();
     digest.u64([coord.x, coord.y, coord.z, 0].iter().fold(0, |packed, &along| packed << 16 | u64::from(along as u16)));
-    digest.i16s(sdf);
-    digest.bytes(weight);
-    colour.into_iter().flatten().for_each(|plane| digest.bytes(plane));
+    digest.whole_i16s(sdf);
+    digest.whole_bytes(weight);
+    for plane in colour.into_iter().flatten() {
+        digest.whole_bytes(plane);
+    }
     digest.finish()
 }
