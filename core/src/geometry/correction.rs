@@ -1,6 +1,6 @@
 //! What is left of a calibration's error in the disparity, and how it is taken out.
 
-use super::StereoRig;
+use super::{StereoRig, scalar::floored_i32};
 use crate::image::{DISPARITY_FILLED, DISPARITY_ONE_PX};
 
 /// What must be added to a disparity, by where the right camera sees the point.
@@ -80,9 +80,9 @@ impl ColumnCorrection {
         for (u, disparity) in (0i32..).zip(disparity_q8) {
             let px = f32::from(*disparity) / ONE_PX;
             let value = (px + self.at(u as f32 - px)) * ONE_PX + 0.5;
-            // What is below 0, and no number, becomes 0, which is none. A cast to 32 bits is one that vectors have.
+            // What is below 0, and no number, becomes 0, which is none.
             let held = if value > 0.0 { value } else { 0.0 };
-            let corrected = (if held < MOST { held } else { MOST }) as i32 as u16;
+            let corrected = floored_i32(if held < MOST { held } else { MOST }) as u16;
             let (corrected, mark) = (corrected & !DISPARITY_FILLED, *disparity & DISPARITY_FILLED);
             *disparity = if (*disparity == 0) | (corrected == 0) { 0 } else { corrected | mark };
         }

@@ -30,3 +30,33 @@ pub(crate) fn floor_i32(value: f32) -> i32 {
     let truncated = value as i32;
     truncated.saturating_sub(i32::from(value < truncated as f32))
 }
+
+/// The nearest integer to a `value` within ±2^22, ties to even, by the float format itself; any bits at all beyond.
+#[inline(always)]
+pub(crate) fn rounded_i32(value: f32) -> i32 {
+    const MAGIC: f32 = 12_582_912.0;
+    ((value + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)
+}
+
+/// As [`floor_i32`] of a `value` within ±2^22, in loops: its cast, which saturates, is one that compilers do one by one.
+#[inline(always)]
+pub(crate) fn floored_i32(value: f32) -> i32 {
+    let near = rounded_i32(value);
+    near.wrapping_sub(i32::from(near as f32 > value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_loops_round_down_is_what_a_cast_does() {
+        for eighth in -4_000..4_000 {
+            let value = eighth as f32 * 0.125;
+            assert_eq!(floored_i32(value), floor_i32(value), "{value}");
+        }
+        for value in [-0.0, 0.999_999_94, 65_534.996, 65_535.0, -4_194_303.5, 4_194_303.5, 1.0e-30, -1.0e-30] {
+            assert_eq!(floored_i32(value), floor_i32(value), "{value}");
+        }
+    }
+}

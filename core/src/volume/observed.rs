@@ -12,7 +12,7 @@
 
 use super::{DistanceAlong, VolumeConfig};
 use crate::{
-    geometry::StereoRig,
+    geometry::{StereoRig, scalar::floored_i32},
     image::{View, ViewMut},
     parallel::{Bands, Executor, Work, each, zip2},
     part::{part, part_mut},
@@ -151,9 +151,10 @@ impl ObservedDepth<'_> {
         let mut levels = [0; BLOCK];
         for (level, (&normal, &disparity)) in levels.iter_mut().zip(normals.iter().zip(here)) {
             let share = f32::from(disparity) * (1.0 / 256.0) / normal;
-            // Without a disparity it is no number, which becomes 0.
-            let rounded = (share * LEVELS as f32 + 0.5) as i32;
-            *level = if rounded > LEVELS as i32 { LEVELS as i32 } else { rounded }.max(1) as u32 - 1;
+            let level_share = share * LEVELS as f32 + 0.5;
+            // Without a disparity it is no number, which becomes 1.
+            let least = if level_share > 1.0 { level_share } else { 1.0 };
+            *level = floored_i32(if least < LEVELS as f32 { least } else { LEVELS as f32 }) as u32 - 1;
         }
         levels
     }

@@ -5,7 +5,7 @@
 
 use super::{Fusion, SHARES};
 use crate::{
-    geometry::scalar::clamp_f32,
+    geometry::scalar::{clamp_f32, rounded_i32},
     image::View,
     volume::{
         BLOCK_SIDE,
@@ -48,13 +48,6 @@ impl Shares {
         let unit = self.units.get(sum as usize).copied().unwrap_or(0);
         -((gain * unit + 128) >> 8) as i16
     }
-}
-
-/// Rounds to the nearest integer, ties to even, by the float format itself: exact for magnitudes below 2^22, and any bits at all beyond.
-#[inline(always)]
-fn rounded(value: f32) -> i32 {
-    const MAGIC: f32 = 12_582_912.0;
-    ((value + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)
 }
 
 /// What is computed of a layer on the way.
@@ -146,8 +139,8 @@ impl Fusion<'_> {
         }
         for i in 0..LAYER_VOXELS {
             let scale = self.focal_px / scratch.z_m[i];
-            scratch.column[i] = rounded(scratch.x_m[i] * scale + self.center_u_px);
-            scratch.row[i] = rounded(scratch.y_m[i] * scale + self.center_v_px);
+            scratch.column[i] = rounded_i32(scratch.x_m[i] * scale + self.center_u_px);
+            scratch.row[i] = rounded_i32(scratch.y_m[i] * scale + self.center_v_px);
         }
         for i in 0..LAYER_VOXELS {
             let (column, row) = (scratch.column[i] as u32, scratch.row[i] as u32);
@@ -192,7 +185,7 @@ impl Fusion<'_> {
         for i in 0..LAYER_VOXELS {
             let distance_m = scratch.distance_m[i];
             scratch.hit[i] &= -i16::from(distance_m >= -behind_m);
-            scratch.target[i] = rounded(clamp_f32(distance_m, -truncation_m, truncation_m) * scale) as i16;
+            scratch.target[i] = rounded_i32(clamp_f32(distance_m, -truncation_m, truncation_m) * scale) as i16;
         }
         scratch.hit.iter().fold(0, |any, hit| any | hit) != 0
     }
