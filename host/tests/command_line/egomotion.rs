@@ -23,7 +23,8 @@ fn the_depth_tracker_tracks_a_slow_camera_and_reports_tracking_failures() {
         let motions = csv.lines().skip(1).map(|line| line.split(',').nth(at).unwrap().to_owned()).collect::<Vec<_>>();
         (summary["egomotion"].clone(), motions, String::from_utf8_lossy(&run.stdout).into_owned(), read("report.html"))
     };
-    let (slow, motions, ..) = run("0.4", &["--quiet"]);
+    // Disparities that are smoothed twice make the tracker less accurate (decision 43).
+    let (slow, motions, ..) = run("0.4", &["--quiet", "--set", "stereo.adaptive_mean=1"]);
     assert_eq!((&slow["source"], &slow["status"], &slow["tracking_failures"]), (&"icp".into(), &"ok".into(), &0.into()));
     assert_eq!(motions, ["first", "tracked", "tracked", "tracked", "tracked"]);
     assert!(slow["ate_m"].as_f64().unwrap() < 0.05, "{slow}");
