@@ -31,9 +31,11 @@ fn paint() {
 #[inline(never)]
 fn used() -> usize {
     let top = stack_pointer();
+    // This frame may begin a little below the painter's.
+    let deepest = PAINTED - MARGIN;
     // SAFETY: as in `paint`; the bytes were written there.
-    let kept = (MARGIN..PAINTED).rev().take_while(|&below| unsafe { top.wrapping_sub(below).read_volatile() } == PAINT).count();
-    PAINTED - kept
+    let kept = (MARGIN..deepest).rev().take_while(|&below| unsafe { top.wrapping_sub(below).read_volatile() } == PAINT).count();
+    deepest - kept
 }
 
 /// What `work` gives, in its caller's frame, and the stack it took below that.

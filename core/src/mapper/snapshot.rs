@@ -128,11 +128,11 @@ impl<'s> Mapper<'s> {
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
     ) -> Result<Self, RestoreError<E>> {
         // Used where it lies, as a mapper is some kilobytes: each move would take as much stack again.
-        let mut made = Self::new(capacity, config, slab).map_err(RestoreError::New);
+        let mut made = Self::new(capacity, config, slab);
         if let Ok(mapper) = &mut made {
             mapper.read(capacity, config, source)?;
         }
-        made
+        made.map_err(RestoreError::New)
     }
 
     /// Reads what [`Mapper::save`] wrote into a new mapper.
