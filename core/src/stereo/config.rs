@@ -82,7 +82,7 @@ pub struct StereoConfig {
     /// Lone segments smaller than this share of the image are removed as well: no pixel of another one that is as similar is within `lone_gap`
     /// px along a row or column. 0..=1; 0 keeps all. 0.002 (docs/decisions/0043-lone-segments.md); published: 0.
     pub lone_share: f32,
-    /// Widest gap between two segments of which none is lone, px; at most `gap_width` of it counts. 32.
+    /// Widest gap to the next segment of the same surface, px: a segment with wider ones is lone. No more than `gap_width` counts. 32.
     pub lone_gap: usize,
     /// Widest gap filled along rows and columns, px; 0 fills none. 70; published: 3; DynSLAM: 21.
     pub gap_width: usize,

@@ -93,7 +93,7 @@ impl Scratch {
         }
     }
 
-    /// What an image of the depths' size shows at the voxels of these bits, each of which falls into it.
+    /// What an image of the depths' size shows at the voxels of these bits; all of them fall into it.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "the mask keeps voxels below LAYER_VOXELS, the length of every layer")]
     pub(super) fn pixels_at<T: Copy + Default>(&self, mut bits: u64, image: View<'_, T>, mut visit: impl FnMut(usize, T)) {
