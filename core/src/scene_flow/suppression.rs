@@ -170,6 +170,7 @@ impl<const SIGN: i16> Block<'_, SIGN> {
     #[inline(always)]
     fn is_first(&self, u: usize, v: usize, response: i16) -> Option<bool> {
         // Eight columns of a row are one vector; those that are later, or too far, count as different.
+        const { assert!(DENSE_RADIUS == 3) }
         const EARLIER: [i16; 8] = [0, 0, 0, -1, -1, -1, -1, -1];
         const ABOVE: [i16; 8] = [0, 0, 0, 0, 0, 0, 0, -1];
         let equal_in = |y: usize, ignored: [i16; 8]| {
@@ -206,6 +207,8 @@ struct Surroundings {
 impl Surroundings {
     #[inline(always)]
     fn of(u: usize, width: usize) -> Self {
+        // At the margin as well.
+        const { assert!(FEATURE_MARGIN + SPARSE_RADIUS >= 16 && 2 * SPARSE_RADIUS < 32) }
         let left = u.saturating_sub(SPARSE_RADIUS);
         let end = if u + SPARSE_RADIUS < width { u + SPARSE_RADIUS + 1 } else { width };
         Self { left, columns: end - left, width }

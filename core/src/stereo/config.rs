@@ -8,6 +8,8 @@ pub const DISPARITY_LIMIT: u16 = 255;
 pub const MIN_CANDIDATE_STEP: usize = 5;
 /// Smallest cell of the grid prior, px: the bound on cells follows from it.
 pub const MIN_GRID_SIZE: usize = 10;
+/// Most passes of the adaptive mean.
+const MEAN_PASSES_MAX: u8 = 4;
 /// Widest search around the prior plane, px.
 pub const MAX_PLANE_RADIUS: usize = 16;
 
@@ -155,7 +157,7 @@ impl StereoConfig {
         check((0.0..=1.0).contains(&self.lone_share), "stereo.lone_share", "must be within 0..=1");
         check(self.lone_gap <= 4_096, "stereo.lone_gap", "must be at most 4096 px");
         check(self.gap_width <= 4_096, "stereo.gap_width", "must be at most 4096 px");
-        check(self.adaptive_mean <= 4, "stereo.adaptive_mean", "must be at most 4");
+        check(self.adaptive_mean <= MEAN_PASSES_MAX, "stereo.adaptive_mean", "must be at most 4");
     }
 
     /// Disparities searched to each side of the prior plane, px.
