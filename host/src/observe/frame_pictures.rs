@@ -4,43 +4,40 @@ use super::{FrameContext, pictures};
 use crate::formats::Image;
 use image::RgbImage;
 
-/// JPEG files of a frame, as far as they were asked for. Empty where there is no picture.
-#[derive(Default)]
-pub struct FramePictures {
-    left: Option<Vec<u8>>,
-    disparity: Option<Vec<u8>>,
-    map: Option<Vec<u8>>,
-    composed: Option<Vec<u8>>,
+/// What a picture of a frame shows.
+#[derive(Clone, Copy)]
+pub(super) enum Shown {
+    /// The left image: in colour where that lies on the image that was matched.
+    Left,
+    /// Disparity in colours.
+    Disparity,
+    /// The static map from the camera's pose.
+    Map,
+    /// The same with every object in its place; none without objects.
+    Composed,
 }
 
+/// JPEG files of a frame, as far as they were asked for. Empty where there is no picture.
+#[derive(Default)]
+pub struct FramePictures([Option<Vec<u8>>; 4]);
+
 impl FrameContext<'_, '_> {
-    /// The left image: in colour where that lies on the image that was matched.
-    pub(super) fn left_jpeg(&mut self) -> Vec<u8> {
-        let made = self.pictures.left.take().unwrap_or_else(|| jpeg(left(self)));
-        self.pictures.left.insert(made).clone()
+    /// A picture as a JPEG file, made when it is first asked for; empty without a picture.
+    pub(super) fn jpeg(&mut self, shown: Shown) -> Vec<u8> {
+        let at = shown as usize;
+        let made = self.pictures.0[at].take();
+        let made = made.unwrap_or_else(|| self.picture(shown).as_ref().map(pictures::jpeg).unwrap_or_default());
+        self.pictures.0[at].insert(made).clone()
     }
 
-    /// Disparity in colours.
-    pub(super) fn disparity_jpeg(&mut self) -> Vec<u8> {
-        let made = self.pictures.disparity.take();
-        let made = made.unwrap_or_else(|| pictures::jpeg(&pictures::disparity(&self.view.mapper().disparity_q8())));
-        self.pictures.disparity.insert(made).clone()
-    }
-
-    /// The static map from the camera's pose.
-    pub(super) fn map_jpeg(&mut self) -> Vec<u8> {
+    fn picture(&mut self, shown: Shown) -> Option<RgbImage> {
         let t_world_camera = self.row.report.t_world_camera;
-        let made = self.pictures.map.take();
-        let made = made.unwrap_or_else(|| jpeg(pictures::map(pictures::SMALL_PX, self.view, &t_world_camera)));
-        self.pictures.map.insert(made).clone()
-    }
-
-    /// The same with every object in its place; empty without objects.
-    pub(super) fn composed_jpeg(&mut self) -> Vec<u8> {
-        let t_world_camera = self.row.report.t_world_camera;
-        let made = self.pictures.composed.take();
-        let made = made.unwrap_or_else(|| jpeg(pictures::composed(pictures::SMALL_PX, self.view, &t_world_camera)));
-        self.pictures.composed.insert(made).clone()
+        match shown {
+            Shown::Left => left(self),
+            Shown::Disparity => Some(pictures::disparity(&self.view.mapper().disparity_q8())),
+            Shown::Map => pictures::map(pictures::SMALL_PX, self.view, &t_world_camera),
+            Shown::Composed => pictures::composed(pictures::SMALL_PX, self.view, &t_world_camera),
+        }
     }
 }
 
@@ -50,9 +47,4 @@ pub(super) fn left(frame: &FrameContext<'_, '_>) -> Option<RgbImage> {
     let colour = frame.images.colour.as_ref().filter(|_| rectified.is_none()).and_then(Image::view);
     let grey = rectified.or_else(|| frame.images.left.view())?;
     Some(pictures::input(&grey, colour.as_ref()))
-}
-
-/// A picture as a JPEG file; empty without a picture.
-fn jpeg(picture: Option<RgbImage>) -> Vec<u8> {
-    picture.as_ref().map(pictures::jpeg).unwrap_or_default()
 }

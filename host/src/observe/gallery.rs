@@ -1,6 +1,6 @@
 //! Pictures of some frames and of the finished map as files, for the viewer: a fixed number, however long the run.
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, frame_pictures::Shown, pictures, spread};
 use crate::scene::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -107,9 +107,9 @@ fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), Ob
     std::fs::create_dir_all(folder).map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
     let disparity_q8 = frame.view.mapper().disparity_q8();
     let masks = pictures::masks(frame.view.mapper(), disparity_q8.width(), disparity_q8.height());
-    let composed = frame.composed_jpeg();
-    let map = if composed.is_empty() { frame.map_jpeg() } else { composed };
-    let (left, disparity) = (frame.left_jpeg(), frame.disparity_jpeg());
+    let composed = frame.jpeg(Shown::Composed);
+    let map = if composed.is_empty() { frame.jpeg(Shown::Map) } else { composed };
+    let (left, disparity) = (frame.jpeg(Shown::Left), frame.jpeg(Shown::Disparity));
     let number = frame.row.frame;
     for (kind, picture) in PictureKind::ALL.into_iter().zip([left, masks, disparity, map]) {
         if !picture.is_empty() {

@@ -1,6 +1,6 @@
 //! Pictures of some frames, and of the finished map.
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, spread};
+use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, frame_pictures::Shown, spread};
 use serde::{Deserialize, Serialize};
 
 /// Frames shown in the report.
@@ -65,7 +65,7 @@ impl Observer for KeyframesObserver {
 }
 
 fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
-    let (input_jpeg, disparity_jpeg, raycast_jpeg) = (frame.left_jpeg(), frame.disparity_jpeg(), frame.map_jpeg());
+    let (input_jpeg, disparity_jpeg, raycast_jpeg) = (frame.jpeg(Shown::Left), frame.jpeg(Shown::Disparity), frame.jpeg(Shown::Map));
     if input_jpeg.is_empty() || raycast_jpeg.is_empty() {
         return None;
     }
@@ -74,6 +74,6 @@ fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
         input_jpeg,
         disparity_jpeg,
         raycast_jpeg,
-        composed_jpeg: frame.composed_jpeg(),
+        composed_jpeg: frame.jpeg(Shown::Composed),
     })
 }

@@ -4,7 +4,9 @@
 mod messages;
 mod schemas;
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup, frame_pictures, pictures};
+use super::{
+    EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup, frame_pictures, frame_pictures::Shown, pictures,
+};
 use dynvox_core::geometry::Transform;
 use dynvox_core::view::RaycastView;
 use mcap::records::MessageHeader;
@@ -90,7 +92,7 @@ impl Recording {
             )?;
             self.write(Topic::Left, time_ns, &messages::image(stamp, &pictures::jpeg(&left)))?;
         }
-        let disparity = frame.disparity_jpeg();
+        let disparity = frame.jpeg(Shown::Disparity);
         self.write(Topic::Disparity, time_ns, &messages::image(stamp, &disparity))?;
         self.write(Topic::Objects, time_ns, &messages::objects(stamp, frame.view.mapper()))?;
         self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
