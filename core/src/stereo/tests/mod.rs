@@ -20,6 +20,15 @@ pub(super) struct Grey {
 }
 
 impl Grey {
+    /// An image of what is at each column and row.
+    pub(super) fn of(width: usize, height: usize, at: impl Fn(f32, usize) -> f32) -> Self {
+        Self {
+            width,
+            height,
+            pixels: (0..width * height).map(|i| at((i % width) as f32, i / width) as u8).collect(),
+        }
+    }
+
     pub(super) fn view(&self) -> View<'_, u8> {
         View::new(&self.pixels, self.width, self.height).unwrap()
     }

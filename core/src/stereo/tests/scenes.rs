@@ -27,11 +27,7 @@ impl Texture {
 /// A pair on whose left image the disparity is `truth(u, v)`, which must change slowly enough along rows to be one surface.
 pub(super) fn surface(width: usize, height: usize, seed: u64, truth: impl Fn(f32, f32) -> f32) -> (Grey, Grey) {
     let texture = Texture::new(width + 260, height, seed);
-    let image = |at: &dyn Fn(f32, f32) -> f32| Grey {
-        width,
-        height,
-        pixels: (0..width * height).map(|i| texture.at(at((i % width) as f32, (i / width) as f32), i / width) as u8).collect(),
-    };
+    let image = |at: &dyn Fn(f32, f32) -> f32| Grey::of(width, height, |u, v| texture.at(at(u, v as f32), v));
     let left = image(&|u, _| u);
     // The right image sees at column x what the left one sees at u with u - d(u) = x.
     let right = image(&|x, v| (0..60).fold(x, |u, _| x + truth(u, v)));
@@ -99,16 +95,11 @@ fn a_right_image_moved_by_five_pixels_moves_the_result_by_five() {
 #[test]
 fn a_pillar_before_a_wall_keeps_its_edges() {
     let (wall, pillar) = (Texture::new(660, 120, 4), Texture::new(660, 120, 5));
-    let image = |shift: f32| Grey {
-        width: 400,
-        height: 120,
-        pixels: (0..400 * 120)
-            .map(|i| {
-                let (u, v) = ((i % 400) as f32, i / 400);
-                let near = (180.0..220.0).contains(&(u + shift * 40.0));
-                if near { pillar.at(u + shift * 40.0, v) as u8 } else { wall.at(u + shift * 15.0, v) as u8 }
-            })
-            .collect(),
+    let image = |shift: f32| {
+        Grey::of(400, 120, |u, v| {
+            let near = (180.0..220.0).contains(&(u + shift * 40.0));
+            if near { pillar.at(u + shift * 40.0, v) } else { wall.at(u + shift * 15.0, v) }
+        })
     };
     let (_, disparity) = disparity(&StereoConfig::default(), &image(0.0), &image(1.0), &Serial);
     let share = |columns: std::ops::Range<usize>, expected: f32| {
@@ -127,24 +118,19 @@ fn a_lone_patch_goes_and_one_of_the_wall_behind_a_gap_stays() {
     let (wall, near) = (Texture::new(660, 120, 6), Texture::new(660, 120, 7));
     // A patch of 24 x 20 px floats before the wall; another of the wall's own is framed by 20 px without texture.
     let (floating, framed, frame) = ((94.0..118.0, 50..70), (274.0..298.0, 50..70), (254.0..318.0, 30..90));
-    let image = |shift: f32| Grey {
-        width: 400,
-        height: 120,
-        pixels: (0..400 * 120)
-            .map(|i| {
-                let (u, v) = ((i % 400) as f32, i / 400);
-                let inside = |(columns, rows): &(std::ops::Range<f32>, std::ops::Range<usize>), d: f32| {
-                    columns.contains(&(u + shift * d)) && rows.contains(&v)
-                };
-                if inside(&floating, 40.0) {
-                    near.at(u + shift * 40.0, v) as u8
-                } else if inside(&frame, 15.0) && !inside(&framed, 15.0) {
-                    120
-                } else {
-                    wall.at(u + shift * 15.0, v) as u8
-                }
-            })
-            .collect(),
+    let image = |shift: f32| {
+        Grey::of(400, 120, |u, v| {
+            let inside = |(columns, rows): &(std::ops::Range<f32>, std::ops::Range<usize>), d: f32| {
+                columns.contains(&(u + shift * d)) && rows.contains(&v)
+            };
+            if inside(&floating, 40.0) {
+                near.at(u + shift * 40.0, v)
+            } else if inside(&frame, 15.0) && !inside(&framed, 15.0) {
+                120.0
+            } else {
+                wall.at(u + shift * 15.0, v)
+            }
+        })
     };
     let (left, right) = (image(0.0), image(1.0));
     let shown = |lone_share: f32, lone_gap: usize| {
