@@ -5,6 +5,7 @@
 //! are integers below 2^15 and which is therefore the same everywhere.
 
 use crate::{
+    geometry::scalar::rounded_i32,
     parallel::Work,
     part::{part, part_mut},
 };
@@ -43,9 +44,7 @@ fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
             }
         }
         for ((to, &centre), (&numerator, &denominator)) in to.iter_mut().zip(centre).zip(numerators.iter().zip(&denominators)) {
-            // Adding 1.5 x 2^23 rounds to the nearest integer, halves to even, and leaves it in the low bits: no conversion, no check.
-            let rounded = f32::from(numerator) / f32::from(denominator) + 12_582_912.0;
-            let offset = rounded.to_bits() as i16;
+            let offset = rounded_i32(f32::from(numerator) / f32::from(denominator)) as i16;
             *to = if centre == NONE { NONE } else { centre.wrapping_add(offset) };
         }
     }
