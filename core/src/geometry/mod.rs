@@ -8,8 +8,8 @@ mod rig;
 pub mod scalar;
 mod transform;
 
-pub(crate) use correction::ColumnCorrection;
 pub use correction::DisparityCorrection;
+pub(crate) use correction::{PixelCorrection, ROW_SQUARE_MEAN};
 pub use depth::depth_from_disparity;
 pub(crate) use oriented_box::OrientedBox;
 pub(crate) use rig::StereoObservation;

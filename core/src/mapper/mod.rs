@@ -40,7 +40,7 @@ use crate::{
     memory::{Carver, SlabError, region_bytes},
     objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
     planning::Planning,
-    rectify::{RawCamera, RectifiedImages, Rectifier, self_calibration::SelfCalibration},
+    rectify::{AlignedImage, RawCamera, RectifiedImages, Rectifier, self_calibration::SelfCalibration},
     scene_flow::FlowMatcher,
     stereo::StereoMatcher,
     tracking::{InstanceAt, TrackReport, Tracker},
@@ -68,6 +68,7 @@ pub struct Mapper<'s> {
     capacity: Capacity,
     rectifier: Rectifier<'s>,
     rectified: RectifiedImages<'s>,
+    aligned: AlignedImage<'s>,
     stereo: StereoMatcher<'s>,
     scene_flow: FlowMatcher<'s>,
     estimator: Estimator<'s>,
@@ -107,6 +108,7 @@ impl Capacity {
             + Planning::bytes(self)
             + Rectifier::bytes(self)
             + RectifiedImages::bytes(self)
+            + AlignedImage::bytes(self)
     }
 
     /// Every region a mapper of this capacity cuts out of its slab.
@@ -176,6 +178,7 @@ impl<'s> Mapper<'s> {
             planning: Planning::new_in(capacity, &config.planning, config.volume.voxel_size_m, carver),
             rectifier: Rectifier::new_in(capacity, carver),
             rectified: RectifiedImages::new_in(capacity, carver),
+            aligned: AlignedImage::new_in(capacity, carver),
             size: None,
             frame: 0,
             clock: Clock::new(config.tracking.frame_interval_s),

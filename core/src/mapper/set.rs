@@ -156,7 +156,7 @@ macro_rules! section {
 }
 
 section!(rig: RigConfig { self_calibration, baseline_scale } and { disparity_correction });
-section!(disparity_correction: DisparityCorrection { offset_px, slope_px, quartic_px });
+section!(disparity_correction: DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px });
 section!(stereo: StereoConfig {
     disparity_max, support_ratio, support_texture, candidate_step, plausible_window, plausible_threshold, plausible_min, redundant_distance,
     redundant_threshold, grid_size, beta, gamma, sigma, plane_radius_sigmas, plane_slope_max, match_texture, subpixel, consistency_threshold,

@@ -30,7 +30,7 @@ use core::fmt::{self, Write};
 /// What a snapshot begins with.
 pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 /// Version of the layout. Another one is refused: there is no conversion.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 /// Why a mapper cannot be restored. There is no mapper then; the slab may be used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -191,6 +191,7 @@ impl<'s> Mapper<'s> {
             raycaster: _,
             rectifier: _,
             rectified: _,
+            aligned: _,
         } = self;
         let [mut width, mut height] = size.unwrap_or_default();
         visitor.u32(frame);

@@ -10,11 +10,10 @@ use crate::{
     audit::Audit,
     digest::Digest,
     egomotion::MotionEstimate,
-    geometry::DisparityCorrection,
     image::InvalidPair,
     objects::{InstancesReport, NoSink, ObjectFrame, ObjectSink, Picture},
-    rectify::Pair,
-    scene_flow::{FlowMatcher, FlowReport},
+    rectify::{Pair, self_calibration::SelfCalibration},
+    scene_flow::{FlowMatcher, FlowReport, Match},
     state::Hasher,
     stereo::{StereoMatcher, StereoReport},
     tracking::{FrameMatches, GuidedMatching, TrackingReport},
@@ -58,9 +57,14 @@ impl Mapper<'_> {
         let rectified = executor.stage(Stage::Rectify, || self.rectifier.rectify(&raw, &mut images, executor));
         let Pair { left, right, colour } = rectified.unwrap_or(raw);
         let rectification = self.rectifier.report(&Pair { left, right, colour });
-        let frame = StereoFrame { left, right, colour, ..*frame };
+        let mut aligned = core::mem::take(&mut self.aligned);
+        let moved = self
+            .self_calibration
+            .row_shift(&self.config.rig)
+            .and_then(|shift| executor.stage(Stage::Rectify, || aligned.align(right, &shift, executor)));
+        let frame = StereoFrame { left, right: moved.unwrap_or(right), colour, ..*frame };
         let report = self.step_rectified(&frame, size, executor, store, sink);
-        self.rectified = images;
+        (self.rectified, self.aligned) = (images, aligned);
         Ok(report.with_input(input, rectification))
     }
 
@@ -77,7 +81,7 @@ impl Mapper<'_> {
         let invalid = self.rectifier.invalid();
         // (A) Depth from the pair, and (C.1) sparse scene flow over this pair and the last.
         let (stereo, scene_flow) = match_images(config, &mut self.stereo, &mut self.scene_flow, frame, invalid.as_ref(), executor);
-        correct_disparity(config, self.self_calibration.correction(), &mut self.stereo, &mut self.scene_flow, executor);
+        calibrate(config, &mut self.self_calibration, &mut self.stereo, &mut self.scene_flow, executor);
         let disparity_q8 = self.stereo.disparity_q8();
         // Objects are followed from frame to frame: matches with an earlier one say nothing of theirs.
         let with_last = self.camera.since_reference() == 0;
@@ -241,17 +245,19 @@ fn match_images<E: Executor>(
     executor.join(|| executor.stage(Stage::Stereo, compute_disparity), || executor.stage(Stage::SceneFlow, match_features))
 }
 
-/// Takes the disparity error found so far out of the disparity image and the matches.
-fn correct_disparity<E: Executor>(
+/// Learns from the matches which rows agree, and takes the disparity error found so far out of them and of the disparity image.
+fn calibrate<E: Executor>(
     config: &Config,
-    correction: DisparityCorrection,
+    self_calibration: &mut SelfCalibration,
     stereo: &mut StereoMatcher<'_>,
     scene_flow: &mut FlowMatcher<'_>,
     executor: &E,
 ) {
+    self_calibration.update_rows(&config.rig, scene_flow.bucketed().map(Match::row_difference));
+    let correction = self_calibration.correction();
     if !correction.is_zero() {
-        let columns = correction.for_rig(&config.rig);
-        executor.stage(Stage::Stereo, || stereo.correct(columns, executor));
-        executor.stage(Stage::SceneFlow, || scene_flow.correct(columns));
+        let correction = correction.for_rig(&config.rig);
+        executor.stage(Stage::Stereo, || stereo.correct(correction, executor));
+        executor.stage(Stage::SceneFlow, || scene_flow.correct(correction));
     }
 }

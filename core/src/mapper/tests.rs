@@ -6,6 +6,7 @@ mod plan;
 mod random_runs;
 mod raw;
 mod resume;
+mod rows;
 mod self_calibration;
 mod set;
 mod views;

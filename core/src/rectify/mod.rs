@@ -31,6 +31,7 @@
 //! ```
 
 mod align;
+mod align_rows;
 mod double_sphere;
 mod equidistant;
 mod extended_unified;
@@ -45,6 +46,7 @@ pub mod self_calibration;
 mod tests;
 
 pub use align::{Alignment, RawCamera, RawRig, RectifyProblem, WIDEST_ANGLE_RAD};
+pub(crate) use align_rows::AlignedImage;
 pub use lens::{Lens, LensModel, LensProblem};
 pub use map::INVALID_MARGIN_PX;
 pub use monotonic::MAX_STEPS as MAX_RADIAL_STEPS;

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     audit::Audit,
     digest::Digest,
-    geometry::ColumnCorrection,
+    geometry::PixelCorrection,
     image::{InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, Vectors, each, zip3},
@@ -49,7 +49,7 @@ pub struct FlowMatcher<'s> {
     selection: &'s mut [u32],
     selection_len: usize,
     /// What has been taken out of the last frame's matches.
-    correction: ColumnCorrection,
+    correction: PixelCorrection,
 }
 
 const LEFT: Names = Names {
@@ -123,7 +123,7 @@ impl<'s> FlowMatcher<'s> {
             score: carver.alloc("scene_flow.score", matches),
             selection: carver.alloc("scene_flow.selection", matches),
             selection_len: 0,
-            correction: ColumnCorrection::default(),
+            correction: PixelCorrection::default(),
         }
     }
 
@@ -151,19 +151,19 @@ impl<'s> FlowMatcher<'s> {
     /// pixel in the other three images. `None` without a frame before, where it is expected outside an image or at no number, and where it is
     /// lost: no texture, or nothing alike within 1.75 px.
     pub(crate) fn find(&self, expected: &Match) -> Option<Match> {
-        let expected = &expected.with_right(|column| self.correction.uncorrected(column));
+        let expected = &expected.with_right(|at| self.correction.uncorrected(at));
         let [width, height] = self.last.filter(|_| self.matched)?;
         let inside = |at: [f32; 2]| at[0] >= 0.0 && at[1] >= 0.0 && at[0] < width as f32 && at[1] < height as f32;
         let positions = [expected.previous_left, expected.previous_right, expected.current_left, expected.current_right];
         let found = positions.into_iter().all(inside).then(|| find_back(expected, images(&self.left, &self.right, [width, height])))??;
-        Some(found.with_right(|column| self.correction.corrected(column)))
+        Some(found.with_right(|at| self.correction.corrected(at)))
     }
 
     /// Takes a disparity error out of the last frame's matches, and of those found later.
-    pub(crate) fn correct(&mut self, correction: ColumnCorrection) {
+    pub(crate) fn correct(&mut self, correction: PixelCorrection) {
         self.correction = correction;
         for matches in [self.sparse.get_mut(..self.sparse_len), self.refined.get_mut(..self.refined_len)] {
-            matches.unwrap_or_default().iter_mut().for_each(|m| *m = m.with_right(|column| correction.corrected(column)));
+            matches.unwrap_or_default().iter_mut().for_each(|m| *m = m.with_right(|at| correction.corrected(at)));
         }
     }
 
@@ -247,7 +247,7 @@ impl<'s> FlowMatcher<'s> {
 
     fn clear(&mut self) {
         (self.sparse_len, self.refined_len, self.selection_len) = (0, 0, 0);
-        self.correction = ColumnCorrection::default();
+        self.correction = PixelCorrection::default();
         self.matched = false;
     }
 

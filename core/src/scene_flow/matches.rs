@@ -28,14 +28,18 @@ impl Match {
         self.current_left[0] - self.current_right[0]
     }
 
-    /// The same with the columns of both right images replaced.
-    pub(crate) fn with_right(&self, column: impl Fn(f32) -> f32) -> Self {
-        let ([u_previous, v_previous], [u_current, v_current]) = (self.previous_right, self.current_right);
+    /// The same with the positions in both right images moved.
+    pub(crate) fn with_right(&self, moved: impl Fn([f32; 2]) -> [f32; 2]) -> Self {
         Self {
-            previous_right: [column(u_previous), v_previous],
-            current_right: [column(u_current), v_current],
+            previous_right: moved(self.previous_right),
+            current_right: moved(self.current_right),
             ..*self
         }
+    }
+
+    /// Where the right image has it in the current frame, and how far below that the left one has it, px.
+    pub(crate) fn row_difference(&self) -> ([f64; 2], f64) {
+        (self.current_right.map(f64::from), f64::from(self.current_left[1] - self.current_right[1]))
     }
 
     /// Movement in the left image, px.

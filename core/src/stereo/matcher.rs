@@ -13,10 +13,10 @@ use super::{
 };
 use crate::{
     digest::Digest,
-    geometry::ColumnCorrection,
+    geometry::PixelCorrection,
     image::{DISPARITY_ONE_PX, InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
-    parallel::{BANDS, Bands, Executor, Work, each},
+    parallel::{BANDS, Bands, Executor, Work, each, zip2},
     problem::Problems,
 };
 
@@ -45,9 +45,10 @@ pub struct StereoMatcher<'s> {
     height: usize,
 }
 
-/// Takes a disparity error out of rows.
+/// Takes a disparity error out of rows, from `first` on.
 struct CorrectRows<'a> {
-    correction: ColumnCorrection,
+    correction: PixelCorrection,
+    first: usize,
     rows: &'a mut [u16],
     width: usize,
 }
@@ -57,7 +58,8 @@ impl Work for CorrectRows<'_> {
 
     #[inline(always)]
     fn run(self) {
-        self.rows.chunks_exact_mut(self.width.max(1)).for_each(|row| self.correction.correct_row(row));
+        let rows = self.rows.chunks_exact_mut(self.width.max(1));
+        (self.first..).zip(rows).for_each(|(v, row)| self.correction.correct_row(v, row));
     }
 }
 
@@ -234,10 +236,11 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Takes a disparity error out of the last pair's disparities, whichever way they came.
-    pub(crate) fn correct<E: Executor>(&mut self, correction: ColumnCorrection, executor: &E) {
+    pub(crate) fn correct<E: Executor>(&mut self, correction: PixelCorrection, executor: &E) {
         let (width, height) = (self.width, self.height);
-        each(executor, Bands::of(height).split_mut(self.disparity, width), |rows: &mut [u16]| {
-            executor.vectors().run(CorrectRows { correction, rows, width });
+        let bands = Bands::of(height);
+        each(executor, zip2(bands.first(), bands.split_mut(self.disparity, width)), |(first, rows)| {
+            executor.vectors().run(CorrectRows { correction, first, rows, width });
         });
     }
 

@@ -3,7 +3,7 @@
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, instances::stem};
 use crate::formats::{Image, write_png_deep};
 use crate::input::InputError;
-use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::geometry::{DisparityCorrection, StereoRig, Transform};
 use dynvox_core::image::View;
 use serde::{Deserialize, Serialize};
 
@@ -30,8 +30,11 @@ impl Observer for MapDisparityObserver {
 
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         let Some(folder) = setup.save_map_disparity else { return Ok(()) };
+        let calibration = end.last.map(|last| last.report.self_calibration).filter(|report| report.corrected);
+        let correction = calibration.and_then(|report| report.found()).unwrap_or_default();
         for (name, t_world_camera) in self.frames.drain(..) {
-            let seen = end.view.raycast((&t_world_camera).into()).and_then(|seen| disparities(&setup.config.rig, seen.depth_m()?));
+            let seen =
+                end.view.raycast((&t_world_camera).into()).and_then(|seen| disparities(&setup.config.rig, &correction, seen.depth_m()?));
             if let Some(disparity) = seen {
                 write_png_deep(&folder.join(format!("{name}.png")), &disparity).map_err(InputError::from)?;
             }
@@ -44,11 +47,19 @@ impl Observer for MapDisparityObserver {
     }
 }
 
-/// Depths as disparities, in units of 1/256 px; 0 stays none.
-fn disparities(rig: &StereoRig, depth_m: View<'_, f32>) -> Option<Image<u16>> {
-    let of_1_m = (rig.focal_px * rig.baseline_m) as f32 * UNITS_PER_PX;
-    let disparity = |&depth_m: &f32| if depth_m > 0.0 { (of_1_m / depth_m).round().max(1.0) as u16 } else { 0 };
-    Image::new(depth_m.width(), depth_m.height(), depth_m.pixels().iter().map(disparity).collect())
+/// Depths as the disparities that the images themselves have there, without what `correction` adds, in units of 1/256 px; 0 stays none.
+fn disparities(rig: &StereoRig, correction: &DisparityCorrection, depth_m: View<'_, f32>) -> Option<Image<u16>> {
+    let of_1_m = (rig.focal_px * rig.baseline_m) as f32;
+    let width = depth_m.width();
+    let disparity = |(at, &depth_m): (usize, &f32)| {
+        if depth_m <= 0.0 {
+            return 0;
+        }
+        let corrected_px = of_1_m / depth_m;
+        let right_px = [(at % width) as f32 - corrected_px, (at / width) as f32];
+        ((corrected_px - correction.added_px(rig, right_px)) * UNITS_PER_PX).round().max(1.0) as u16
+    };
+    Image::new(width, depth_m.height(), depth_m.pixels().iter().enumerate().map(disparity).collect())
 }
 
 #[cfg(test)]
@@ -59,8 +70,17 @@ mod tests {
     fn depths_become_the_disparities_of_the_rig() {
         let rig = StereoRig { focal_px: 500.0, center_u_px: 1.0, center_v_px: 1.0, baseline_m: 0.5 };
         let depth_m = [0.0, 10.0, 100.0, 1e-3, 1e9, 250.0];
-        let image = disparities(&rig, View::new(&depth_m, 3, 2).unwrap()).unwrap();
+        let none = DisparityCorrection::default();
+        let image = disparities(&rig, &none, View::new(&depth_m, 3, 2).unwrap()).unwrap();
         assert_eq!((image.width(), image.height()), (3, 2));
         assert_eq!(image.pixels(), [0, 25 * 256, 640, u16::MAX, 1, 256]);
+    }
+
+    #[test]
+    fn what_self_calibration_added_is_taken_off_again() {
+        let rig = StereoRig { focal_px: 500.0, center_u_px: 100.0, center_v_px: 1.0, baseline_m: 0.5 };
+        let correction = DisparityCorrection { offset_px: 0.5, row_quadratic_px: -1.0, ..DisparityCorrection::default() };
+        let image = disparities(&rig, &correction, View::new(&[10.0; 3], 1, 3).unwrap()).unwrap();
+        assert_eq!(image.pixels(), [6579, 6323, 6579]);
     }
 }

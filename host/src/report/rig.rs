@@ -4,6 +4,9 @@ use crate::run::RunRecord;
 use dynvox_core::rectify::self_calibration::{CalibrationState, SelfCalibrationReport};
 use serde::Serialize;
 
+/// Difference of rows that is worth a word, px.
+const ROWS_WORTH_A_WORD_PX: f64 = 0.1;
+
 /// The rig's part of `summary.json`.
 #[derive(Debug, Serialize)]
 pub struct RigSummary {
@@ -14,6 +17,10 @@ pub struct RigSummary {
     disparity_slope_px: f64,
     /// Growth of that with the fourth power of the distance from the middle, px at the sides.
     disparity_quartic_px: f64,
+    /// Growth of that with the square of the distance from the middle row, px from there to the first row.
+    disparity_row_quadratic_px: f64,
+    /// Largest difference of the rows in which both cameras see the same, px.
+    row_error_px: f64,
     /// Frames that said something about it.
     disparity_frames: u32,
     /// `sound`, `off` or `recalibrate`.
@@ -34,6 +41,8 @@ pub fn summary(run: &RunRecord) -> Option<RigSummary> {
         disparity_offset_sigma_px: report.offset_sigma_px,
         disparity_slope_px: report.slope_px,
         disparity_quartic_px: report.quartic_px,
+        disparity_row_quadratic_px: report.row_quadratic_px,
+        row_error_px: report.row_error_px,
         disparity_frames: report.frames,
         calibration: match report.state() {
             CalibrationState::Sound => "sound",
@@ -49,7 +58,13 @@ pub fn sentence(run: &RunRecord) -> String {
     let Some(report) = found(run) else {
         return "disparity offset unknown: the camera has to move past something within about 30 m".to_owned();
     };
-    let value = format!("{:+.3} px of disparity, sigma {:.3} px", report.offset_px, report.offset_sigma_px);
+    let rows = if report.row_error_px >= ROWS_WORTH_A_WORD_PX {
+        let moved = if report.corrected { ", aligned" } else { "" };
+        format!("; rows up to {:.1} px apart{moved}", report.row_error_px)
+    } else {
+        String::new()
+    };
+    let value = format!("{:+.3} px of disparity, sigma {:.3} px{rows}", report.offset_px, report.offset_sigma_px);
     let done = if report.corrected { "taken out" } else { "not taken out: set rig.self_calibration=\"apply\"" };
     match report.state() {
         CalibrationState::Sound => format!("sound: {value}"),
@@ -71,10 +86,12 @@ pub fn calibration_toml(run: &RunRecord) -> Option<String> {
     Some(format!(
         "# What must be added to the disparities of this rig, px, as a run over {} frames found it.\n\
          # Another run of the same rig begins with it: dynvox run PATH --config calibration.toml\n\
-         [rig.disparity_correction]\noffset_px = {:.4}\nslope_px = {:.4}\nquartic_px = {:.4}\n",
+         [rig.disparity_correction]\noffset_px = {:.4}\nslope_px = {:.4}\nquartic_px = {:.4}\n\
+         row_quadratic_px = {:.4}\n",
         run.frames.len(),
         found.offset_px,
         found.slope_px,
-        found.quartic_px
+        found.quartic_px,
+        found.row_quadratic_px
     ))
 }

@@ -28,7 +28,7 @@ pub struct RigConfig {
     /// checks it: compare with a distance known from elsewhere. KITTI's 0.5372 m are 0.54 m in truth.
     pub baseline_scale: f64,
     /// What is added to disparities from the first frame on, as another run found it; each of the
-    /// three within 5 px; 0, 0, 0. With self-calibration the search begins there.
+    /// four within 5 px; all 0. With self-calibration the search begins there.
     pub disparity_correction: DisparityCorrection,
 }
 
@@ -49,11 +49,12 @@ impl RigConfig {
     /// Notes what is wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {
         require(problems, (0.5..=2.0).contains(&self.baseline_scale), "rig.baseline_scale", "must be in 0.5..=2");
-        let DisparityCorrection { offset_px, slope_px, quartic_px } = self.disparity_correction;
+        let DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px } = self.disparity_correction;
         for (key, part) in [
             ("rig.disparity_correction.offset_px", offset_px),
             ("rig.disparity_correction.slope_px", slope_px),
             ("rig.disparity_correction.quartic_px", quartic_px),
+            ("rig.disparity_correction.row_quadratic_px", row_quadratic_px),
         ] {
             let within = (-Self::CORRECTION_MAX_PX..=Self::CORRECTION_MAX_PX).contains(&part);
             require(problems, within, key, "must be in -5..=5");

@@ -22,6 +22,28 @@ pub(super) struct FrameInformation<const P: usize> {
     pub vector: [f64; P],
 }
 
+#[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below P, the length of all rows")]
+impl<const P: usize> FrameInformation<P> {
+    pub(super) const ZERO: Self = Self { matrix: [[0.0; P]; P], vector: [0.0; P] };
+
+    /// What the parameters should be, multiplied by the matrix, of errors that were taken at `at`.
+    fn target(&self, at: [f64; P]) -> [f64; P] {
+        core::array::from_fn(|i| (0..P).fold(-self.vector[i], |sum, j| sum + self.matrix[i][j] * at[j]))
+    }
+
+    /// Adds a row of derivatives and its error.
+    #[inline]
+    pub(super) fn add(&mut self, row: &[f64; P], error: f64, weight: f64) {
+        for i in 0..P {
+            let weighted = weight * row[i];
+            self.vector[i] += weighted * error;
+            for j in 0..P {
+                self.matrix[i][j] += weighted * row[j];
+            }
+        }
+    }
+}
+
 #[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below C or P, the lengths of all rows")]
 impl<const C: usize> Sums<C> {
     pub(super) const ZERO: Self = Self([[0.0; C]; C]);
@@ -87,6 +109,8 @@ impl<const P: usize> Information<P> {
 
     /// Takes a frame in, linearised at `at`. With `F` the variances a frame may be off by, it counts
     /// as `(S⁻¹ + F)⁻¹`, which is `S - S D (I + D S D)⁻¹ D S` with `D² = F` and needs no inverse of `S`.
+    // Never inlined, as all that has many callers here: it is unrolled, and large.
+    #[inline(never)]
     pub(super) fn take(&mut self, prior: &Prior<P>, frame: &FrameInformation<P>, at: [f64; P]) -> Option<()> {
         let (s, d) = (&frame.matrix, prior.frame_sigma);
         let damped: [[f64; P]; P] =
@@ -100,18 +124,31 @@ impl<const P: usize> Information<P> {
             // Columns of a symmetric matrix stand for its rows.
             *column = reduce(core::array::from_fn(|i| s[i][j]))?;
         }
-        let target: [f64; P] = core::array::from_fn(|i| (0..P).fold(-frame.vector[i], |sum, j| sum + s[i][j] * at[j]));
-        let vector = reduce(target)?;
+        let vector = reduce(frame.target(at))?;
+        self.add(&matrix, &vector);
+        Some(())
+    }
+
+    /// Takes a frame in, linearised at `at`, that is off by nothing but its noise.
+    pub(super) fn take_exact(&mut self, frame: &FrameInformation<P>, at: [f64; P]) -> Option<()> {
+        let vector = frame.target(at);
+        let finite = frame.matrix.as_flattened().iter().chain(&vector).all(|value| value.is_finite());
+        finite.then(|| self.add(&frame.matrix, &vector))
+    }
+
+    /// Adds what a frame says, after forgetting a little of what was known.
+    #[inline]
+    fn add(&mut self, matrix: &[[f64; P]; P], vector: &[f64; P]) {
         for i in 0..P {
             self.vector[i] = MEMORY * self.vector[i] + vector[i];
             for j in 0..P {
                 self.matrix[i][j] = MEMORY * self.matrix[i][j] + 0.5 * (matrix[i][j] + matrix[j][i]);
             }
         }
-        Some(())
     }
 
     /// The parameters and the error of the first one, px.
+    #[inline(never)]
     pub(super) fn estimate(&self, prior: &Prior<P>) -> Option<([f64; P], f64)> {
         let weight = |i: usize| 1.0 / (prior.sigma[i] * prior.sigma[i]);
         let matrix: [[f64; P]; P] =
@@ -131,6 +168,7 @@ impl<const P: usize> Information<P> {
 
 /// What a positive definite matrix turns into `right`; `None` where it is not positive definite.
 #[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below P, the length of all rows")]
+#[inline(never)]
 fn solve<const P: usize>(matrix: &[[f64; P]; P], right: [f64; P]) -> Option<[f64; P]> {
     let (mut upper, mut solution) = (*matrix, right);
     for k in 0..P {

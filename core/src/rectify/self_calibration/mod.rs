@@ -8,24 +8,28 @@
 //!
 //! Two filters run over the same matches. One has a constant and weighs the middle of the image; it
 //! gives the offset. The other has a constant, a slope and a fourth power over the columns and a
-//! tilt over the rows; it gives what the lenses left at the sides. Krešo and Šegvić (*Improving the
+//! square over the rows; it gives what the lenses left at the sides, the top and the bottom. Krešo and Šegvić (*Improving the
 //! Egomotion Estimation by Correcting the Calibration Bias*, VISAPP 2015) correct the same error by
 //! a field learned beforehand.
 //!
-//! **What is applied.** The sides once five frames have said something and the offset is known to
+//! **What is applied.** What the lenses left once five frames have said something and the offset is known to
 //! .06 px; the offset while it is above .1 px (and until it falls below .06 px), or after two frames
 //! when it is four sigmas large. Changes are spread over frames, so that surfaces in the map do not
 //! jump.
+//!
+//! **Rows.** Where both cameras see the same in different rows, the right image is moved before it is
+//! matched ([`rows`]).
 //!
 //! **What it cannot see.** The baseline: a wrong one scales everything. Standing still, turning on
 //! the spot and far points say nothing; the filter waits. Cameras that expose at different times
 //! look like an offset that grows with the flow.
 //!
-//! **Memory.** 240 bytes in the mapper, 2 KiB of stack. **Time.** About .3 µs a match.
+//! **Memory.** 640 bytes in the mapper, 2 KiB of stack. **Time.** About .3 µs a match.
 
 mod config;
 mod information;
 mod residuals;
+mod rows;
 #[cfg(test)]
 mod tests;
 
@@ -37,6 +41,10 @@ use crate::{
 };
 use information::{Information, Prior, Sums};
 use residuals::Residuals;
+use rows::RowCalibration;
+#[cfg(test)]
+pub(crate) use rows::RowError;
+pub(crate) use rows::RowShift;
 
 /// Frames with information before the correction is applied.
 const FRAMES_MIN: u32 = 5;
@@ -59,9 +67,9 @@ const OFFSET_KNEE: f64 = 0.3;
 /// The same for the sides.
 const SIDES_KNEE: f64 = 0.5;
 /// Sigmas before the first frame and of what one frame may be off by, px: offset, slope, fourth
-/// power, tilt.
-const SIGMA_PX: [f64; 4] = [0.5, 0.5, 2.0, 0.7];
-const FRAME_SIGMA_PX: [f64; 4] = [0.1, 0.2, 0.5, 0.3];
+/// power, quadratic.
+const SIGMA_PX: [f64; 4] = [0.5, 0.5, 2.0, 0.5];
+const FRAME_SIGMA_PX: [f64; 4] = [0.1, 0.2, 0.5, 0.1];
 
 /// What the calibration was found to be off by.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -78,6 +86,10 @@ pub struct SelfCalibrationReport {
     pub slope_px: f64,
     /// Growth with the fourth power of the distance from the middle, px at the sides.
     pub quartic_px: f64,
+    /// Growth with the square of the distance from the middle row, px from there to the first row.
+    pub row_quadratic_px: f64,
+    /// Largest difference of the rows in which both cameras see the same, px; 0 while that is not known.
+    pub row_error_px: f64,
     /// Offset added in this frame, px.
     pub applied_offset_px: f64,
     /// Frames that said something about it.
@@ -119,6 +131,7 @@ impl SelfCalibrationReport {
             offset_px: if applies { self.offset_px } else { 0.0 },
             slope_px: self.slope_px,
             quartic_px: self.quartic_px,
+            row_quadratic_px: self.row_quadratic_px,
         })
     }
 
@@ -147,6 +160,7 @@ pub(crate) struct SelfCalibration {
     /// Whether the offset is large enough to be applied.
     offset_applies: bool,
     frames: u32,
+    rows: RowCalibration,
 }
 
 impl SelfCalibration {
@@ -161,6 +175,25 @@ impl SelfCalibration {
             applied: start,
             offset_applies: libm::fabs(start.offset_px) > APPLY_UNTIL_PX,
             frames: 0,
+            rows: RowCalibration::NONE,
+        }
+    }
+
+    /// What the right image is to be moved by, so that rows agree; `None` where they do.
+    pub(crate) fn row_shift(&self, rig: &StereoRig) -> Option<RowShift> {
+        let error = self.rows.applied();
+        (error.largest_px() > 0.0).then(|| error.for_rig(rig))
+    }
+
+    /// Learns from a frame's matches: where the right camera sees each, and how far below that the left one does, px, with images moved as
+    /// [`SelfCalibration::row_shift`] says. The camera need not move.
+    pub(crate) fn update_rows(&mut self, rig: &StereoRig, matches: impl Iterator<Item = ([f64; 2], f64)> + Clone) {
+        if self.mode == SelfCalibrationMode::Off {
+            return;
+        }
+        self.rows.update(rig, matches);
+        if self.mode == SelfCalibrationMode::Apply {
+            self.rows.apply();
         }
     }
 
@@ -187,6 +220,7 @@ impl SelfCalibration {
                 offset_px: report.offset_px,
                 slope_px: report.slope_px,
                 quartic_px: report.quartic_px,
+                row_quadratic_px: report.row_quadratic_px,
             }
         } else {
             self.applied
@@ -197,9 +231,9 @@ impl SelfCalibration {
             let Some(match_rows) = residuals.of(&previous, &current) else { continue };
             let [middle, wide] = [OFFSET_KNEE, SIDES_KNEE].map(|knee| match_rows.weight(knee));
             for row in &match_rows.rows {
-                let [a, b, c, d, e, f, constant, slope, quartic, tilt, error] = *row;
+                let [a, b, c, d, e, f, constant, slope, quartic, quadratic, error] = *row;
                 offset.add(&[a, b, c, d, e, f, constant, error], middle);
-                sides.add(&[a, b, c, d, e, f, constant, slope, quartic, tilt, error], wide);
+                sides.add(&[a, b, c, d, e, f, constant, slope, quartic, quadratic, error], wide);
             }
         }
         let (Some(offset), Some(sides)) = (offset.without_motion::<1>(), sides.without_motion::<4>()) else { return };
@@ -207,7 +241,7 @@ impl SelfCalibration {
         if information < INFORMATION_MIN {
             return;
         }
-        let at = [at.offset_px, at.slope_px, at.quartic_px, 0.0];
+        let at = [at.offset_px, at.slope_px, at.quartic_px, at.row_quadratic_px];
         let taken = self.offset.take(&self.offset_prior(), &offset, [at[0]]);
         let taken = taken.and_then(|()| self.sides.take(&self.sides_prior(), &sides, at));
         if taken.is_some() {
@@ -233,6 +267,7 @@ impl SelfCalibration {
             offset_px: toward(self.applied.offset_px, offset_px),
             slope_px: toward(self.applied.slope_px, report.slope_px),
             quartic_px: toward(self.applied.quartic_px, report.quartic_px),
+            row_quadratic_px: toward(self.applied.row_quadratic_px, report.row_quadratic_px),
         };
     }
 
@@ -242,7 +277,7 @@ impl SelfCalibration {
             return SelfCalibrationReport { applied_offset_px: self.applied.offset_px, ..SelfCalibrationReport::default() };
         }
         let ([offset_px], offset_sigma_px) = self.offset.estimate(&self.offset_prior()).unwrap_or_default();
-        let ([_, slope_px, quartic_px, _], _) = self.sides.estimate(&self.sides_prior()).unwrap_or_default();
+        let ([_, slope_px, quartic_px, row_quadratic_px], _) = self.sides.estimate(&self.sides_prior()).unwrap_or_default();
         let is_certain = self.frames >= FRAMES_MIN && offset_sigma_px < SIGMA_MAX_PX;
         let obvious = self.frames >= OBVIOUS_FRAMES_MIN && libm::fabs(offset_px) > OBVIOUS_SIGMAS * offset_sigma_px;
         SelfCalibrationReport {
@@ -250,6 +285,8 @@ impl SelfCalibration {
             offset_sigma_px,
             slope_px,
             quartic_px,
+            row_quadratic_px,
+            row_error_px: self.rows.known().map_or(0.0, |error| error.largest_px()),
             applied_offset_px: self.applied.offset_px,
             frames: self.frames,
             known: is_certain || obvious,
@@ -263,9 +300,9 @@ impl SelfCalibration {
     }
 
     fn sides_prior(&self) -> Prior<4> {
-        let DisparityCorrection { offset_px, slope_px, quartic_px } = self.start;
+        let DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px } = self.start;
         Prior {
-            mean: [offset_px, slope_px, quartic_px, 0.0],
+            mean: [offset_px, slope_px, quartic_px, row_quadratic_px],
             sigma: SIGMA_PX,
             frame_sigma: FRAME_SIGMA_PX,
         }
@@ -273,12 +310,13 @@ impl SelfCalibration {
 
     /// Visits every field but those the configuration gives.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { mode: _, start: _, offset, sides, applied, offset_applies, frames } = self;
-        let DisparityCorrection { offset_px, slope_px, quartic_px } = applied;
+        let Self { mode: _, start: _, offset, sides, applied, offset_applies, frames, rows } = self;
+        let DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px } = applied;
         offset.visit(visitor);
         sides.visit(visitor);
-        visitor.f64s([offset_px, slope_px, quartic_px]);
+        visitor.f64s([offset_px, slope_px, quartic_px, row_quadratic_px]);
         visitor.code(offset_applies, u32::from, |code| code == 1);
         visitor.u32(frames);
+        rows.visit(visitor);
     }
 }

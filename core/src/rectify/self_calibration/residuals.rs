@@ -1,7 +1,7 @@
 //! A match's reprojection errors, whitened by the noise of both frames, and their derivatives by
 //! the motion and by the disparity error.
 
-use crate::geometry::{DisparityCorrection, StereoObservation, StereoRig, Transform};
+use crate::geometry::{DisparityCorrection, ROW_SQUARE_MEAN, StereoObservation, StereoRig, Transform};
 
 /// Noise of a column, px; a row's, the mean of two, has half the variance.
 const NOISE_PX: f64 = 0.2;
@@ -12,7 +12,7 @@ const DISPARITY_MIN_PX: f64 = 1.0;
 /// Nearest depth of a point after the motion, m.
 const DEPTH_MIN_M: f64 = 0.5;
 
-/// Columns: rotation and translation, then constant, slope, fourth power and tilt, then the error.
+/// Columns: rotation and translation, then constant, slope, fourth power and quadratic, then the error.
 pub(super) type Row = [f64; 11];
 
 /// The rows of one match.
@@ -39,10 +39,10 @@ pub(super) struct Residuals<'r> {
     rig: &'r StereoRig,
     t_current_previous: &'r Transform,
     rotation: [[f64; 3]; 3],
-    per_px: f64,
+    per_px: [f64; 2],
     /// What is still to be added to disparities to be where errors are linearised: constant, slope,
-    /// fourth power.
-    ahead_px: [f64; 3],
+    /// fourth power, quadratic.
+    ahead_px: [f64; 4],
 }
 
 impl<'r> Residuals<'r> {
@@ -53,14 +53,17 @@ impl<'r> Residuals<'r> {
         applied: &DisparityCorrection,
         at: &DisparityCorrection,
     ) -> Self {
-        let center = libm::fabs(rig.center_u_px);
         Self {
             rig,
             t_current_previous,
             rotation: t_current_previous.rotation_matrix(),
-            // A principal point in the first column has no sides.
-            per_px: if center >= 1.0 { 1.0 / center } else { 0.0 },
-            ahead_px: [at.offset_px - applied.offset_px, at.slope_px - applied.slope_px, at.quartic_px - applied.quartic_px],
+            per_px: DisparityCorrection::per_px(rig),
+            ahead_px: [
+                at.offset_px - applied.offset_px,
+                at.slope_px - applied.slope_px,
+                at.quartic_px - applied.quartic_px,
+                at.row_quadratic_px - applied.row_quadratic_px,
+            ],
         }
     }
 
@@ -80,15 +83,15 @@ impl<'r> Residuals<'r> {
         let (before, now) = (self.basis(previous), self.basis(current));
         let [mut left, mut row, mut right] = by_point.map(|[a, b, c]| [c * y - b * z, a * z - c * x, b * x - a * y, a, b, c]).map(rows_of);
         for (derivatives, [.., by_right]) in [&mut left, &mut row, &mut right].into_iter().zip(by_previous) {
-            let [.., constant, slope, quartic, tilt, _] = derivatives;
+            let [.., constant, slope, quartic, quadratic, _] = derivatives;
             // The correction moves the previous right column to the left ...
-            for (entry, part) in [constant, slope, quartic, tilt].into_iter().zip(before) {
+            for (entry, part) in [constant, slope, quartic, quadratic].into_iter().zip(before) {
                 *entry = -by_right * part;
             }
         }
-        let [.., constant, slope, quartic, tilt, _] = &mut right;
+        let [.., constant, slope, quartic, quadratic, _] = &mut right;
         // ... and the current one, with which the prediction is compared.
-        for (entry, part) in [constant, slope, quartic, tilt].into_iter().zip(now) {
+        for (entry, part) in [constant, slope, quartic, quadratic].into_iter().zip(now) {
             *entry += part;
         }
         for (derivatives, value) in [&mut left, &mut row, &mut right].into_iter().zip(errors) {
@@ -97,20 +100,24 @@ impl<'r> Residuals<'r> {
         }
         let rows = whitened([left, row, right], &covariance(&by_previous))?;
         let squared = rows.iter().fold(0.0, |sum, [.., error]| sum + error * error);
-        squared.is_finite().then_some(MatchRows { rows, squared, share: current.u_left_px * self.per_px })
+        squared.is_finite().then_some(MatchRows { rows, squared, share: current.u_left_px * self.per_px[0] })
     }
 
     /// An observation as the correction it is linearised at would leave it.
     fn ahead(&self, seen: &StereoObservation) -> StereoObservation {
-        let ([constant, slope, quartic, _], [a, b, c]) = (self.basis(seen), self.ahead_px);
-        StereoObservation { u_right_px: seen.u_right_px - (a * constant + b * slope + c * quartic), ..*seen }
+        let ([constant, slope, quartic, quadratic], [a, b, c, d]) = (self.basis(seen), self.ahead_px);
+        StereoObservation {
+            u_right_px: seen.u_right_px - (a * constant + b * slope + c * quartic + d * quadratic),
+            ..*seen
+        }
     }
 
-    /// What constant, slope, fourth power and tilt are multiplied by.
+    /// What constant, slope, fourth power and quadratic are multiplied by.
     fn basis(&self, seen: &StereoObservation) -> [f64; 4] {
-        let share = seen.u_right_px * self.per_px;
-        let square = share * share;
-        [1.0, share, square * square, seen.v_px * self.per_px]
+        let [across, down] = self.per_px;
+        let (column, row) = (seen.u_right_px * across, seen.v_px * down);
+        let square = column * column;
+        [1.0, column, square * square, row * row - ROW_SQUARE_MEAN]
     }
 }
 

@@ -15,7 +15,7 @@ const FAR_M: f64 = 40.0;
 /// disparities `error` must be added.
 fn street(error: &DisparityCorrection, motion: &Transform, far_m: f64, random: &mut Random) -> Vec<[StereoObservation; 2]> {
     let mut uniform = move |low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / f64::from(u32::MAX);
-    let columns = error.for_rig(&RIG);
+    let error = error.for_rig(&RIG);
     (0..1_500)
         .filter_map(|_| {
             let z = 1.0 / uniform(1.0 / far_m, if far_m > FAR_M { 0.005 } else { 0.2 });
@@ -24,16 +24,21 @@ fn street(error: &DisparityCorrection, motion: &Transform, far_m: f64, random: &
                 // The sum of three uniform numbers: nearly normal, and bounded.
                 let mut noise = |sigma: f64| sigma * (uniform(-1.0, 1.0) + uniform(-1.0, 1.0) + uniform(-1.0, 1.0));
                 let exact = RIG.project(point)?;
-                let column = (exact.u_right_px + RIG.center_u_px) as f32;
+                let [column, _] = error.uncorrected(pixel(&exact));
                 Some(StereoObservation {
                     u_left_px: exact.u_left_px + noise(NOISE_PX),
                     v_px: exact.v_px + noise(NOISE_PX * 0.7),
-                    u_right_px: f64::from(columns.uncorrected(column)) - RIG.center_u_px + noise(NOISE_PX),
+                    u_right_px: f64::from(column) - RIG.center_u_px + noise(NOISE_PX),
                 })
             });
             Some([seen[0]?, seen[1]?])
         })
         .collect()
+}
+
+/// Where the right image has it.
+fn pixel(seen: &StereoObservation) -> [f32; 2] {
+    [(seen.u_right_px + RIG.center_u_px) as f32, (seen.v_px + RIG.center_v_px) as f32]
 }
 
 /// The filter after `frames` frames.
@@ -43,8 +48,8 @@ fn driven(config: &RigConfig, error: &DisparityCorrection, motion: ([f64; 3], [f
     for _ in 0..frames {
         let correction = calibration.correction().for_rig(&RIG);
         let corrected = |seen: StereoObservation| {
-            let column = (seen.u_right_px + RIG.center_u_px) as f32;
-            StereoObservation { u_right_px: f64::from(correction.corrected(column)) - RIG.center_u_px, ..seen }
+            let [column, _] = correction.corrected(pixel(&seen));
+            StereoObservation { u_right_px: f64::from(column) - RIG.center_u_px, ..seen }
         };
         let observations = street(error, &motion, far_m, &mut random).into_iter().map(|pair| pair.map(corrected));
         calibration.update(&RIG, observations, &motion);
@@ -69,9 +74,10 @@ fn an_offset_is_found_and_taken_out() {
 }
 
 #[test]
-fn what_the_lenses_left_at_the_sides_is_found() {
-    let error = DisparityCorrection { offset_px: 0.2, slope_px: 0.4, quartic_px: 1.2 };
+fn what_the_lenses_left_is_found() {
+    let error = DisparityCorrection { offset_px: 0.2, slope_px: 0.4, quartic_px: 1.2, row_quadratic_px: -0.4 };
     let found = driven(&RigConfig::default(), &error, DRIVING, FAR_M, 60).report().found().unwrap();
+    assert!((found.row_quadratic_px + 0.4).abs() < 0.1, "{found:?}");
     assert!((found.slope_px - 0.4).abs() < 0.15 && (found.quartic_px - 1.2).abs() < 0.3, "{found:?}");
 }
 
@@ -155,9 +161,9 @@ fn settings_out_of_range_are_named() {
     let mut problems = crate::problem::Problems::new();
     RigConfig::default().validate(&mut problems);
     assert!(problems.is_empty());
-    let wrong = DisparityCorrection { offset_px: 6.0, slope_px: f64::NAN, quartic_px: -9.0 };
+    let wrong = DisparityCorrection { offset_px: 6.0, slope_px: f64::NAN, quartic_px: -9.0, row_quadratic_px: 5.1 };
     RigConfig { baseline_scale: 0.0, disparity_correction: wrong, ..RigConfig::default() }.validate(&mut problems);
     let keys: Vec<_> = problems.iter().map(|problem| problem.key).collect();
     let part = |name: &str| std::format!("rig.disparity_correction.{name}_px");
-    assert_eq!(keys, ["rig.baseline_scale", &part("offset"), &part("slope"), &part("quartic")]);
+    assert_eq!(keys, ["rig.baseline_scale", &part("offset"), &part("slope"), &part("quartic"), &part("row_quadratic")]);
 }

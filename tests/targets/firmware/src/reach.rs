@@ -83,6 +83,18 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
         digest.u64(report.digest);
         digest.u64(report.severity() as u64);
     }
+    look(mapper, &mut digest);
+    digest.u64(u64::from(mapper.finish_with(&mut objects).visited));
+    digest.u64(u64::from(mapper.stream_out(&mut blocks).kept));
+    digest.u64(blocks.0.finish());
+    digest.u64(objects.0.finish());
+    digest.finish()
+}
+
+/// All that the map shows.
+// Never inlined: what it needs of the stack must not stay below the steps.
+#[inline(never)]
+fn look(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     let pose = *mapper.t_world_camera();
     let mut hash_view = |seen: Option<&Raycaster<'_>>| {
         let depth_m = seen.and_then(Raycaster::depth_m).into_iter().flat_map(|image| image.rows()).flatten();
@@ -93,18 +105,13 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
     hash_view(mapper.raycast(&pose, &Serial).ok());
     hash_view(mapper.raycast_composed(&pose, &Serial).ok());
     hash_view(mapper.raycast_object(black_box(1), &pose, &Serial).ok());
-    plan(mapper, &mut digest);
+    plan(mapper, digest);
     let triangles = mapper.triangles(&mut |triangle| {
         triangle.vertices.iter().flat_map(|vertex| vertex.position_m).for_each(|x| digest.f64(f64::from(x)));
     });
     digest.u64(triangles);
     mapper.tracks().for_each(|track| digest.u64(u64::from(track.id)));
     digest.u64(mapper.footprint().bytes() as u64);
-    digest.u64(u64::from(mapper.finish_with(&mut objects).visited));
-    digest.u64(u64::from(mapper.stream_out(&mut blocks).kept));
-    digest.u64(blocks.0.finish());
-    digest.u64(objects.0.finish());
-    digest.finish()
 }
 
 /// The maps for planners: the window now and later, distances, a ray and a path.
