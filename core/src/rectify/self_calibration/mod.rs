@@ -18,7 +18,7 @@
 //! jump.
 //!
 //! **Rows.** Where both cameras see the same in different rows, the right image is moved before it is
-//! matched ([`rows`]).
+//! matched, by a polynomial of second degree over the image.
 //!
 //! **What it cannot see.** The baseline: a wrong one scales everything. Standing still, turning on
 //! the spot and far points say nothing; the filter waits. Cameras that expose at different times
