@@ -33,6 +33,8 @@ pub(crate) struct PixelCorrection {
     slope_px: f32,
     quartic_px: f32,
     row_quadratic_px: f32,
+    /// By how much the right camera is turned about its axis, rad.
+    roll_rad: f32,
     center_px: [f32; 2],
     per_px: [f32; 2],
 }
@@ -46,6 +48,7 @@ impl DisparityCorrection {
             slope_px: self.slope_px as f32,
             quartic_px: self.quartic_px as f32,
             row_quadratic_px: self.row_quadratic_px as f32,
+            roll_rad: 0.0,
             center_px: [rig.center_u_px as f32, rig.center_v_px as f32],
             per_px: Self::per_px(rig).map(|per_px| per_px as f32),
         }
@@ -78,6 +81,12 @@ impl DisparityCorrection {
 }
 
 impl PixelCorrection {
+    /// The same for a right camera that is turned as well: where that moves rows by an angle times the column, it moves columns by the angle
+    /// times the row.
+    pub(crate) fn rolled(self, roll_rad: f64) -> Self {
+        Self { roll_rad: roll_rad as f32, ..self }
+    }
+
     /// What must be added to a disparity whose point the right camera sees at `[u, v]`.
     #[inline]
     pub(crate) fn at(&self, [u_px, v_px]: [f32; 2]) -> f32 {
@@ -88,8 +97,9 @@ impl PixelCorrection {
     #[inline(always)]
     fn of_row(&self, v_px: f32) -> f32 {
         let ([_, center_px], [_, per_px]) = (self.center_px, self.per_px);
-        let share = (v_px - center_px) * per_px;
-        self.offset_px + self.row_quadratic_px * (share * share - ROW_SQUARE_MEAN as f32)
+        let below_px = v_px - center_px;
+        let share = below_px * per_px;
+        self.offset_px + self.row_quadratic_px * (share * share - ROW_SQUARE_MEAN as f32) + self.roll_rad * below_px
     }
 
     /// What must be added in a column of a row, given what its columns share.
@@ -159,6 +169,12 @@ mod tests {
         }
         let middle = DisparityCorrection { offset_px: 0.5, slope_px: 9.0, quartic_px: 9.0, row_quadratic_px: 9.0 };
         assert_eq!(middle.for_rig(&StereoRig { center_u_px: 0.0, ..RIG }).at([50.0, 180.0]), 0.5 - 9.0 * 0.2);
+    }
+
+    #[test]
+    fn a_turned_camera_errs_with_the_row() {
+        let turned = DisparityCorrection { offset_px: 0.5, ..DisparityCorrection::default() }.for_rig(&RIG).rolled(0.005);
+        assert!((turned.at([50.0, 280.0]) - 1.0).abs() < 1e-6 && (turned.at([900.0, 80.0])).abs() < 1e-6);
     }
 
     #[test]

@@ -253,10 +253,9 @@ fn calibrate<E: Executor>(
     scene_flow: &mut FlowMatcher<'_>,
     executor: &E,
 ) {
+    let correction = self_calibration.pixel_correction(&config.rig);
     self_calibration.update_rows(&config.rig, scene_flow.bucketed().map(Match::row_difference));
-    let correction = self_calibration.correction();
-    if !correction.is_zero() {
-        let correction = correction.for_rig(&config.rig);
+    if let Some(correction) = correction {
         executor.stage(Stage::Stereo, || stereo.correct(correction, executor));
         executor.stage(Stage::SceneFlow, || scene_flow.correct(correction));
     }

@@ -36,7 +36,7 @@ mod tests;
 pub use config::{RigConfig, SelfCalibrationMode};
 
 use crate::{
-    geometry::{DisparityCorrection, StereoObservation, StereoRig, Transform},
+    geometry::{DisparityCorrection, PixelCorrection, StereoObservation, StereoRig, Transform},
     state::Visitor,
 };
 use information::{Information, Prior, Sums};
@@ -197,13 +197,21 @@ impl SelfCalibration {
         }
     }
 
-    /// What is to be added to the next frame's disparities.
+    /// What is to be added to disparities of images moved as [`SelfCalibration::row_shift`] says, by the pixel; `None` where that is nothing.
+    pub(crate) fn pixel_correction(&self, rig: &StereoRig) -> Option<PixelCorrection> {
+        let roll_rad = self.rows.applied().roll_rad(rig);
+        let changes = !self.applied.is_zero() || roll_rad != 0.0;
+        changes.then(|| self.applied.for_rig(rig).rolled(roll_rad))
+    }
+
+    /// The same without a turn of the right camera.
+    #[cfg(test)]
     pub(crate) fn correction(&self) -> DisparityCorrection {
         self.applied
     }
 
     /// Learns from a frame: what both cameras saw before and see now, corrected as
-    /// [`SelfCalibration::correction`] says, in a stated order, and the motion in between as found
+    /// [`SelfCalibration::pixel_correction`] says, in a stated order, and the motion in between as found
     /// from them. Observations no motion explains may be among them.
     pub(crate) fn update<O>(&mut self, rig: &StereoRig, observations: O, t_current_previous: &Transform)
     where

@@ -58,6 +58,12 @@ impl RowError {
         self.largest_from(&Self::default())
     }
 
+    /// The angle by which the right camera is turned, which is what grows with the column, rad.
+    pub(crate) fn roll_rad(&self, rig: &StereoRig) -> f64 {
+        let ([_, column_px, ..], [across, _]) = (self.0, DisparityCorrection::per_px(rig));
+        column_px * across
+    }
+
     /// Prepares it for the images of a rig.
     pub(crate) fn for_rig(&self, rig: &StereoRig) -> RowShift {
         RowShift {
