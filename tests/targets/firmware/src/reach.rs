@@ -83,7 +83,7 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
         digest.u64(report.digest);
         digest.u64(report.severity() as u64);
     }
-    look(mapper, &mut digest);
+    inspect(mapper, &mut digest);
     digest.u64(u64::from(mapper.finish_with(&mut objects).visited));
     digest.u64(u64::from(mapper.stream_out(&mut blocks).kept));
     digest.u64(blocks.0.finish());
@@ -94,7 +94,7 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
 /// All that the map shows.
 // Never inlined: what it needs of the stack must not stay below the steps.
 #[inline(never)]
-fn look(mapper: &mut Mapper<'_>, digest: &mut Digest) {
+fn inspect(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     let pose = *mapper.t_world_camera();
     let mut hash_view = |seen: Option<&Raycaster<'_>>| {
         let depth_m = seen.and_then(Raycaster::depth_m).into_iter().flat_map(|image| image.rows()).flatten();
