@@ -81,6 +81,6 @@ mod tests {
         let rig = StereoRig { focal_px: 500.0, center_u_px: 100.0, center_v_px: 1.0, baseline_m: 0.5 };
         let correction = DisparityCorrection { offset_px: 0.5, row_quadratic_px: -1.0, ..DisparityCorrection::default() };
         let image = disparities(&rig, &correction, View::new(&[10.0; 3], 1, 3).unwrap()).unwrap();
-        assert_eq!(image.pixels(), [6579, 6323, 6579]);
+        assert_eq!(image.pixels(), [6477, 6221, 6477]);
     }
 }
