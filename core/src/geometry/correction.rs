@@ -1,6 +1,6 @@
 //! What is left of a calibration's error in the disparity, and how it is taken out.
 
-use super::{StereoRig, scalar::floored_i32};
+use super::{Shares, StereoRig, scalar::floored_i32};
 use crate::image::{DISPARITY_FILLED, DISPARITY_ONE_PX};
 
 /// Mean square of the distances of matches from the middle row, in shares of that of the first row: so much is taken off the square of
@@ -35,8 +35,7 @@ pub(crate) struct PixelCorrection {
     row_quadratic_px: f32,
     /// By how much the right camera is turned about its axis, rad.
     roll_rad: f32,
-    center_px: [f32; 2],
-    per_px: [f32; 2],
+    shares: Shares,
 }
 
 impl DisparityCorrection {
@@ -49,15 +48,8 @@ impl DisparityCorrection {
             quartic_px: self.quartic_px as f32,
             row_quadratic_px: self.row_quadratic_px as f32,
             roll_rad: 0.0,
-            center_px: [rig.center_u_px as f32, rig.center_v_px as f32],
-            per_px: Self::per_px(rig).map(|per_px| per_px as f32),
+            shares: Shares::of(rig),
         }
-    }
-
-    /// Shares of the way from the principal point to the side and to the first row in a pixel.
-    pub(crate) fn per_px(rig: &StereoRig) -> [f64; 2] {
-        let per_px = |center_px: f64| if libm::fabs(center_px) >= 1.0 { 1.0 / center_px } else { 0.0 };
-        [per_px(rig.center_u_px), per_px(rig.center_v_px)]
     }
 
     /// What must be added to a disparity whose point the right camera of this rig sees at `[u, v]`, px.
@@ -96,17 +88,14 @@ impl PixelCorrection {
     /// What all columns of a row share.
     #[inline(always)]
     fn of_row(&self, v_px: f32) -> f32 {
-        let ([_, center_px], [_, per_px]) = (self.center_px, self.per_px);
-        let below_px = v_px - center_px;
-        let share = below_px * per_px;
-        self.offset_px + self.row_quadratic_px * (share * share - ROW_SQUARE_MEAN as f32) + self.roll_rad * below_px
+        let share = self.shares.down(v_px);
+        self.offset_px + self.row_quadratic_px * (share * share - ROW_SQUARE_MEAN as f32) + self.roll_rad * self.shares.below_px(v_px)
     }
 
     /// What must be added in a column of a row, given what its columns share.
     #[inline(always)]
     fn in_row(&self, row_px: f32, u_px: f32) -> f32 {
-        let ([center_px, _], [per_px, _]) = (self.center_px, self.per_px);
-        let share = (u_px - center_px) * per_px;
+        let share = self.shares.across(u_px);
         let square = share * share;
         row_px + self.slope_px * share + self.quartic_px * (square * square)
     }

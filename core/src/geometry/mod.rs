@@ -6,6 +6,7 @@ pub(crate) mod histogram;
 mod oriented_box;
 mod rig;
 pub mod scalar;
+mod shares;
 mod transform;
 
 pub use correction::DisparityCorrection;
@@ -14,4 +15,5 @@ pub use depth::depth_from_disparity;
 pub(crate) use oriented_box::OrientedBox;
 pub(crate) use rig::StereoObservation;
 pub use rig::{DEPTH_MIN_M, DISPARITY_MIN_PX, RigProblem, StereoRig};
+pub(crate) use shares::Shares;
 pub use transform::Transform;

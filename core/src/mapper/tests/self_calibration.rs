@@ -61,7 +61,7 @@ fn driven(by_px: f64) -> (SelfCalibrationReport, f64) {
         let (left, right) = (grey("image_0", frame), shifted(grey("image_1", frame), by_px));
         let images = [&left, &right].map(|(pixels, width, height)| View::new(pixels, *width, *height).unwrap());
         matcher.push(&SceneFlowConfig::default(), images[0], images[1], &Serial);
-        matcher.correct(calibration.correction().for_rig(&RIG));
+        matcher.correct(calibration.pixel_correction(&RIG).unwrap_or_default());
         if frame > 0 {
             let estimate = camera.step(&EgomotionConfig::default(), &RIG, 0.1, matcher.bucketed(), &mut estimator);
             let observations = matcher

@@ -26,6 +26,10 @@ pub(super) struct FrameInformation<const P: usize> {
 impl<const P: usize> FrameInformation<P> {
     pub(super) const ZERO: Self = Self { matrix: [[0.0; P]; P], vector: [0.0; P] };
 
+    fn is_finite(&self) -> bool {
+        self.matrix.as_flattened().iter().chain(&self.vector).all(|value| value.is_finite())
+    }
+
     /// What the parameters should be, multiplied by the matrix, of errors that were taken at `at`.
     fn target(&self, at: [f64; P]) -> [f64; P] {
         core::array::from_fn(|i| (0..P).fold(-self.vector[i], |sum, j| sum + self.matrix[i][j] * at[j]))
@@ -80,8 +84,7 @@ impl<const C: usize> Sums<C> {
         let matrix = core::array::from_fn(|i| core::array::from_fn(|j| at(i, j)));
         let vector = core::array::from_fn(|i| lower[C - 1][MOTION + i]);
         let frame = FrameInformation { matrix, vector };
-        let finite = frame.matrix.as_flattened().iter().chain(&frame.vector).all(|value| value.is_finite());
-        finite.then_some(frame)
+        frame.is_finite().then_some(frame)
     }
 }
 
@@ -131,9 +134,8 @@ impl<const P: usize> Information<P> {
 
     /// Takes a frame in, linearised at `at`, that is off by nothing but its noise.
     pub(super) fn take_exact(&mut self, frame: &FrameInformation<P>, at: [f64; P]) -> Option<()> {
-        let vector = frame.target(at);
-        let finite = frame.matrix.as_flattened().iter().chain(&vector).all(|value| value.is_finite());
-        finite.then(|| self.add(&frame.matrix, &vector))
+        let target = FrameInformation { matrix: frame.matrix, vector: frame.target(at) };
+        target.is_finite().then(|| self.add(&target.matrix, &target.vector))
     }
 
     /// Adds what a frame says, after forgetting a little of what was known.

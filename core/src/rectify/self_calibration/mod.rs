@@ -204,12 +204,6 @@ impl SelfCalibration {
         changes.then(|| self.applied.for_rig(rig).rolled(roll_rad))
     }
 
-    /// The same without a turn of the right camera.
-    #[cfg(test)]
-    pub(crate) fn correction(&self) -> DisparityCorrection {
-        self.applied
-    }
-
     /// Learns from a frame: what both cameras saw before and see now, corrected as
     /// [`SelfCalibration::pixel_correction`] says, in a stated order, and the motion in between as found
     /// from them. Observations no motion explains may be among them.

@@ -1,7 +1,7 @@
 //! A match's reprojection errors, whitened by the noise of both frames, and their derivatives by
 //! the motion and by the disparity error.
 
-use crate::geometry::{DisparityCorrection, ROW_SQUARE_MEAN, StereoObservation, StereoRig, Transform};
+use crate::geometry::{DisparityCorrection, ROW_SQUARE_MEAN, Shares, StereoObservation, StereoRig, Transform};
 
 /// Noise of a column, px; a row's, the mean of two, has half the variance.
 const NOISE_PX: f64 = 0.2;
@@ -57,7 +57,7 @@ impl<'r> Residuals<'r> {
             rig,
             t_current_previous,
             rotation: t_current_previous.rotation_matrix(),
-            per_px: DisparityCorrection::per_px(rig),
+            per_px: Shares::per_px(rig),
             ahead_px: [
                 at.offset_px - applied.offset_px,
                 at.slope_px - applied.slope_px,

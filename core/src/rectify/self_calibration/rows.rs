@@ -9,7 +9,7 @@ use super::{
     information::{FrameInformation, Information, Prior},
 };
 use crate::{
-    geometry::{DisparityCorrection, StereoRig},
+    geometry::{Shares, StereoRig},
     state::Visitor,
 };
 
@@ -60,17 +60,13 @@ impl RowError {
 
     /// The angle by which the right camera is turned, which is what grows with the column, rad.
     pub(crate) fn roll_rad(&self, rig: &StereoRig) -> f64 {
-        let ([_, column_px, ..], [across, _]) = (self.0, DisparityCorrection::per_px(rig));
+        let ([_, column_px, ..], [across, _]) = (self.0, Shares::per_px(rig));
         column_px * across
     }
 
     /// Prepares it for the images of a rig.
     pub(crate) fn for_rig(&self, rig: &StereoRig) -> RowShift {
-        RowShift {
-            terms_px: self.0.map(|term| term as f32),
-            center_px: [rig.center_u_px as f32, rig.center_v_px as f32],
-            per_px: DisparityCorrection::per_px(rig).map(|per_px| per_px as f32),
-        }
+        RowShift { terms_px: self.0.map(|term| term as f32), shares: Shares::of(rig) }
     }
 }
 
@@ -78,16 +74,14 @@ impl RowError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RowShift {
     terms_px: [f32; TERMS],
-    center_px: [f32; 2],
-    per_px: [f32; 2],
+    shares: Shares,
 }
 
 impl RowShift {
     /// How far below row `v` of the right image the left one sees what is in column `u` there, px.
     #[inline(always)]
     pub(crate) fn at(&self, [u_px, v_px]: [f32; 2]) -> f32 {
-        let ([center_u, center_v], [across, down]) = (self.center_px, self.per_px);
-        let (s, t) = ((u_px - center_u) * across, (v_px - center_v) * down);
+        let (s, t) = (self.shares.across(u_px), self.shares.down(v_px));
         let [constant, column, row, column_2, both, row_2] = self.terms_px;
         (constant + t * (row + t * row_2)) + s * ((column + t * both) + s * column_2)
     }
@@ -121,7 +115,7 @@ impl RowCalibration {
     // Never inlined: its matrices must not stay in the frame of a step.
     #[inline(never)]
     pub(super) fn update(&mut self, rig: &StereoRig, matches: impl Iterator<Item = ([f64; 2], f64)> + Clone) {
-        let [across, down] = DisparityCorrection::per_px(rig);
+        let [across, down] = Shares::per_px(rig);
         let shares = |[u, v]: [f64; 2]| [(u - rig.center_u_px) * across, (v - rig.center_v_px) * down];
         let mut found = self.information;
         for scale_px in PASSES_PX {

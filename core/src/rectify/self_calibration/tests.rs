@@ -46,7 +46,7 @@ fn driven(config: &RigConfig, error: &DisparityCorrection, motion: ([f64; 3], [f
     let (mut random, mut calibration) = (Random::new(11), SelfCalibration::new(config));
     let motion = Transform::new(motion.0, motion.1);
     for _ in 0..frames {
-        let correction = calibration.correction().for_rig(&RIG);
+        let correction = calibration.applied.for_rig(&RIG);
         let corrected = |seen: StereoObservation| {
             let [column, _] = correction.corrected(pixel(&seen));
             StereoObservation { u_right_px: f64::from(column) - RIG.center_u_px, ..seen }
@@ -93,7 +93,7 @@ fn standing_turning_on_the_spot_and_a_far_scene_say_nothing() {
     for (motion, far_m) in [(([0.0; 3], [0.0; 3]), FAR_M), (([0.0, 0.05, 0.0], [0.0; 3]), FAR_M), (DRIVING, 4_000.0)] {
         let calibration = driven(&RigConfig::default(), &offset(0.7), motion, far_m, 40);
         let report = calibration.report();
-        assert!(!report.known && calibration.correction().is_zero(), "{motion:?}: {report:?}");
+        assert!(!report.known && calibration.applied.is_zero(), "{motion:?}: {report:?}");
         assert!(report.offset_sigma_px > 0.2, "{report:?}");
     }
 }
@@ -103,9 +103,9 @@ fn the_correction_changes_gently() {
     let mut random = Random::new(11);
     let (mut calibration, motion) = (SelfCalibration::new(&RigConfig::default()), Transform::new(DRIVING.0, DRIVING.1));
     for _ in 0..20 {
-        let before = calibration.correction();
+        let before = calibration.applied;
         calibration.update(&RIG, street(&offset(1.0), &motion, FAR_M, &mut random), &motion);
-        let now = calibration.correction();
+        let now = calibration.applied;
         assert!((now.offset_px - before.offset_px).abs() <= CHANGE_MAX_PX + 1e-12, "{before:?} {now:?}");
     }
 }
@@ -114,7 +114,7 @@ fn the_correction_changes_gently() {
 fn what_is_only_to_be_reported_is_not_applied_and_what_is_off_not_sought() {
     let with = |self_calibration| RigConfig { self_calibration, ..RigConfig::default() };
     let reported = driven(&with(SelfCalibrationMode::Report), &offset(0.7), DRIVING, FAR_M, 30);
-    assert!(reported.correction().is_zero() && (reported.report().offset_px - 0.7).abs() < 0.05);
+    assert!(reported.applied.is_zero() && (reported.report().offset_px - 0.7).abs() < 0.05);
     assert_eq!(reported.report().state(), CalibrationState::Off);
     let off = driven(&with(SelfCalibrationMode::Off), &offset(0.7), DRIVING, FAR_M, 30);
     assert_eq!(off.report(), SelfCalibrationReport::default());
@@ -125,7 +125,7 @@ fn a_run_begins_where_another_ended() {
     let start = driven(&RigConfig::default(), &offset(0.7), DRIVING, FAR_M, 30).report().found().unwrap();
     let config = RigConfig { disparity_correction: start, ..RigConfig::default() };
     let again = SelfCalibration::new(&config);
-    assert_eq!(again.correction(), start);
+    assert_eq!(again.applied, start);
     assert_eq!(again.report().found(), None, "until it has frames of its own");
     let report = driven(&config, &offset(0.7), DRIVING, FAR_M, 30).report();
     assert!((report.offset_px - 0.7).abs() < 0.05, "{report:?}");
