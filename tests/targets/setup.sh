@@ -47,11 +47,12 @@ pack() {
   fixture=$(realpath "${DYNVOX_FIXTURE:-$root/fixtures/street-320x96}")
   local packed; packed=$(realpath "$(dirname "$build")")/$(basename "$fixture")
   export DYNVOX_CLIP=$packed.clip DYNVOX_CONSTANTS=$packed.rs DYNVOX_DIGESTS=$fixture/digests.txt
-  # The binary that the tests have built, or one built here.
+  # The binary that the tests have built, unless sources are newer.
   dynvox=$root/target/debug/dynvox
-  [ -x "$dynvox" ] || (cd "$root" && cargo build --quiet --locked -p dynvox)
+  [ -x "$dynvox" ] && [ -z "$(find "$root/core" "$root/host/src" -newer "$dynvox" -name '*.rs' -print -quit)" ] ||
+    (cd "$root" && cargo build --quiet --locked -p dynvox)
   # Digests are not in it.
-  [ -s "$DYNVOX_CONSTANTS" ] && [ -z "$(find "$fixture" "$root/core/src" -newer "$DYNVOX_CONSTANTS" -type f ! -name '*.txt' -print -quit)" ] &&
+  [ -s "$DYNVOX_CONSTANTS" ] && [ -z "$(find "$fixture" "$root/core/src" "$dynvox" -newer "$DYNVOX_CONSTANTS" -type f ! -name '*.txt' -print -quit)" ] &&
     return 0
   "$dynvox" fixtures pack "$fixture" --out "$DYNVOX_CLIP" --rust "$DYNVOX_CONSTANTS"
 }

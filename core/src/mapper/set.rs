@@ -3,7 +3,7 @@
 use super::{Config, MapperConfig, MotionSource};
 use crate::{
     egomotion::{EgomotionConfig, icp::IcpConfig},
-    geometry::DisparityCorrection,
+    geometry::{DisparityCorrection, RowCorrection},
     objects::ObjectsConfig,
     planning::PlanningConfig,
     rectify::self_calibration::{RigConfig, SelfCalibrationMode},
@@ -155,8 +155,9 @@ macro_rules! section {
     };
 }
 
-section!(rig: RigConfig { self_calibration, baseline_scale } and { disparity_correction });
+section!(rig: RigConfig { self_calibration, baseline_scale } and { disparity_correction, row_correction });
 section!(disparity_correction: DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px });
+section!(row_correction: RowCorrection { constant_px, column_px, row_px, column_quadratic_px, product_px, row_quadratic_px });
 section!(stereo: StereoConfig {
     disparity_max, support_ratio, support_texture, candidate_step, plausible_window, plausible_threshold, plausible_min, redundant_distance,
     redundant_threshold, grid_size, beta, gamma, sigma, plane_radius_sigmas, plane_slope_max, match_texture, subpixel, consistency_threshold,

@@ -2,8 +2,8 @@
 //!
 //! Memory: one byte a pixel. Time: two reads and two products a pixel.
 
-use super::self_calibration::RowShift;
 use crate::{
+    geometry::RowShift,
     image::View,
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, Work, each, zip2},
@@ -83,7 +83,11 @@ fn source(height: usize, v: usize, shift_px: f32) -> (usize, usize, u16) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Serial, geometry::StereoRig, memory::SLAB_ALIGN, rectify::self_calibration::RowError};
+    use crate::{
+        Serial,
+        geometry::{RowCorrection, StereoRig},
+        memory::SLAB_ALIGN,
+    };
     use std::{vec, vec::Vec};
 
     const CAPACITY: Capacity = Capacity { image_width: 70, image_height: 40, ..Capacity::TINY };
@@ -96,7 +100,7 @@ mod tests {
         let mut carver = Carver::new(&mut slab, bytes).unwrap();
         let mut aligned = AlignedImage::new_in(&CAPACITY, &mut carver);
         let pixels: Vec<u8> = (0..70 * 40).map(|at| (at / 70 * 4) as u8).collect();
-        let shift = RowError(terms).for_rig(&RIG);
+        let shift = RowCorrection::of_terms(terms).for_rig(&RIG);
         aligned.align(View::new(&pixels, 70, 40).unwrap(), &shift, &Serial).unwrap().pixels().to_vec()
     }
 

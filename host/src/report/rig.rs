@@ -42,7 +42,7 @@ pub fn summary(run: &RunRecord) -> Option<RigSummary> {
         disparity_slope_px: report.slope_px,
         disparity_quartic_px: report.quartic_px,
         disparity_row_quadratic_px: report.row_quadratic_px,
-        row_error_px: report.row_error_px,
+        row_error_px: report.rows.largest_px(),
         disparity_frames: report.frames,
         calibration: match report.state() {
             CalibrationState::Sound => "sound",
@@ -58,9 +58,9 @@ pub fn sentence(run: &RunRecord) -> String {
     let Some(report) = found(run) else {
         return "disparity offset unknown: the camera has to move past something within about 30 m".to_owned();
     };
-    let rows = if report.row_error_px >= ROWS_WORTH_A_WORD_PX {
+    let rows = if report.rows.largest_px() >= ROWS_WORTH_A_WORD_PX {
         let moved = if report.corrected { ", aligned" } else { "" };
-        format!("; rows up to {:.1} px apart{moved}", report.row_error_px)
+        format!("; rows up to {:.1} px apart{moved}", report.rows.largest_px())
     } else {
         String::new()
     };
@@ -82,16 +82,55 @@ pub fn is_warning(run: &RunRecord) -> bool {
 
 /// Settings that begin another run with what was found; `None` where there is nothing to correct.
 pub fn calibration_toml(run: &RunRecord) -> Option<String> {
-    let found = run.frames.last()?.report.self_calibration.found().filter(|found| !found.is_zero())?;
-    Some(format!(
-        "# What must be added to the disparities of this rig, px, as a run over {} frames found it.\n\
-         # Another run of the same rig begins with it: dynvox run PATH --config calibration.toml\n\
-         [rig.disparity_correction]\noffset_px = {:.4}\nslope_px = {:.4}\nquartic_px = {:.4}\n\
-         row_quadratic_px = {:.4}\n",
-        run.frames.len(),
-        found.offset_px,
-        found.slope_px,
-        found.quartic_px,
-        found.row_quadratic_px
-    ))
+    begin_with(&run.frames.last()?.report.self_calibration, run.frames.len())
+}
+
+fn begin_with(report: &SelfCalibrationReport, frames: usize) -> Option<String> {
+    let disparity = report.found().filter(|found| !found.is_zero()).map(|found| {
+        format!(
+            "[rig.disparity_correction]\noffset_px = {:.4}\nslope_px = {:.4}\nquartic_px = {:.4}\nrow_quadratic_px = {:.4}\n",
+            found.offset_px, found.slope_px, found.quartic_px, found.row_quadratic_px
+        )
+    });
+    let rows = Some(report.rows).filter(|rows| rows.largest_px() >= ROWS_WORTH_A_WORD_PX).map(|rows| {
+        format!(
+            "[rig.row_correction]\nconstant_px = {:.4}\ncolumn_px = {:.4}\nrow_px = {:.4}\ncolumn_quadratic_px = {:.4}\n\
+             product_px = {:.4}\nrow_quadratic_px = {:.4}\n",
+            rows.constant_px, rows.column_px, rows.row_px, rows.column_quadratic_px, rows.product_px, rows.row_quadratic_px
+        )
+    });
+    (disparity.is_some() || rows.is_some()).then(|| {
+        format!(
+            "# What must be added to the disparities of this rig and to the rows of its right images, px, as a run over {frames} frames found it.\n\
+             # Another run of the same rig begins with it: dynvox run PATH --config calibration.toml\n{}{}",
+            disparity.unwrap_or_default(),
+            rows.unwrap_or_default()
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynvox_core::geometry::{DisparityCorrection, RowCorrection};
+    use dynvox_core::rectify::self_calibration::RigConfig;
+
+    #[derive(serde::Deserialize)]
+    struct SettingsFile {
+        rig: RigConfig,
+    }
+
+    #[test]
+    fn another_run_begins_with_what_was_found() {
+        let mut report = SelfCalibrationReport::default();
+        assert_eq!(begin_with(&report, 9), None);
+        (report.known, report.corrected, report.offset_px, report.applied_offset_px, report.quartic_px) = (true, true, 0.25, 0.25, 1.5);
+        report.rows = RowCorrection { constant_px: 0.5, product_px: -1.25, row_px: 0.125, ..RowCorrection::default() };
+        let SettingsFile { rig } = toml::from_str(&begin_with(&report, 9).unwrap()).unwrap();
+        assert_eq!(rig.disparity_correction, DisparityCorrection { offset_px: 0.25, quartic_px: 1.5, ..DisparityCorrection::default() });
+        assert_eq!(rig.row_correction, report.rows);
+        report.known = false;
+        let text = begin_with(&report, 9).unwrap();
+        assert!(!text.contains("disparity_correction") && text.contains("row_correction"), "rows are known from pictures alone: {text}");
+    }
 }

@@ -48,11 +48,11 @@ fn rows_that_a_calibration_left_apart_are_aligned() {
     let mut off = Walk::config();
     off.rig_settings.self_calibration = SelfCalibrationMode::Off;
     let (sound, exact) = driven(&Walk::config(), 0.0);
-    assert!(sound.self_calibration.row_error_px < 0.1, "{:?}", sound.self_calibration);
+    assert!(sound.self_calibration.rows.largest_px() < 0.1, "{:?}", sound.self_calibration);
     let (aligned, close) = driven(&Walk::config(), roll_rad);
-    assert!((1.2..2.2).contains(&aligned.self_calibration.row_error_px), "{:?}", aligned.self_calibration);
+    assert!((1.2..2.2).contains(&aligned.self_calibration.rows.largest_px()), "{:?}", aligned.self_calibration);
     let (apart, far) = driven(&off, roll_rad);
-    assert_eq!(apart.self_calibration.row_error_px, 0.0);
+    assert_eq!(apart.self_calibration.rows.largest_px(), 0.0);
     let [close, far] = [&close, &far].map(|disparities| agreement(&exact, disparities));
     assert!(close > 0.95 && far < 0.9, "{close} aligned, {far} without");
 }

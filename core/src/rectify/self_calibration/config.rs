@@ -1,7 +1,7 @@
 //! Settings of the rig in addition to its calibration.
 
 use crate::{
-    geometry::DisparityCorrection,
+    geometry::{DisparityCorrection, RowCorrection},
     problem::{Problems, require},
 };
 
@@ -30,6 +30,9 @@ pub struct RigConfig {
     /// What is added to disparities from the first frame on, as another run found it; each of the
     /// four within 5 px; all 0. With self-calibration the search begins there.
     pub disparity_correction: DisparityCorrection,
+    /// What is added to the right image's rows from the first frame on, as another run found it; each of
+    /// the six within 5 px; all 0. With self-calibration the search begins there.
+    pub row_correction: RowCorrection,
 }
 
 impl Default for RigConfig {
@@ -38,6 +41,7 @@ impl Default for RigConfig {
             self_calibration: SelfCalibrationMode::Apply,
             baseline_scale: 1.0,
             disparity_correction: DisparityCorrection::default(),
+            row_correction: RowCorrection::default(),
         }
     }
 }
@@ -50,11 +54,18 @@ impl RigConfig {
     pub fn validate(&self, problems: &mut Problems) {
         require(problems, (0.5..=2.0).contains(&self.baseline_scale), "rig.baseline_scale", "must be in 0.5..=2");
         let DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px } = self.disparity_correction;
+        let rows = self.row_correction;
         for (key, part) in [
             ("rig.disparity_correction.offset_px", offset_px),
             ("rig.disparity_correction.slope_px", slope_px),
             ("rig.disparity_correction.quartic_px", quartic_px),
             ("rig.disparity_correction.row_quadratic_px", row_quadratic_px),
+            ("rig.row_correction.constant_px", rows.constant_px),
+            ("rig.row_correction.column_px", rows.column_px),
+            ("rig.row_correction.row_px", rows.row_px),
+            ("rig.row_correction.column_quadratic_px", rows.column_quadratic_px),
+            ("rig.row_correction.product_px", rows.product_px),
+            ("rig.row_correction.row_quadratic_px", rows.row_quadratic_px),
         ] {
             let within = (-Self::CORRECTION_MAX_PX..=Self::CORRECTION_MAX_PX).contains(&part);
             require(problems, within, key, "must be in -5..=5");
