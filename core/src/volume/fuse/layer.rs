@@ -5,7 +5,7 @@
 
 use super::{Fusion, SHARES};
 use crate::{
-    geometry::scalar::{clamp_f32, rounded_i32},
+    geometry::scalar::{clamp_f32, min_f32, rounded_i32},
     image::View,
     volume::{
         BLOCK_SIDE,
@@ -194,8 +194,12 @@ impl Fusion<'_> {
     #[inline(always)]
     fn share(&self, scratch: &mut Scratch, weight: &Layer<u8>) {
         if self.plain_weights {
-            for (share, &weight) in scratch.share.iter_mut().zip(weight) {
-                *share = self.shares.ones.get(usize::from(weight) + 1).copied().unwrap_or(0);
+            for ((past, &weight), &observed_m) in scratch.share.iter_mut().zip(weight).zip(&scratch.observed_m) {
+                *past = self.past(weight, observed_m) as i16;
+            }
+            // Apart, for a table is read one by one, and what comes before it is not.
+            for share in &mut scratch.share {
+                *share = self.shares.ones.get(*share as usize + 1).copied().unwrap_or(0);
             }
             return;
         }
@@ -204,8 +208,15 @@ impl Fusion<'_> {
         for (((&column, &row), &observed_m), ((gain, share), &weight)) in pixels.zip(gains) {
             let observation = if observed_m > 0.0 { self.observation_weight(column as usize, row as usize, observed_m) } else { 0 };
             *gain = observation as i16;
-            *share = self.shares.of(i32::from(weight) + observation, observation);
+            *share = self.shares.of(self.past(weight, observed_m) + observation, observation);
         }
+    }
+
+    /// What the past of a voxel weighs against an observation at a depth.
+    #[inline(always)]
+    fn past(&self, weight: u8, observed_m: f32) -> i32 {
+        let most = rounded_i32(min_f32(observed_m * self.past_per_m, 255.0));
+        if most < i32::from(weight) { most } else { i32::from(weight) }
     }
 
     /// Counts the observations.

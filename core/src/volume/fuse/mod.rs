@@ -5,9 +5,9 @@
 //! is hidden. Where the depth has notes (`observed`), `d - z` is then taken along the surface's normal. Neither is what lies
 //! farther than `behind_m` behind the surface observed, for it may belong to another. With weight w and observation weight v, in units of 1 / 32,767:
 //!
-//! `sdf += round((o - sdf) * v / (w + v))`, `w = min(w + v, max_weight)`
+//! `sdf += round((o - sdf) * v / (p + v))`, `w = min(w + v, max_weight)`, where the past counts `p = min(w, d / 2 m)` (`volume.observation_weight`),
 //!
-//! where `v / (w + v)` is a 15-bit fraction from a table. Colour is averaged likewise within `colour_band` of the surface, with a weight
+//! where `v / (p + v)` is a 15-bit fraction from a table. Colour is averaged likewise within `colour_band` of the surface, with a weight
 //! of at most 5, so that its 8 bits keep following.
 //!
 //! Blocks behind all that is observed where they can fall are left out (`horizon`); of the others 64 voxels are fused at a time (`layer`).
@@ -73,6 +73,8 @@ struct Fusion<'a> {
     center_v_px: f32,
     shares: Shares,
     plain_weights: bool,
+    /// The most that the past weighs against an observation, by its depth, 1/m.
+    past_per_m: f32,
     /// The depth image, without padding.
     depth_m: &'a [f32],
     width: u32,
@@ -103,7 +105,8 @@ impl<'a> Fusion<'a> {
             center_u_px: view.rig.center_u_px as f32,
             center_v_px: view.rig.center_v_px as f32,
             shares: Shares::new(),
-            plain_weights: config.observation_weight == ObservationWeight::One && seen.class.is_none(),
+            plain_weights: config.observation_weight.most() == 1 && seen.class.is_none(),
+            past_per_m: config.observation_weight.past_per_m(),
             depth_m: seen.depth_m.pixels(),
             width: seen.depth_m.width() as u32,
             height: seen.depth_m.height() as u32,
@@ -116,7 +119,7 @@ impl<'a> Fusion<'a> {
     /// Weight of an observation at a pixel, of that depth; 0 keeps it out.
     fn observation_weight(&self, u: usize, v: usize, depth_m: f32) -> i32 {
         let by_depth = match self.config.observation_weight {
-            ObservationWeight::One => 1,
+            ObservationWeight::One | ObservationWeight::Near => 1,
             ObservationWeight::Depth => ((100.0 / depth_m) as i32).clamp(1, 10),
         };
         let class = self.seen.class.and_then(|image| image.get(u, v)).map(usize::from);

@@ -108,7 +108,8 @@ fn fuse_slowly(
         if gain == 0 {
             continue;
         }
-        sdf[voxel] = averaged(i32::from(sdf[voxel]), observed, gain, w + gain) as i16;
+        let past = if config.observation_weight == ObservationWeight::Near { w.min(libm::rintf(0.5 * depth) as i32) } else { w };
+        sdf[voxel] = averaged(i32::from(sdf[voxel]), observed, gain, past + gain) as i16;
         weight[voxel] = (w + gain).min(i32::from(config.max_weight)) as u8;
         let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
         if distance.abs() > config.colour_band * config.truncation_m || !is_blank && notes & 16 != 0 {
@@ -123,7 +124,12 @@ fn fuse_slowly(
 
 #[test]
 fn equals_the_plain_twin_bit_for_bit() {
-    let mut config = VolumeConfig { max_weight: 7, behind_m: 0.4, ..VolumeConfig::default() };
+    equals_the_plain_twin(ObservationWeight::Near);
+    equals_the_plain_twin(ObservationWeight::One);
+}
+
+fn equals_the_plain_twin(observation_weight: ObservationWeight) {
+    let mut config = VolumeConfig { max_weight: 7, behind_m: 0.4, observation_weight, ..VolumeConfig::default() };
     config.class_weight[..3].copy_from_slice(&[0, 1, 3]);
     let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i % 251) as u8).collect();
     let rgb: Vec<[u8; 3]> = grey.iter().map(|&grey| [grey, 255 - grey, grey / 3]).collect();
@@ -268,6 +274,28 @@ fn near_observations_weigh_more_when_asked_and_weight_stops_at_its_maximum() {
                 fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
             }
             assert_eq!(volume.sampler().voxel(point).unwrap().weight, 25);
+        });
+    }
+}
+
+#[test]
+fn near_observations_replace_the_past_and_weights_still_count() {
+    for (observation_weight, depth, past) in
+        [(ObservationWeight::Near, 4.0, 2), (ObservationWeight::Near, 16.0, 8), (ObservationWeight::One, 4.0, 10)]
+    {
+        let config = VolumeConfig { observation_weight, distance: DistanceAlong::Ray, ..VolumeConfig::default() };
+        with_volume(&Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY }, &config, |volume| {
+            let point = [0, 0, (depth / 0.05) as i32 - 2];
+            let mut fused = |depth: f32| {
+                fuse_once(volume, &view([0.0; 3], [0.0; 3]), &vec![depth; WIDTH * HEIGHT], &vec![50; WIDTH * HEIGHT]);
+                let voxel = volume.sampler().voxel(point).unwrap();
+                (f64::from(voxel.sdf), voxel.weight)
+            };
+            let before = (0..10).map(|_| fused(depth)).last().unwrap().0;
+            let (after, weight) = fused(depth + 0.15);
+            let step = 0.15 / 0.75 * 32_767.0 / f64::from(past + 1);
+            assert!((after - before - step).abs() < 3.0, "{observation_weight:?} at {depth} m: {before} to {after}");
+            assert_eq!(weight, 11);
         });
     }
 }
