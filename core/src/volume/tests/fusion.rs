@@ -59,6 +59,11 @@ fn target_colour(seen: &Observation<'_>, u: usize, v: usize) -> [u8; 3] {
     seen.colour.map_or_else(|| [seen.grey.get(u, v).unwrap(); 3], |image| image.get(u, v).unwrap())
 }
 
+/// What a weight counts for against an observation at a depth.
+fn past(config: &VolumeConfig, weight: i32, depth_m: f32) -> i32 {
+    if config.observation_weight == ObservationWeight::Near { weight.min(libm::rintf(0.5 * depth_m) as i32) } else { weight }
+}
+
 /// Fusion as its module states it, one voxel after the other, and as plainly.
 fn fuse_slowly(
     config: &VolumeConfig,
@@ -108,8 +113,7 @@ fn fuse_slowly(
         if gain == 0 {
             continue;
         }
-        let past = if config.observation_weight == ObservationWeight::Near { w.min(libm::rintf(0.5 * depth) as i32) } else { w };
-        sdf[voxel] = averaged(i32::from(sdf[voxel]), observed, gain, past + gain) as i16;
+        sdf[voxel] = averaged(i32::from(sdf[voxel]), observed, gain, past(config, w, depth) + gain) as i16;
         weight[voxel] = (w + gain).min(i32::from(config.max_weight)) as u8;
         let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
         if distance.abs() > config.colour_band * config.truncation_m || !is_blank && notes & 16 != 0 {
