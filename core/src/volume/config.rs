@@ -14,7 +14,7 @@ pub enum ObservationWeight {
     /// 1, against a past that weighs at most one for every 2 m of depth: near observations, which are more precise, replace what was seen from
     /// afar, and weights count observations all the same.
     #[default]
-    Near,
+    Nearest,
     /// `100 / depth_m`, held within 1 and 10: near observations are more precise (the original's option).
     Depth,
 }
@@ -23,7 +23,7 @@ impl ObservationWeight {
     /// The most that one observation weighs.
     pub(super) const fn most(self) -> u32 {
         match self {
-            Self::One | Self::Near => 1,
+            Self::One | Self::Nearest => 1,
             Self::Depth => 10,
         }
     }
@@ -31,7 +31,7 @@ impl ObservationWeight {
     /// The most that the past weighs against an observation, by its depth, 1/m.
     pub(super) const fn past_per_m(self) -> f32 {
         match self {
-            Self::Near => 0.5,
+            Self::Nearest => 0.5,
             Self::One | Self::Depth => f32::MAX,
         }
     }
@@ -82,7 +82,7 @@ pub struct VolumeConfig {
     pub far_m: f32,
     /// Weight at which the average stops forgetting less, 1 to 255; 50.
     pub max_weight: u8,
-    /// What one observation weighs; near (the original: one).
+    /// What one observation weighs; nearest (the original: one).
     pub observation_weight: ObservationWeight,
     /// Factor on an observation's weight by semantic class (Vineet et al., *Incremental Dense Semantic Stereo Fusion*, 2015);
     /// 0 keeps a class out of the map. All 1.
@@ -116,7 +116,7 @@ impl Default for VolumeConfig {
             near_m: 0.5,
             far_m: 20.0,
             max_weight: 50,
-            observation_weight: ObservationWeight::Near,
+            observation_weight: ObservationWeight::Nearest,
             class_weight: [1; CLASS_COUNT],
             colour_band: 0.25,
             when_full: WhenFull::Evict,

@@ -119,7 +119,7 @@ impl<'a> Fusion<'a> {
     /// Weight of an observation at a pixel, of that depth; 0 keeps it out.
     fn observation_weight(&self, u: usize, v: usize, depth_m: f32) -> i32 {
         let by_depth = match self.config.observation_weight {
-            ObservationWeight::One | ObservationWeight::Near => 1,
+            ObservationWeight::One | ObservationWeight::Nearest => 1,
             ObservationWeight::Depth => ((100.0 / depth_m) as i32).clamp(1, 10),
         };
         let class = self.seen.class.and_then(|image| image.get(u, v)).map(usize::from);

@@ -61,7 +61,7 @@ fn target_colour(seen: &Observation<'_>, u: usize, v: usize) -> [u8; 3] {
 
 /// What a weight counts for against an observation at a depth.
 fn past(config: &VolumeConfig, weight: i32, depth_m: f32) -> i32 {
-    if config.observation_weight == ObservationWeight::Near { weight.min(libm::rintf(0.5 * depth_m) as i32) } else { weight }
+    if config.observation_weight == ObservationWeight::Nearest { weight.min(libm::rintf(0.5 * depth_m) as i32) } else { weight }
 }
 
 /// Fusion as its module states it, one voxel after the other, and as plainly.
@@ -128,7 +128,7 @@ fn fuse_slowly(
 
 #[test]
 fn equals_the_plain_twin_bit_for_bit() {
-    equals_the_plain_twin(ObservationWeight::Near);
+    equals_the_plain_twin(ObservationWeight::Nearest);
     equals_the_plain_twin(ObservationWeight::One);
 }
 
@@ -285,7 +285,7 @@ fn near_observations_weigh_more_when_asked_and_weight_stops_at_its_maximum() {
 #[test]
 fn near_observations_replace_the_past_and_weights_still_count() {
     for (observation_weight, depth, past) in
-        [(ObservationWeight::Near, 4.0, 2), (ObservationWeight::Near, 16.0, 8), (ObservationWeight::One, 4.0, 10)]
+        [(ObservationWeight::Nearest, 4.0, 2), (ObservationWeight::Nearest, 16.0, 8), (ObservationWeight::One, 4.0, 10)]
     {
         let config = VolumeConfig { observation_weight, distance: DistanceAlong::Ray, ..VolumeConfig::default() };
         with_volume(&Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY }, &config, |volume| {
