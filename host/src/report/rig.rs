@@ -1,6 +1,7 @@
 //! What a run found out about its rig: figures, a sentence, and a file to begin another run with.
 
 use crate::run::RunRecord;
+use dynvox_core::geometry::RowCorrection;
 use dynvox_core::rectify::self_calibration::{CalibrationState, SelfCalibrationReport};
 use serde::Serialize;
 
@@ -53,17 +54,20 @@ pub fn summary(run: &RunRecord) -> Option<RigSummary> {
     })
 }
 
+/// The correction of rows, where it is worth a word.
+fn rows_apart(report: &SelfCalibrationReport) -> Option<RowCorrection> {
+    Some(report.rows).filter(|rows| rows.largest_px() >= ROWS_WORTH_A_WORD_PX)
+}
+
 /// What was found and what to do about it.
 pub fn sentence(run: &RunRecord) -> String {
     let Some(report) = found(run) else {
         return "disparity offset unknown: the camera has to move past something within about 30 m".to_owned();
     };
-    let rows = if report.rows.largest_px() >= ROWS_WORTH_A_WORD_PX {
+    let rows = rows_apart(&report).map_or_else(String::new, |rows| {
         let moved = if report.corrected { ", aligned" } else { "" };
-        format!("; rows up to {:.1} px apart{moved}", report.rows.largest_px())
-    } else {
-        String::new()
-    };
+        format!("; rows up to {:.1} px apart{moved}", rows.largest_px())
+    });
     let value = format!("{:+.3} px of disparity, sigma {:.3} px{rows}", report.offset_px, report.offset_sigma_px);
     let done = if report.corrected { "taken out" } else { "not taken out: set rig.self_calibration=\"apply\"" };
     match report.state() {
@@ -92,7 +96,7 @@ fn begin_with(report: &SelfCalibrationReport, frames: usize) -> Option<String> {
             found.offset_px, found.slope_px, found.quartic_px, found.row_quadratic_px
         )
     });
-    let rows = Some(report.rows).filter(|rows| rows.largest_px() >= ROWS_WORTH_A_WORD_PX).map(|rows| {
+    let rows = rows_apart(report).map(|rows| {
         format!(
             "[rig.row_correction]\nconstant_px = {:.4}\ncolumn_px = {:.4}\nrow_px = {:.4}\ncolumn_quadratic_px = {:.4}\n\
              product_px = {:.4}\nrow_quadratic_px = {:.4}\n",
@@ -112,7 +116,7 @@ fn begin_with(report: &SelfCalibrationReport, frames: usize) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynvox_core::geometry::{DisparityCorrection, RowCorrection};
+    use dynvox_core::geometry::DisparityCorrection;
     use dynvox_core::rectify::self_calibration::RigConfig;
 
     #[derive(serde::Deserialize)]

@@ -101,15 +101,9 @@ impl RowCalibration {
     pub(super) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { start: _, information, applied, frames } = self;
         information.visit(visitor);
-        let RowCorrection {
-            constant_px,
-            column_px,
-            row_px,
-            column_quadratic_px,
-            product_px,
-            row_quadratic_px,
-        } = applied;
-        visitor.f64s([constant_px, column_px, row_px, column_quadratic_px, product_px, row_quadratic_px]);
+        let mut terms = applied.terms();
+        visitor.f64s(&mut terms);
+        *applied = RowCorrection::of_terms(terms);
         visitor.u32(frames);
     }
 }

@@ -197,7 +197,7 @@ impl Fusion<'_> {
             for ((past, &weight), &observed_m) in scratch.share.iter_mut().zip(weight).zip(&scratch.observed_m) {
                 *past = self.past(weight, observed_m) as i16;
             }
-            // Apart, for a table is read one by one, and what comes before it is not.
+            // In a loop of its own: fusion takes a fifth longer where one loop does both.
             for share in &mut scratch.share {
                 *share = self.shares.ones.get(*share as usize + 1).copied().unwrap_or(0);
             }
