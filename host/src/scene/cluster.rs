@@ -1,7 +1,8 @@
 //! Mesh simplification by vertex clustering (Rossignac, Borrel, 1993): vertices in one cell of a lattice become their mean.
 //!
 //! Triangles stream in; whenever there are more than may be, the cells grow and what is kept is clustered again. So the memory is bounded by
-//! the result, not by the input, and the order of the input alone decides the result.
+//! the result, not by the input, and the order of the input alone decides the result. A vertex counts once for all triangles that share it
+//! within [`RECENT`] numbers of vertices; one that returns later counts again.
 
 use super::IndexedMesh;
 use crate::formats::MeshVertex;
@@ -13,6 +14,20 @@ const FIRST_CELL_M: f32 = 0.03;
 const GROWTH: f32 = 1.26;
 /// Cells for each triangle that may stay: small fragments have cells and no triangle.
 const CELLS_PER_TRIANGLE: usize = 2;
+/// Vertices whose cell is remembered: what triangles share lies near each other in a file.
+const RECENT: usize = 1 << 16;
+
+/// A vertex and its cluster, by number.
+#[derive(Clone, Copy)]
+struct Recent {
+    vertex: u32,
+    cluster: u32,
+}
+
+impl Recent {
+    /// None yet: no mesh has clusters of this number.
+    const NONE: Self = Self { vertex: 0, cluster: u32::MAX };
+}
 
 /// The vertices of one cell.
 #[derive(Clone, Copy, Default)]
@@ -66,6 +81,8 @@ pub struct VertexClustering {
     cell_m: f32,
     cells: HashMap<[i32; 3], u32>,
     clusters: Vec<Cluster>,
+    /// Each in the slot of its number.
+    recent: Vec<Recent>,
     triangles: Vec<[u32; 3]>,
     /// Corners of the triangles in ascending order: two sides of a thin sheet would flicker.
     known: HashSet<[u32; 3]>,
@@ -81,22 +98,34 @@ impl VertexClustering {
             cell_m: FIRST_CELL_M * side.max(1.0),
             cells: HashMap::new(),
             clusters: Vec::new(),
+            recent: vec![Recent::NONE; RECENT],
             triangles: Vec::new(),
             known: HashSet::new(),
         }
     }
 
-    /// Adds a triangle.
-    pub fn add(&mut self, corners: [impl Into<MeshVertex>; 3]) {
-        let corners: [MeshVertex; 3] = corners.map(Into::into);
-        if corners.iter().flat_map(|corner| corner.position_m).any(|metres| !metres.is_finite()) {
+    /// Adds a triangle: its vertices and their numbers in the mesh that comes in.
+    pub fn add(&mut self, corners: [(u32, MeshVertex); 3]) {
+        if corners.iter().flat_map(|(_, vertex)| vertex.position_m).any(|metres| !metres.is_finite()) {
             return;
         }
-        let triangle = corners.map(|corner| self.cluster(corner.position_m, &Cluster::of(corner)));
+        let triangle = corners.map(|(number, vertex)| self.cluster_of(number, vertex));
         self.connect(triangle);
         while self.triangles.len() > self.most_triangles || self.clusters.len() > CELLS_PER_TRIANGLE * self.most_triangles {
             self.coarsen();
         }
+    }
+
+    /// The number of the cell that a vertex is in; it counts there unless it has just done so.
+    fn cluster_of(&mut self, vertex: u32, at: MeshVertex) -> u32 {
+        let slot = vertex as usize % RECENT;
+        let known = self.recent[slot];
+        if known.vertex == vertex && known.cluster != Recent::NONE.cluster {
+            return known.cluster;
+        }
+        let cluster = self.cluster(at.position_m, &Cluster::of(at));
+        self.recent[slot] = Recent { vertex, cluster };
+        cluster
     }
 
     /// Adds vertices to their cell and returns its number.
@@ -124,6 +153,7 @@ impl VertexClustering {
         let (clusters, triangles) = (std::mem::take(&mut self.clusters), std::mem::take(&mut self.triangles));
         self.cells.clear();
         self.known.clear();
+        self.recent.fill(Recent::NONE);
         self.cell_m *= GROWTH;
         let numbers: Vec<u32> = clusters.iter().map(|cluster| self.cluster(cluster.position_m(), cluster)).collect();
         triangles.iter().for_each(|triangle| self.connect(triangle.map(|corner| numbers[corner as usize])));
@@ -157,7 +187,7 @@ mod tests {
     /// A square of `side` x `side` squares of 5 cm, two triangles each, that lies at a depth of 2 m.
     fn plane(side: u32, most_triangles: usize) -> IndexedMesh {
         let mut clustering = VertexClustering::new(most_triangles, u64::from(2 * side * side));
-        let corner = |x: u32, y: u32| ([0.05 * x as f32, 0.05 * y as f32, 2.0], [200, x as u8, 0]);
+        let corner = |x: u32, y: u32| (x + y * (side + 1), ([0.05 * x as f32, 0.05 * y as f32, 2.0], [200, x as u8, 0]).into());
         for (x, y) in (0..side * side).map(|at| (at % side, at / side)) {
             clustering.add([corner(x, y), corner(x + 1, y), corner(x, y + 1)]);
             clustering.add([corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)]);
@@ -187,10 +217,27 @@ mod tests {
     #[test]
     fn the_two_sides_of_a_sheet_become_one_and_nonsense_is_left_out() {
         let mut clustering = VertexClustering::new(10, 3);
-        let corners = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(|at| (at, [0; 3]));
+        let corner = |number: u32, at: [f32; 3]| (number, (at, [0; 3]).into());
+        let corners = [corner(0, [0.0, 0.0, 1.0]), corner(1, [1.0, 0.0, 1.0]), corner(2, [0.0, 1.0, 1.0])];
         clustering.add(corners);
         clustering.add([corners[0], corners[2], corners[1]]);
-        clustering.add([corners[0], corners[1], ([f32::NAN, 0.0, 0.0], [0; 3])]);
+        clustering.add([corners[0], corners[1], corner(3, [f32::NAN, 0.0, 0.0])]);
         assert_eq!(clustering.finish().triangles, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn a_vertex_counts_once_however_many_triangles_share_it() {
+        let corner = |number: u32, x: f32, y: f32| (number, ([x, y, 1.0], [9; 3]).into());
+        // A fan: its centre, and a vertex of one triangle in the same cell.
+        let (centre, beside) = (corner(0, 0.01, 0.0), corner(1, 0.02, 0.0));
+        let rim = [(0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)];
+        let rim: Vec<_> = (2..).zip(rim).map(|(number, (x, y))| corner(number, x, y)).collect();
+        let mut clustering = VertexClustering::new(10, 5);
+        for pair in rim.windows(2) {
+            clustering.add([centre, pair[0], pair[1]]);
+        }
+        clustering.add([beside, rim[3], rim[0]]);
+        let x_m = clustering.finish().positions_m[0][0];
+        assert!((x_m - 0.015).abs() < 1e-6, "{x_m}: the mean of two vertices, not of four corners");
     }
 }

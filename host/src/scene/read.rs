@@ -56,7 +56,10 @@ fn simplified(path: &Path, static_only: bool, most_triangles: usize) -> Result<(
     let add = |corners: [PlyVertex; 3]| {
         if corners[0].object == 0 || !static_only {
             triangles += 1;
-            clustering.add(corners.map(|PlyVertex { position_m, colour, weight, .. }| MeshVertex { position_m, colour, weight }));
+            clustering.add(corners.map(|corner| {
+                let PlyVertex { number, position_m, colour, weight, .. } = corner;
+                (number, MeshVertex { position_m, colour, weight })
+            }));
         }
     };
     ply.triangles(add).map_err(FormatError::read(path))?;

@@ -9,10 +9,14 @@ use std::path::Path;
 
 /// Bytes of a face: the number of its corners, and three of them.
 const FACE_BYTES: usize = 13;
+/// Faces read at once.
+const FACES: usize = 4_096;
 
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlyVertex {
+    /// Its number in the file.
+    pub number: u32,
     /// Position, m, in the camera's axes.
     pub position_m: [f32; 3],
     /// Red, green, blue.
@@ -54,16 +58,16 @@ impl VertexLayout {
         Some(())
     }
 
-    /// The vertex in so many bytes.
-    fn vertex(&self, bytes: &[u8]) -> Option<PlyVertex> {
+    /// The vertex of a number in so many bytes.
+    fn vertex(&self, number: u32, bytes: &[u8]) -> Option<PlyVertex> {
         let word = |at: usize| <[u8; 4]>::try_from(bytes.get(at..at + 4)?).ok();
-        let number = |at: usize| word(at).map(f32::from_le_bytes);
+        let metres = |at: usize| word(at).map(f32::from_le_bytes);
         let at = self.position?;
         let colour = self.colour.and_then(|at| bytes.get(at..at + 3)?.try_into().ok()).unwrap_or_default();
         let object = self.object.and_then(word).map(u32::from_le_bytes).unwrap_or_default();
         let weight = self.weight.and_then(|at| bytes.get(at).copied()).unwrap_or_default();
-        let position_m = self.axes.to_camera([number(at)?, number(at + 4)?, number(at + 8)?]);
-        Some(PlyVertex { position_m, colour, object, weight })
+        let position_m = self.axes.to_camera([metres(at)?, metres(at + 4)?, metres(at + 8)?]);
+        Some(PlyVertex { number, position_m, colour, object, weight })
     }
 }
 
@@ -76,7 +80,7 @@ pub struct PlyMesh {
     pub triangles: u64,
     layout: VertexLayout,
     records: Records,
-    faces: BufReader<File>,
+    faces: File,
 }
 
 impl PlyMesh {
@@ -125,13 +129,7 @@ impl PlyMesh {
         let open =
             |at: u64| File::open(path).and_then(|mut file| file.seek(SeekFrom::Start(at)).map(|_| file)).map_err(FormatError::read(path));
         let records = Records::new(open(0)?, vertices_at, vertices, layout.bytes);
-        Ok(Self {
-            vertices,
-            triangles,
-            layout,
-            records,
-            faces: BufReader::with_capacity(1 << 16, open(faces_at)?),
-        })
+        Ok(Self { vertices, triangles, layout, records, faces: open(faces_at)? })
     }
 
     /// Hands every triangle to `sink`, once: corners in the file's order.
@@ -139,21 +137,30 @@ impl PlyMesh {
     /// # Errors
     /// The file ends early, a face is not a triangle, or names a vertex that is not there.
     pub fn triangles(mut self, mut sink: impl FnMut([PlyVertex; 3])) -> io::Result<()> {
-        let damaged = || io::Error::new(io::ErrorKind::InvalidData, "the mesh is damaged");
-        let mut face = [0u8; FACE_BYTES];
-        for _ in 0..self.triangles {
-            self.faces.read_exact(&mut face)?;
-            let [3, indices @ ..] = face else { return Err(damaged()) };
-            let mut corners = [PlyVertex::default(); 3];
-            for (corner, index) in corners.iter_mut().zip(indices.chunks_exact(4)) {
-                let index = u32::from_le_bytes([index[0], index[1], index[2], index[3]]);
-                let record = self.records.get(u64::from(index))?.ok_or_else(damaged)?;
-                *corner = self.layout.vertex(record).ok_or_else(damaged)?;
+        let mut bytes = vec![0; FACES * FACE_BYTES];
+        let mut left = self.triangles;
+        while left > 0 {
+            let faces = left.min(FACES as u64);
+            let bytes = &mut bytes[..faces as usize * FACE_BYTES];
+            self.faces.read_exact(bytes)?;
+            for face in bytes.as_chunks::<FACE_BYTES>().0 {
+                let [3, indices @ ..] = face else { return Err(damaged()) };
+                let [a, b, c] = [0, 4, 8].map(|at| u32::from_le_bytes([indices[at], indices[at + 1], indices[at + 2], indices[at + 3]]));
+                sink([self.vertex(a)?, self.vertex(b)?, self.vertex(c)?]);
             }
-            sink(corners);
+            left -= faces;
         }
         Ok(())
     }
+
+    fn vertex(&mut self, number: u32) -> io::Result<PlyVertex> {
+        let record = self.records.get(u64::from(number))?.ok_or_else(damaged)?;
+        self.layout.vertex(number, record).ok_or_else(damaged)
+    }
+}
+
+fn damaged() -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, "the mesh is damaged")
 }
 
 #[cfg(test)]
