@@ -95,7 +95,8 @@ pub struct VolumeConfig {
     pub prune_weight: u8,
     /// Length of the window, frames. At least 1; 200 (the paper's text: 300, its pruning experiment: 40).
     pub prune_lag: u32,
-    /// A block whose smallest |distance| is above this share of the truncation goes as a whole, 0 to 1; 0 is off.
+    /// A block not visible in the window whose smallest |distance| is above this share of the truncation goes as a whole, 0 to 1; 0 is off. With two
+    /// voxels, 0.13 at the defaults, surfaces stay.
     pub prune_distance: f32,
     /// Most blocks visited in one frame; the rest follows in the next. At least 1; 20,000.
     pub prune_blocks_per_frame: u32,
@@ -132,6 +133,11 @@ impl Default for VolumeConfig {
 }
 
 impl VolumeConfig {
+    /// Whether anything is pruned.
+    pub const fn prunes(&self) -> bool {
+        self.prune_weight > 0 || self.prune_distance > 0.0
+    }
+
     /// Notes everything wrong with the figures.
     pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;

@@ -1,10 +1,11 @@
 //! Pruning: what noise left behind goes, a fixed lag after it was last looked at (Section III-F of the paper).
 //!
 //! After frame n the blocks visible in frame n - lag are visited. Each voxel with 0 < weight <= `prune_weight` is reset; a block without
-//! a seen voxel left, or one whose smallest |distance| exceeds `prune_distance` (Nießner et al., 2013, Section 5.3; off by default), goes
-//! back to the pool. At most `prune_blocks_per_frame` blocks are visited per frame; the rest stays due and comes first in the next.
+//! a seen voxel left goes back to the pool, and so does one that was not visible since and whose smallest |distance| exceeds `prune_distance`
+//! (Nießner et al., 2013, Section 5.3; off by default). At most `prune_blocks_per_frame` blocks are visited per frame; the rest stays due and comes
+//! first in the next.
 //!
-//! Weight 0 is off, bit for bit.
+//! With `prune_weight` and `prune_distance` 0 pruning is off, bit for bit.
 
 use super::{BLOCK_VOXELS, Slot, Volume, block::Voxels};
 
@@ -36,11 +37,20 @@ impl PruneReport {
     }
 }
 
+/// What goes.
+#[derive(Clone, Copy)]
+pub(super) struct Rule {
+    /// Voxels seen at most this often.
+    pub weight: u8,
+    /// Blocks farther from any surface than this share of the truncation; 0 is none.
+    pub distance: f32,
+}
+
 impl Volume<'_> {
     /// Remembers what is visible in this frame and prunes what was visible `prune_lag` frames ago.
     pub(crate) fn prune(&mut self) -> PruneReport {
         let mut report = PruneReport::default();
-        if self.config.prune_weight == 0 {
+        if !self.config.prunes() {
             return report;
         }
         let frame = self.visible.frame();
@@ -68,30 +78,40 @@ impl Volume<'_> {
         let mut report = PruneReport::default();
         let mut from = 0;
         while let Some(slot) = self.pool.next_live(from) {
-            let (reset, freed) = self.prune_block(slot, prune_weight);
+            let (reset, freed) = self.prune_block(slot, Rule { weight: prune_weight, ..self.rule() });
             report.add(reset, freed);
             from = slot.get() + 1;
         }
         report
     }
 
+    /// What goes of a block that has left the window.
+    pub(super) fn rule(&self) -> Rule {
+        Rule { weight: self.config.prune_weight, distance: self.config.prune_distance }
+    }
+
+    /// Visits blocks that are due. Those visible in the window will be due again, and do not go for their distance.
     fn visit_due(&mut self, most: u32, report: &mut PruneReport) {
         let mut from = 0;
         while report.visited < most
             && let Some(slot) = self.history.take_due(from)
         {
-            let (reset, freed) = self.prune_block(slot, self.config.prune_weight);
+            let in_window = self.history.covers(self.visible.last_visible(slot));
+            let rule = Rule {
+                distance: if in_window { 0.0 } else { self.config.prune_distance },
+                ..self.rule()
+            };
+            let (reset, freed) = self.prune_block(slot, rule);
             report.add(reset, freed);
             from = slot.get() + 1;
         }
         report.carried_over = self.history.due();
     }
 
-    /// Resets the voxels of low weight in a block, and frees it when nothing is left. How many were reset, and whether it was freed.
-    pub(super) fn prune_block(&mut self, slot: Slot, prune_weight: u8) -> (u32, bool) {
-        let at = slot.index();
+    /// Resets the voxels of low weight in a block, and frees it when nothing near a surface is left. How many were reset, and whether it was freed.
+    pub(super) fn prune_block(&mut self, slot: Slot, rule: Rule) -> (u32, bool) {
+        let (at, prune_weight, by_distance) = (slot.index(), rule.weight, rule.distance > 0.0);
         // Most blocks are known to hold no voxel of low weight without reading them.
-        let by_distance = self.config.prune_distance > 0.0;
         if !by_distance && self.blocks.header.get(at).is_some_and(|header| header.min_weight > prune_weight) {
             return (0, false);
         }
@@ -105,7 +125,7 @@ impl Volume<'_> {
         if census.low_weight > 0 {
             reset_low_weight(prune_weight, sdf, weight, self.blocks.colour.get_mut(at));
         }
-        let far = by_distance && nearest(sdf, weight) > self.config.prune_distance;
+        let far = by_distance && nearest(sdf, weight) > rule.distance;
         if far {
             self.free_block(slot);
         } else if census.low_weight > 0 {
@@ -167,6 +187,9 @@ fn reset_low_weight(
 
 /// Smallest |distance| of the seen voxels, as a share of the truncation.
 fn nearest(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS]) -> f32 {
-    let seen = sdf.iter().zip(weight).filter(|(_, weight)| **weight > 0);
-    seen.map(|(sdf, _)| sdf.unsigned_abs()).min().map_or(0.0, |units| f32::from(units) / 32_767.0)
+    let mut nearest = i16::MAX;
+    for (&sdf, &weight) in sdf.iter().zip(weight) {
+        nearest = nearest.min(if weight > 0 { sdf.wrapping_abs() } else { i16::MAX });
+    }
+    f32::from(nearest) / 32_767.0
 }

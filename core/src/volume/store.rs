@@ -79,8 +79,8 @@ impl Volume<'_> {
         if self.config.when_full == WhenFull::Refuse || self.visible.was_lately(slot) {
             return false;
         }
-        if self.config.prune_weight > 0 && self.history.covers(self.visible.last_visible(slot)) {
-            let (_, freed) = self.prune_block(slot, self.config.prune_weight);
+        if self.config.prunes() && self.history.covers(self.visible.last_visible(slot)) {
+            let (_, freed) = self.prune_block(slot, self.rule());
             if freed {
                 report.empty += 1;
                 return true;

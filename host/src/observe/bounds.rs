@@ -154,7 +154,7 @@ impl Observer for BoundsObserver {
 
     fn finish(mut self, setup: &Setup<'_>, _: &Finished) -> Result<BoundsSection, ObserveError> {
         let volume = &setup.config.volume;
-        if volume.prune_weight > 0 {
+        if volume.prunes() {
             // A shorter window would be another setting, even where the run ended before the window was full.
             let asked = volume.prune_lag as usize;
             self.uses.history_frames.needed =

@@ -128,7 +128,7 @@ pub fn check_bounds((width, height): (usize, usize), (profile, bounds): (&str, &
     }
     let problems = config.validate();
     let (prune_lag, history_frames) = (config.volume.prune_lag, bounds.history_frames);
-    if problems.is_empty() && config.volume.prune_weight > 0 && prune_lag as usize > history_frames {
+    if problems.is_empty() && config.volume.prunes() && prune_lag as usize > history_frames {
         return Err(RunError::Window { prune_lag, history_frames, profile: profile.to_owned() });
     }
     if problems.is_empty() {

@@ -1,13 +1,20 @@
 //! The window and what leaves it.
 
+mod by_distance;
+
 use super::*;
 use crate::random::Random;
-use crate::volume::block::Voxels;
+use crate::volume::{block::Voxels, prune::Rule};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A config that prunes weights up to `prune_weight` after `prune_lag` frames.
 fn pruning(prune_weight: u8, prune_lag: u32) -> VolumeConfig {
     VolumeConfig { prune_weight, prune_lag, ..VolumeConfig::default() }
+}
+
+/// Resets voxels of low weight, wherever they are.
+fn by_weight(weight: u8) -> Rule {
+    Rule { weight, distance: 0.0 }
 }
 
 /// Makes a block whose voxels all have that weight, with its digest entered.
@@ -96,20 +103,6 @@ fn a_half_noisy_block_keeps_its_good_voxels() {
 }
 
 #[test]
-fn a_block_far_from_any_surface_goes_only_when_asked() {
-    for (prune_distance, left) in [(0.0, 1), (0.9, 1), (0.1, 0)] {
-        with_volume(&CAPACITY, &VolumeConfig { prune_distance, ..pruning(1, 1) }, |volume| {
-            volume.visible.begin_frame();
-            let slot = plant(volume, BlockCoord::default(), |_| 9);
-            volume.blocks.voxels[slot.index()].sdf.fill(-16_384);
-            frame(volume, &[slot]);
-            frame(volume, &[]);
-            assert_eq!(volume.pool.len(), left, "at {prune_distance}");
-        });
-    }
-}
-
-#[test]
 fn blocks_left_unread_have_no_voxel_of_low_weight() {
     let depth_m = bumpy_depth();
     let nearer: Vec<f32> = depth_m.iter().map(|depth| 0.95 * depth).collect();
@@ -177,36 +170,15 @@ fn a_history_as_long_as_the_lag_prunes_in_time() {
 }
 
 #[test]
-fn a_block_is_far_where_all_that_was_seen_of_it_is_farther_than_allowed() {
-    let units = 16_384;
-    let at_units = f32::from(units as u16) / 32_767.0;
-    for (prune_distance, near, weight, left) in [
-        (at_units, units, 9, 1),
-        (at_units.next_down(), units, 9, 0),
-        (at_units.next_down(), units - 1, 9, 1),
-        (at_units.next_down(), 0, 0, 0),
-    ] {
-        with_volume(&CAPACITY, &VolumeConfig { prune_distance, ..pruning(1, 1) }, |volume| {
-            volume.visible.begin_frame();
-            let slot = plant(volume, BlockCoord::default(), |voxel| if voxel == 77 { weight } else { 9 });
-            volume.blocks.voxels[slot.index()].sdf.fill(-units);
-            volume.blocks.voxels[slot.index()].sdf[77] = near;
-            assert_eq!(volume.prune_block(slot, 1), (0, left == 0));
-            assert_eq!(volume.pool.len(), left, "at {prune_distance}, nearest {near} of weight {weight}");
-        });
-    }
-}
-
-#[test]
 fn voxels_of_a_block_are_counted_by_how_often_they_were_seen() {
     with_volume(&CAPACITY, &pruning(3, 1), |volume| {
         volume.visible.begin_frame();
         // 64 voxels of each weight from 0 to 7.
         let slot = plant(volume, BlockCoord::default(), |voxel| (voxel % 8) as u8);
-        assert_eq!(volume.prune_block(slot, 3), (3 * 64, false));
-        assert_eq!(volume.prune_block(slot, 3), (0, false), "nothing of low weight is left");
-        assert_eq!(volume.prune_block(slot, 6), (3 * 64, false), "4 to 6");
-        assert_eq!(volume.prune_block(slot, 7), (64, true));
+        assert_eq!(volume.prune_block(slot, by_weight(3)), (3 * 64, false));
+        assert_eq!(volume.prune_block(slot, by_weight(3)), (0, false), "nothing of low weight is left");
+        assert_eq!(volume.prune_block(slot, by_weight(6)), (3 * 64, false), "4 to 6");
+        assert_eq!(volume.prune_block(slot, by_weight(7)), (64, true));
     });
 }
 
