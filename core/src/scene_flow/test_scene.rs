@@ -39,7 +39,7 @@ fn image(t_world_camera: &Transform, x_m: f64) -> Vec<u8> {
 }
 
 /// Smooth noise of three wavelengths.
-fn grey(point: Point3<f64>) -> f64 {
+pub(crate) fn grey(point: Point3<f64>) -> f64 {
     let octave = |wavelength: f64, seed: u32| {
         let p = point.coords / wavelength;
         let cell = p.map(f64::floor);

@@ -1,10 +1,13 @@
 //! Moving objects among static points, with closed answers.
 
+mod patches;
+
 use super::*;
 use crate::{
     geometry::Transform,
     memory::SLAB_ALIGN,
     random::Random,
+    scene_flow::FlowMatcher,
     tracking::{Detection, FrameMatches, TrackReport, TrackingConfig},
 };
 use std::{vec, vec::Vec};
@@ -37,6 +40,28 @@ fn project([x, y, z]: [f64; 3]) -> [[f32; 2]; 2] {
     [[u as f32, v as f32], [(u - RIG.baseline_m * per_m) as f32, v as f32]]
 }
 
+/// What is seen of a world.
+struct Seen<'i, 's> {
+    /// Matches on each car, at most.
+    matches_on_car: usize,
+    /// Images, where patches are searched for.
+    images: Option<&'i mut FlowMatcher<'s>>,
+}
+
+impl Seen<'_, '_> {
+    fn thin(&self, world: &World, frame: u32, matches: &mut Vec<Match>) {
+        let mut left = vec![self.matches_on_car; world.cars.len() + 1];
+        left[0] = usize::MAX;
+        matches.retain(|m| {
+            let [u, v] = m.current_left.map(|at| at.round() as usize);
+            let left = &mut left[world.cast(frame, u, v).1];
+            let keep = *left > 0;
+            *left -= usize::from(keep);
+            keep
+        });
+    }
+}
+
 /// A world of a ground, a wall 40 m ahead and cars; the camera moves forward by `step_m` a frame.
 struct World {
     cars: Vec<Car>,
@@ -51,7 +76,12 @@ impl World {
 
     /// Depth and what is seen at a pixel: 0 the background, n the n-th car.
     fn cast(&self, frame: u32, u: usize, v: usize) -> (f64, usize) {
-        let [x, y] = [(u as f64 - RIG.center_u_px) / RIG.focal_px, (v as f64 - RIG.center_v_px) / RIG.focal_px];
+        self.cast_from(0.0, frame, [u as f64, v as f64])
+    }
+
+    /// The same from so far to the right.
+    fn cast_from(&self, right_m: f64, frame: u32, [u, v]: [f64; 2]) -> (f64, usize) {
+        let [x, y] = [(u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px];
         let mut best = (40.0, 0);
         if y > 0.0 && GROUND_M / y < best.0 {
             best.0 = GROUND_M / y;
@@ -59,7 +89,7 @@ impl World {
         for (number, car) in (1..).zip(&self.cars) {
             let [car_x, car_z] = car.at_frame(frame);
             let z = car_z - self.camera_z(frame);
-            let inside = (x * z - car_x).abs() < 0.9 && y * z < GROUND_M && y * z > GROUND_M - 1.4;
+            let inside = (right_m + x * z - car_x).abs() < 0.9 && y * z < GROUND_M && y * z > GROUND_M - 1.4;
             if z > 1.0 && inside && z < best.0 {
                 best = (z, number);
             }
@@ -97,7 +127,16 @@ impl World {
     }
 
     /// Runs `frames` frames, with the detections `detect` returns, and shows the tracks and the report of each.
-    fn run(&self, frames: u32, mut detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
+    fn run(&self, frames: u32, detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
+        self.run_with(Seen { matches_on_car: usize::MAX, images: None }, frames, detect)
+    }
+
+    fn run_with(
+        &self,
+        mut seen: Seen<'_, '_>,
+        frames: u32,
+        mut detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>,
+    ) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
         let config = TrackingConfig {
             segmentation: SegmentationConfig { enabled: true, ..SegmentationConfig::default() },
             area_min_px: 0,
@@ -111,7 +150,11 @@ impl World {
         let mut estimator = crate::egomotion::Estimator::new_in(&CAPACITY, &mut carver);
         (0..frames)
             .map(|frame| {
-                let (matches, disparity) = (if frame > 0 { self.matches(frame) } else { Vec::new() }, self.disparity(frame));
+                let (mut matches, disparity) = (if frame > 0 { self.matches(frame) } else { Vec::new() }, self.disparity(frame));
+                seen.thin(self, frame, &mut matches);
+                if let Some(images) = &mut seen.images {
+                    self.push(frame, images);
+                }
                 let disparity_q8 = View::new(&disparity, WIDTH, HEIGHT).unwrap();
                 let owned = detect(frame);
                 let detections: Vec<Detection<'_>> = owned
@@ -129,8 +172,9 @@ impl World {
                 let camera = self.camera(frame);
                 let matches = FrameMatches { refined: &matches, sparse: &[] };
                 let assigned = tracker.detect(frame, &detections, [WIDTH, HEIGHT], matches).assign_matches();
+                let search = seen.images.as_deref().filter(|_| frame > 0).map(|matcher| GuidedMatching { matcher, disparity_q8 });
                 let tracked =
-                    assigned.segment_motion(&RIG, &camera, disparity_q8, None).estimate_motions(&RIG, &camera, None, &mut estimator);
+                    assigned.segment_motion(&RIG, &camera, disparity_q8, search).estimate_motions(&RIG, &camera, None, &mut estimator);
                 let report = tracked.commit().segmentation;
                 (tracker.tracks().collect(), report)
             })
