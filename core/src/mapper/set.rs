@@ -197,7 +197,7 @@ section!(objects: ObjectsConfig {
 });
 section!(volume: VolumeConfig {
     voxel_size_m, truncation_m, near_m, far_m, max_weight, observation_weight, class_weight, colour_band, when_full, prune_weight, prune_lag,
-    prune_distance, prune_blocks_per_frame, edge_reach_px, distance, behind_m,
+    prune_distance, prune_blocks_per_frame, edge_reach_px, distance, behind_m, allocation_m,
 });
 section!(raycast: RaycastConfig { near_m, far_m, min_weight });
 section!(mesh: MeshConfig { min_weight });

@@ -107,6 +107,9 @@ pub struct VolumeConfig {
     pub distance: DistanceAlong,
     /// How far behind the surface voxels are observed, m, above 0: at least two voxels, at most the truncation; 0.3.
     pub behind_m: f32,
+    /// How far before and behind the surface blocks are made, along the ray, m, above 0: at least two voxels, at most the truncation; 0.2 (the original:
+    /// the truncation). Blocks that exist are fused wherever they are in view.
+    pub allocation_m: f32,
 }
 
 impl Default for VolumeConfig {
@@ -128,6 +131,7 @@ impl Default for VolumeConfig {
             edge_reach_px: 2,
             distance: DistanceAlong::Normal,
             behind_m: 0.3,
+            allocation_m: 0.2,
         }
     }
 }
@@ -161,6 +165,7 @@ impl VolumeConfig {
         require(problems, self.prune_lag >= 1, "volume.prune_lag", "must be at least 1 frame");
         require(problems, (0.0..=1.0).contains(&self.prune_distance), "volume.prune_distance", "must be from 0 to 1");
         require(problems, positive(self.behind_m), "volume.behind_m", "must be above 0");
+        require(problems, positive(self.allocation_m), "volume.allocation_m", "must be above 0");
         require(problems, self.edge_reach_px <= 16, "volume.edge_reach_px", "must be at most 16 px");
         require(problems, self.prune_blocks_per_frame >= 1, "volume.prune_blocks_per_frame", "must be at least 1");
     }

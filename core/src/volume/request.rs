@@ -5,7 +5,7 @@
 
 use super::{BLOCK_SIDE, MAX_BLOCKS_PER_RAY, Viewpoint, VolumeConfig};
 use crate::{
-    geometry::scalar::{floor_i32, max_f32},
+    geometry::scalar::{floor_i32, max_f32, min_f32},
     image::View,
     memory::{Carver, region_bytes},
     parallel::{BANDS, Bands},
@@ -133,7 +133,8 @@ pub(super) struct Rays<'a> {
     start: Vector3<f32>,
     /// The ray of pixel (0, 0) per metre of depth, and its change per column and row.
     rays: [Vector3<f32>; 3],
-    truncation_m: f32,
+    /// How far before and behind the surface blocks are made.
+    reach_m: f32,
     far_m: f32,
     /// First row, and first column of it.
     offset: [usize; 2],
@@ -147,7 +148,7 @@ impl<'a> Rays<'a> {
             depth_m,
             start,
             rays: view.rays_world().map(|ray| (ray / block_m).cast::<f32>()),
-            truncation_m: config.truncation_m,
+            reach_m: min_f32(max_f32(config.allocation_m, 2.0 * config.voxel_size_m), config.truncation_m),
             far_m: config.far_m,
             offset: [(frame / 2) as usize % PIXEL_STEP, frame as usize % PIXEL_STEP],
         }
@@ -175,8 +176,8 @@ impl<'a> Rays<'a> {
                     return;
                 }
                 let ray = ray + per_column * (first_u + PIXEL_STEP * i) as f32;
-                let from = self.start + ray * max_f32(depth_m - self.truncation_m, 0.0);
-                let to = self.start + ray * (depth_m + self.truncation_m);
+                let from = self.start + ray * max_f32(depth_m - self.reach_m, 0.0);
+                let to = self.start + ray * (depth_m + self.reach_m);
                 walk(from, to, |block| band.meet(block));
             }
             band.next = [row + 1, 0];
@@ -281,7 +282,7 @@ mod tests {
             depth_m,
             start: Vector3::new(0.3, 0.4, 0.5),
             rays: [Vector3::new(-1.2, -0.9, 2.5), Vector3::new(0.04, 0.0, 0.0), Vector3::new(0.0, 0.04, 0.0)],
-            truncation_m: 0.75,
+            reach_m: 0.75,
             far_m: 20.0,
             offset: [1, 0],
         };

@@ -158,7 +158,7 @@ fn of_more_crops_than_there_are_entries_the_latest_wait() {
 #[test]
 fn a_volume_that_is_full_keeps_what_it_has() {
     let board = Board { half_m: [0.8, 0.5], ..Board::CAR };
-    with(&Capacity { object_blocks: 75, ..CAPACITY }, &known_in_the_fourth_frame(), |instances, estimator| {
+    with(&Capacity { object_blocks: 50, ..CAPACITY }, &known_in_the_fourth_frame(), |instances, estimator| {
         let mut run = Run::new(instances, estimator);
         let coords = |run: &Run<'_, '_, '_>| {
             let (_, object) = run.instances.objects().next().unwrap();
@@ -172,7 +172,7 @@ fn a_volume_that_is_full_keeps_what_it_has() {
             run.step(Transform::IDENTITY, &[(&board, Some(shift(0.0, 0.0, 9.0)))]);
         }
         let before = coords(&run);
-        assert!(before.len() > 20 && before.len() < 75, "{} blocks", before.len());
+        assert!(before.len() > 20 && before.len() < 50, "{} blocks", before.len());
         // What was its right half is now the left one of what is seen of it.
         let mut refused = 0;
         for _ in 0..3 {

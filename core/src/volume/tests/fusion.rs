@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 #[test]
 fn a_wall_ahead_is_stored_at_its_distance() {
     let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![77; WIDTH * HEIGHT]);
-    let config = VolumeConfig { truncation_m: 0.4, behind_m: 0.4, ..VolumeConfig::default() };
+    let config = VolumeConfig { truncation_m: 0.4, behind_m: 0.4, allocation_m: 0.4, ..VolumeConfig::default() };
     with_volume(&CAPACITY, &config, |volume| {
         for _ in 0..3 {
             fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
@@ -40,7 +40,7 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
         for (i, &depth) in depth_m.iter().enumerate().filter(|(i, depth)| **depth > 0.0 && is_taken(*i)) {
             let direction = Vector3::new(((i % WIDTH) as f64 - RIG.center_u_px) / 80.0, ((i / WIDTH) as f64 - RIG.center_v_px) / 80.0, 1.0);
             for step in 0..=3_000 {
-                let at = f64::from(depth) - 0.75 + 1.5 * f64::from(step) / 3_000.0;
+                let at = f64::from(depth) - 0.2 + 0.4 * f64::from(step) / 3_000.0;
                 let point = view.t_world_camera.transform_point(Point3::from(direction * at)).coords / block_m;
                 let block = [point.x, point.y, point.z].map(|c| (c + 1.0 / 16.0).floor() as i32);
                 fine.insert(BlockCoord::new(block[0], block[1], block[2]).unwrap());

@@ -97,10 +97,14 @@ fn done(folder: &Path, job: &Job) -> anyhow::Result<()> {
     }
 }
 
+/// Blocks as far about surfaces as distances are kept: registration searches so far, and what is free of one epoch's surfaces tells what has changed.
+const ALLOCATION: [&str; 2] = ["--set", "volume.allocation_m=64"];
+
 /// Runs one job in a process of its own.
 fn run_apart(folder: &Path, job: &Job) -> anyhow::Result<()> {
     let run = Command::new(std::env::current_exe()?)
         .arg("run")
+        .args(ALLOCATION)
         .args(&job.arguments)
         .args(["--quiet", "--keep-blocks", "--overwrite", "--out"])
         .arg(job.run_folder(folder))

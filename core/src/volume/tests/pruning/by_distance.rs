@@ -46,7 +46,7 @@ fn surfaces_stay_when_blocks_two_voxels_from_them_go() {
         triangles.sort_unstable();
         triangles
     };
-    let config = VolumeConfig { behind_m: 0.75, ..pruning(0, 1) };
+    let config = VolumeConfig { behind_m: 0.75, allocation_m: 0.75, ..pruning(0, 1) };
     for (voxels, lost_share) in [(2.0, 0.001), (3.0, 0.0)] {
         let prune_distance = voxels * config.voxel_size_m / config.truncation_m;
         with_volume(&CAPACITY, &VolumeConfig { prune_distance, ..config }, |volume| {
