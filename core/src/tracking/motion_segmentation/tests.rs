@@ -40,15 +40,15 @@ fn project([x, y, z]: [f64; 3]) -> [[f32; 2]; 2] {
     [[u as f32, v as f32], [(u - RIG.baseline_m * per_m) as f32, v as f32]]
 }
 
-/// What is seen of a world.
-struct Seen<'i, 's> {
+/// What a tracker is given of a world.
+struct WorldInput<'i, 's> {
     /// Matches on each car, at most.
     matches_on_car: usize,
     /// Images, where patches are searched for.
     images: Option<&'i mut FlowMatcher<'s>>,
 }
 
-impl Seen<'_, '_> {
+impl WorldInput<'_, '_> {
     fn thin(&self, world: &World, frame: u32, matches: &mut Vec<Match>) {
         let mut left = vec![self.matches_on_car; world.cars.len() + 1];
         left[0] = usize::MAX;
@@ -128,12 +128,12 @@ impl World {
 
     /// Runs `frames` frames, with the detections `detect` returns, and shows the tracks and the report of each.
     fn run(&self, frames: u32, detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
-        self.run_with(Seen { matches_on_car: usize::MAX, images: None }, frames, detect)
+        self.run_with(WorldInput { matches_on_car: usize::MAX, images: None }, frames, detect)
     }
 
     fn run_with(
         &self,
-        mut seen: Seen<'_, '_>,
+        mut input: WorldInput<'_, '_>,
         frames: u32,
         mut detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>,
     ) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
@@ -151,8 +151,8 @@ impl World {
         (0..frames)
             .map(|frame| {
                 let (mut matches, disparity) = (if frame > 0 { self.matches(frame) } else { Vec::new() }, self.disparity(frame));
-                seen.thin(self, frame, &mut matches);
-                if let Some(images) = &mut seen.images {
+                input.thin(self, frame, &mut matches);
+                if let Some(images) = &mut input.images {
                     self.push(frame, images);
                 }
                 let disparity_q8 = View::new(&disparity, WIDTH, HEIGHT).unwrap();
@@ -172,7 +172,7 @@ impl World {
                 let camera = self.camera(frame);
                 let matches = FrameMatches { refined: &matches, sparse: &[] };
                 let assigned = tracker.detect(frame, &detections, [WIDTH, HEIGHT], matches).assign_matches();
-                let search = seen.images.as_deref().filter(|_| frame > 0).map(|matcher| GuidedMatching { matcher, disparity_q8 });
+                let search = input.images.as_deref().filter(|_| frame > 0).map(|matcher| GuidedMatching { matcher, disparity_q8 });
                 let tracked =
                     assigned.segment_motion(&RIG, &camera, disparity_q8, search).estimate_motions(&RIG, &camera, None, &mut estimator);
                 let report = tracked.commit().segmentation;

@@ -33,8 +33,8 @@ impl World {
         let mut slab = vec![0u8; bytes + SLAB_ALIGN];
         let mut carver = Carver::new(&mut slab, bytes).unwrap();
         let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut carver);
-        let seen = Seen { matches_on_car, images: with_images.then_some(&mut matcher) };
-        self.run_with(seen, 8, nothing).into_iter().map(|(tracks, _)| tracks).collect()
+        let input = WorldInput { matches_on_car, images: with_images.then_some(&mut matcher) };
+        self.run_with(input, 8, nothing).into_iter().map(|(tracks, _)| tracks).collect()
     }
 }
 
@@ -53,9 +53,9 @@ fn a_car_with_too_few_matches_is_found_by_patches_of_its_mask_and_a_parked_one_i
 
 #[test]
 fn a_supposed_car_is_found_where_the_images_show_that_it_moves_so_and_nowhere_else() {
-    let overtakes = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.1 };
-    let stands = World { cars: vec![Car { motion: [0.0; 2], ..OVERTAKING }], ..overtakes };
-    for (world, extent_z_m, moves) in [(overtakes, 9.6, true), (stands, 8.2, false)] {
+    let overtaking = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.1 };
+    let parked = World { cars: vec![Car { motion: [0.0; 2], ..OVERTAKING }], ..overtaking };
+    for (world, extent_z_m, moves) in [(overtaking, 9.6, true), (parked, 8.2, false)] {
         let bytes = FlowMatcher::bytes(&CAPACITY);
         let mut slab = vec![0u8; bytes + SLAB_ALIGN];
         let mut carver = Carver::new(&mut slab, bytes).unwrap();
