@@ -62,7 +62,7 @@ fn the_least_bounds_hold_the_same_run() {
         assert_eq!(digests(&root.join("least"), column), digests(&root.join("large"), column), "{column}");
     }
     let street = ["street.width=320", "street.height=96", "volume.voxel_size_m=0.2"].map(|set| ["--set", set]).concat();
-    let console = dynvox(root, &[&["run", "--capacity", "least.toml", "--frames", "2"], &street[..]].concat());
+    let console = dynvox(root, &[&["run", "--capacity", "least.toml", "--frames", "2", "--instances", "exact"], &street[..]].concat());
     assert!(
         String::from_utf8_lossy(&console.stdout).contains("MiB would have held this run without a refusal"),
         "{}",

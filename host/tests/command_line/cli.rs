@@ -122,7 +122,7 @@ fn a_strict_run_ends_at_the_first_frame_that_affects_the_map_and_names_the_cause
     let strict = run(&["--strict"]);
     assert_eq!(strict.status.code(), Some(4));
     assert!(
-        output_text(&strict).contains("frame 0: map affected: ") && output_text(&strict).contains("block requests refused"),
+        output_text(&strict).contains("frame 1: map affected: ") && output_text(&strict).contains("block requests refused"),
         "{}",
         output_text(&strict)
     );

@@ -21,7 +21,7 @@ const STREET: [&str; 18] = [
     "--set",
     "street.frames=24",
     "--set",
-    "volume.voxel_size_m=0.07",
+    "volume.voxel_size_m=0.05",
     "--set",
     "volume.prune_lag=6",
     "--set",
