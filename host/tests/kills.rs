@@ -32,7 +32,7 @@ const STREET: [&str; 17] = [
     "--set",
     "street.frames=16",
     "--set",
-    "volume.voxel_size_m=0.07",
+    "volume.voxel_size_m=0.06",
     "--set",
     "volume.prune_lag=4",
     "--instances",

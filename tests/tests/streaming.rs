@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 static STREET: LazyLock<Clip> = LazyLock::new(|| Clip::street(320, 96, 40));
 const VOXEL_M: f32 = 0.1;
 /// Holds what is in view and some metres more.
-const SMALL: Capacity = Capacity { blocks: 4_000, visible_blocks: 4_000, ..Capacity::TINY };
+const SMALL: Capacity = Capacity { blocks: 2_800, visible_blocks: 2_800, ..Capacity::TINY };
 const LARGE: Capacity = Capacity { blocks: 40_000, ..SMALL };
 
 fn config(clip: &Clip) -> Config {

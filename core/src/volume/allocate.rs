@@ -1,7 +1,7 @@
 //! Making the blocks that a depth image runs through, and finding which are visible.
 //!
-//! Along the ray of every second pixel of every second row, staggered, each block between `depth - allocation_m` and `depth + allocation_m` is
-//! visited exactly once, by walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray Tracing*, 1987). Which pixels
+//! Along the ray of every second pixel of every second row, staggered, each block within `allocation_m` of the depth, or half of the
+//! way to the rays beside it, is visited exactly once, by walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray Tracing*, 1987). Which pixels
 //! are taken changes from frame to frame (docs/decisions/0018-allocation-from-every-fourth-pixel.md). A point belongs to the block of its
 //! nearest lattice point: a block's lattice points are its centre of mass, so nothing is shifted by half a voxel. Blocks farther from the surface
 //! than that hold none of it (docs/decisions/0046-blocks-near-the-surface.md).

@@ -107,8 +107,8 @@ pub struct VolumeConfig {
     pub distance: DistanceAlong,
     /// How far behind the surface voxels are observed, m, above 0: at least two voxels, at most the truncation; 0.3.
     pub behind_m: f32,
-    /// How far before and behind the surface blocks are made, along the ray, m, above 0: at least two voxels, at most the truncation; 0.2 (the original:
-    /// the truncation). Blocks that exist are fused wherever they are in view.
+    /// How far before and behind the surface blocks are made, along the ray, m, above 0: at least two voxels and half of the way in depth to the pixels
+    /// beside, at most the truncation; 0.2 (the original: the truncation). Blocks that exist are fused wherever they are in view.
     pub allocation_m: f32,
 }
 

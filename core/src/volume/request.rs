@@ -133,8 +133,8 @@ pub(super) struct Rays<'a> {
     start: Vector3<f32>,
     /// The ray of pixel (0, 0) per metre of depth, and its change per column and row.
     rays: [Vector3<f32>; 3],
-    /// How far before and behind the surface blocks are made.
-    reach_m: f32,
+    /// How far before and behind the surface blocks are made, at least and at most.
+    reach_m: [f32; 2],
     far_m: f32,
     /// First row, and first column of it.
     offset: [usize; 2],
@@ -148,7 +148,7 @@ impl<'a> Rays<'a> {
             depth_m,
             start,
             rays: view.rays_world().map(|ray| (ray / block_m).cast::<f32>()),
-            reach_m: min_f32(max_f32(config.allocation_m, 2.0 * config.voxel_size_m), config.truncation_m),
+            reach_m: [max_f32(config.allocation_m, 2.0 * config.voxel_size_m), config.truncation_m],
             far_m: config.far_m,
             offset: [(frame / 2) as usize % PIXEL_STEP, frame as usize % PIXEL_STEP],
         }
@@ -159,6 +159,15 @@ impl<'a> Rays<'a> {
         (self.offset[1] + row) % PIXEL_STEP
     }
 
+    /// How far before and behind a surface its ray is walked: at least half of the way in depth to the rays above and to the left, so that no block
+    /// between them is missed where a road or a wall is seen at a grazing angle.
+    #[inline(always)]
+    fn reach_m(&self, depth_m: f32, beside_m: [f32; 2]) -> f32 {
+        let [least_m, most_m] = self.reach_m;
+        let [above, left] = beside_m.map(|beside_m| if beside_m > 0.0 { 0.5 * (beside_m - depth_m).abs() } else { 0.0 });
+        min_f32(max_f32(least_m, max_f32(above, left)), most_m)
+    }
+
     /// Walks a band's rays until it ends or its list may be too short for another one.
     pub fn walk(&self, band: &mut Band<'_>) {
         let [corner, per_column, per_row] = self.rays;
@@ -167,7 +176,11 @@ impl<'a> Rays<'a> {
             let v = PIXEL_STEP * row + self.offset[0];
             let ray = corner + per_row * v as f32;
             let first_u = self.first_column(row) + PIXEL_STEP * first;
-            for (i, &depth_m) in self.depth_m.row(v).iter().skip(first_u).step_by(PIXEL_STEP).enumerate() {
+            let (here, above) = (self.depth_m.row(v), self.depth_m.row(v.saturating_sub(PIXEL_STEP)));
+            let depths = here.iter().zip(above).skip(first_u).step_by(PIXEL_STEP);
+            let mut left_m = first_u.checked_sub(PIXEL_STEP).and_then(|u| here.get(u)).copied().unwrap_or(0.0);
+            for (i, (&depth_m, &above_m)) in depths.enumerate() {
+                let beside_m = [above_m, core::mem::replace(&mut left_m, depth_m)];
                 if !(depth_m > 0.0 && depth_m <= self.far_m) {
                     continue;
                 }
@@ -176,8 +189,9 @@ impl<'a> Rays<'a> {
                     return;
                 }
                 let ray = ray + per_column * (first_u + PIXEL_STEP * i) as f32;
-                let from = self.start + ray * max_f32(depth_m - self.reach_m, 0.0);
-                let to = self.start + ray * (depth_m + self.reach_m);
+                let reach_m = self.reach_m(depth_m, beside_m);
+                let from = self.start + ray * max_f32(depth_m - reach_m, 0.0);
+                let to = self.start + ray * (depth_m + reach_m);
                 walk(from, to, |block| band.meet(block));
             }
             band.next = [row + 1, 0];
@@ -282,7 +296,7 @@ mod tests {
             depth_m,
             start: Vector3::new(0.3, 0.4, 0.5),
             rays: [Vector3::new(-1.2, -0.9, 2.5), Vector3::new(0.04, 0.0, 0.0), Vector3::new(0.0, 0.04, 0.0)],
-            reach_m: 0.75,
+            reach_m: [0.2, 0.75],
             far_m: 20.0,
             offset: [1, 0],
         };

@@ -39,8 +39,12 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
         let is_taken = |i: usize| (i / WIDTH).is_multiple_of(2) && (i % WIDTH + i / WIDTH / 2) % 2 == 1;
         for (i, &depth) in depth_m.iter().enumerate().filter(|(i, depth)| **depth > 0.0 && is_taken(*i)) {
             let direction = Vector3::new(((i % WIDTH) as f64 - RIG.center_u_px) / 80.0, ((i / WIDTH) as f64 - RIG.center_v_px) / 80.0, 1.0);
+            // Two rows above and two columns to the left.
+            let beside = [i.checked_sub(2 * WIDTH), i.checked_sub(2).filter(|_| i % WIDTH > 1)];
+            let beside = beside.into_iter().flatten().map(|at| depth_m[at]).filter(|&beside| beside > 0.0);
+            let reach = f64::from(beside.map(|beside| 0.5 * (beside - depth).abs()).fold(0.2, f32::max).min(0.75));
             for step in 0..=3_000 {
-                let at = f64::from(depth) - 0.2 + 0.4 * f64::from(step) / 3_000.0;
+                let at = f64::from(depth) + reach * (f64::from(step) / 1_500.0 - 1.0);
                 let point = view.t_world_camera.transform_point(Point3::from(direction * at)).coords / block_m;
                 let block = [point.x, point.y, point.z].map(|c| (c + 1.0 / 16.0).floor() as i32);
                 fine.insert(BlockCoord::new(block[0], block[1], block[2]).unwrap());
