@@ -1,6 +1,7 @@
 //! Allocation and fusion.
 
 use super::*;
+use crate::geometry::scalar::{max_f32, min_f32};
 use crate::volume::block::{Colour, Voxels};
 use nalgebra::Point3;
 use std::collections::BTreeSet;
@@ -42,7 +43,7 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
             // Two rows above and two columns to the left.
             let beside = [i.checked_sub(2 * WIDTH), i.checked_sub(2).filter(|_| i % WIDTH > 1)];
             let beside = beside.into_iter().flatten().map(|at| depth_m[at]).filter(|&beside| beside > 0.0);
-            let reach = f64::from(beside.map(|beside| 0.5 * (beside - depth).abs()).fold(0.2, f32::max).min(0.75));
+            let reach = f64::from(min_f32(beside.map(|beside| 0.5 * (beside - depth).abs()).fold(0.2, max_f32), 0.75));
             for step in 0..=3_000 {
                 let at = f64::from(depth) + reach * (f64::from(step) / 1_500.0 - 1.0);
                 let point = view.t_world_camera.transform_point(Point3::from(direction * at)).coords / block_m;
