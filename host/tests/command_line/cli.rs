@@ -119,10 +119,10 @@ fn a_strict_run_ends_at_the_first_frame_that_affects_the_map_and_names_the_cause
     let root = TempDir::new().unwrap();
     let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=4", "--profile", "tiny", "--quiet"];
     let run = |more: &[&str]| dynvox(root.path(), &[&["run", "--out", "result"], &street[..], more].concat());
-    let strict = run(&["--strict"]);
+    let strict = run(&["--strict", "--set", "volume.voxel_size_m=0.04"]);
     assert_eq!(strict.status.code(), Some(4));
     assert!(
-        output_text(&strict).contains("frame 1: map affected: ") && output_text(&strict).contains("block requests refused"),
+        output_text(&strict).contains("frame 0: map affected: ") && output_text(&strict).contains("block requests refused"),
         "{}",
         output_text(&strict)
     );
