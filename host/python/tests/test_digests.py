@@ -33,7 +33,7 @@ def test_street(command_line):
 
 
 def test_street_in_little_memory_with_blocks_evicted_and_loaded(command_line):
-    summary = compare(command_line, None, memory="20MiB", threads=1, frames=20)
+    summary = compare(command_line, None, memory="18MiB", threads=1, frames=20)
     assert summary["evict"]["out"] > 0 and summary["evict"]["back"] > 0, summary["evict"]
 
 
@@ -75,7 +75,7 @@ def test_a_mapper_of_a_rig_gives_the_bits_of_the_data_set():
 
 
 def test_a_snapshot_continues_bit_for_bit_evicted_blocks_included(tmp_path):
-    dataset = dynvox.Dataset(frames=20, memory="20MiB", threads=1)
+    dataset = dynvox.Dataset(frames=20, memory="18MiB", threads=1)
     mapper = dataset.mapper()
     frames = list(dataset)
     for frame in frames[:14]:
@@ -93,11 +93,11 @@ def test_a_snapshot_continues_bit_for_bit_evicted_blocks_included(tmp_path):
     with pytest.raises(dynvox.Error, match="damaged|cannot be read"):
         other = dataset.mapper()
         other.restore(snapshot[:1000] + b"\0" + snapshot[1001:])
-    lost = dynvox.Dataset(frames=2, memory="20MiB", threads=1, stream=False).mapper()
+    lost = dynvox.Dataset(frames=2, memory="18MiB", threads=1, stream=False).mapper()
     with pytest.raises(dynvox.Error, match="stream=True"):
         lost.restore(snapshot)
     kept = tmp_path / "map.blocks"
-    filed = dynvox.Dataset(frames=20, memory="20MiB", threads=1, stream=kept).mapper()
+    filed = dynvox.Dataset(frames=20, memory="18MiB", threads=1, stream=kept).mapper()
     filed.restore(snapshot)
     assert [filed.step(**frame)["digest"] for frame in frames[14:]] == rest and kept.stat().st_size > 1000
 
