@@ -1,10 +1,10 @@
 //! Making the blocks that a depth image runs through, and finding which are visible.
 //!
-//! Along the ray of every second pixel of every second row, staggered, each block within `allocation_m` of the depth, or half of the
-//! way to the rays beside it, is visited exactly once, by walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray Tracing*, 1987). Which pixels
-//! are taken changes from frame to frame (docs/decisions/0018-allocation-from-every-fourth-pixel.md). A point belongs to the block of its
-//! nearest lattice point: a block's lattice points are its centre of mass, so nothing is shifted by half a voxel. Blocks farther from the surface
-//! than that hold none of it (docs/decisions/0046-blocks-near-the-surface.md).
+//! Along the ray of every second pixel of every second row, staggered, each block within `allocation_m` of the depth is visited exactly
+//! once, farther where the next rays end farther off, by walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray
+//! Tracing*, 1987). Which pixels are taken changes from frame to frame (docs/decisions/0018-allocation-from-every-fourth-pixel.md). A point
+//! belongs to the block of its nearest lattice point: a block's lattice points are its centre of mass, so nothing is shifted by half a voxel.
+//! Blocks farther from the surface hold none of it (docs/decisions/0046-blocks-near-the-surface.md).
 //!
 //! Rows are walked in four fixed bands; what they ask for is made band by band, in the order in which it was met.
 //!

@@ -7,6 +7,14 @@ use crate::{
 };
 use nalgebra::Point3;
 
+/// Runs `test` with a matcher that has seen nothing.
+fn with_matcher<R>(test: impl FnOnce(&mut FlowMatcher<'_>) -> R) -> R {
+    let bytes = FlowMatcher::bytes(&CAPACITY);
+    let mut slab = vec![0u8; bytes + SLAB_ALIGN];
+    let mut carver = Carver::new(&mut slab, bytes).unwrap();
+    test(&mut FlowMatcher::new_in(&CAPACITY, &mut carver))
+}
+
 impl World {
     /// What a camera so far to the right sees: textures that lie still on the background and on each car.
     fn image(&self, right_m: f64, frame: u32) -> Vec<u8> {
@@ -29,12 +37,10 @@ impl World {
 
     /// Tracks by frame where each car has so many matches, with or without images.
     fn tracks(&self, matches_on_car: usize, with_images: bool) -> Vec<Vec<TrackReport>> {
-        let bytes = FlowMatcher::bytes(&CAPACITY);
-        let mut slab = vec![0u8; bytes + SLAB_ALIGN];
-        let mut carver = Carver::new(&mut slab, bytes).unwrap();
-        let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut carver);
-        let input = WorldInput { matches_on_car, images: with_images.then_some(&mut matcher) };
-        self.run_with(input, 8, nothing).into_iter().map(|(tracks, _)| tracks).collect()
+        with_matcher(|matcher| {
+            let input = WorldInput { matches_on_car, images: with_images.then_some(matcher) };
+            self.run_with(input, 8, nothing).into_iter().map(|(tracks, _)| tracks).collect()
+        })
     }
 }
 
@@ -56,30 +62,28 @@ fn a_supposed_car_is_found_where_the_images_show_that_it_moves_so_and_nowhere_el
     let overtaking = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.1 };
     let parked = World { cars: vec![Car { motion: [0.0; 2], ..OVERTAKING }], ..overtaking };
     for (world, extent_z_m, moves) in [(overtaking, 9.6, true), (parked, 8.2, false)] {
-        let bytes = FlowMatcher::bytes(&CAPACITY);
-        let mut slab = vec![0u8; bytes + SLAB_ALIGN];
-        let mut carver = Carver::new(&mut slab, bytes).unwrap();
-        let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut carver);
-        for frame in 0..2 {
-            world.push(frame, &mut matcher);
-        }
-        let disparity = world.disparity(1);
-        let disparity_q8 = View::new(&disparity, WIDTH, HEIGHT).unwrap();
-        let t_current_previous = world.camera(1).t_current_previous.unwrap();
-        let (config, ground) = (SegmentationConfig::default(), None);
-        let model = StaticModel::new(&config, &RIG, &t_current_previous, [0.25, 0.0]);
-        let shape = Shape { lattice: Lattice::new(&RIG, disparity_q8), ground };
-        let mut search = PatchSearch::new(GuidedMatching { matcher: &matcher, disparity_q8 }, &t_current_previous, &shape);
-        let (mut cells, mut queue) = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
-        let (mut members, mut values) = (vec![Candidate::default(); PATCHES_MAX], vec![0.0; CANDIDATES_MAX]);
-        let extent = groups::Extent { low: [1.8, 0.4, extent_z_m - 0.1], high: [3.2, 1.4, extent_z_m + 0.1] };
-        let mut is_found = |motion_m: [f64; 3], known: bool| {
-            let mut memory = PatchMemory { cells: &mut cells, queue: &mut queue, members: &mut members, values: &mut values };
-            search.verify(&model, &Seed::new(&extent, motion_m.into()).known(known), &mut memory).is_some()
-        };
-        for known in [false, true] {
-            assert_eq!(is_found([0.0, 0.0, 1.4], known), moves, "of a car that moves: {moves}, known: {known}");
-            assert!(!is_found([1.4, 0.0, 0.0], known), "of a car that does not move to the side, known: {known}");
-        }
+        with_matcher(|matcher| {
+            for frame in 0..2 {
+                world.push(frame, matcher);
+            }
+            let disparity = world.disparity(1);
+            let disparity_q8 = View::new(&disparity, WIDTH, HEIGHT).unwrap();
+            let t_current_previous = world.camera(1).t_current_previous.unwrap();
+            let config = SegmentationConfig::default();
+            let model = StaticModel::new(&config, &RIG, &t_current_previous, [0.25, 0.0]);
+            let shape = Shape { lattice: Lattice::new(&RIG, disparity_q8), ground: None };
+            let mut search = PatchSearch::new(GuidedMatching { matcher, disparity_q8 }, &t_current_previous, &shape);
+            let (mut cells, mut queue) = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
+            let (mut members, mut values) = (vec![Candidate::default(); PATCHES_MAX], vec![0.0; CANDIDATES_MAX]);
+            let extent = groups::Extent { low: [1.8, 0.4, extent_z_m - 0.1], high: [3.2, 1.4, extent_z_m + 0.1] };
+            let mut is_found = |motion_m: [f64; 3], known: bool| {
+                let mut memory = PatchMemory { cells: &mut cells, queue: &mut queue, members: &mut members, values: &mut values };
+                search.verify(&model, &Seed::new(&extent, motion_m.into()).known(known), &mut memory).is_some()
+            };
+            for known in [false, true] {
+                assert_eq!(is_found([0.0, 0.0, 1.4], known), moves, "of a car that moves: {moves}, known: {known}");
+                assert!(!is_found([1.4, 0.0, 0.0], known), "of a car that does not move to the side, known: {known}");
+            }
+        });
     }
 }
