@@ -54,6 +54,7 @@ mod delaunay;
 mod dense;
 mod descriptor;
 mod filter_support;
+mod flags;
 mod gaps;
 mod gradient;
 mod invalid;

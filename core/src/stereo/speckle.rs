@@ -2,9 +2,12 @@
 //!
 //! Runs of similar pixels along a row are united with those of the row above that they touch: a union-find over runs, whose roots hold
 //! the sizes. Where runs end is remembered, so that a second walk over runs, not pixels, blanks the small ones. Memory: six bytes a pixel
-//! (in the worst case each is a run) and two a column. Time: one walk over the image in bytes side by side, and one over its runs.
+//! (in the worst case each is a run) and three a column. Time: one walk over the image in bytes side by side, and one over its runs.
 
-use super::dense::{FILLED, NONE};
+use super::{
+    dense::{FILLED, NONE},
+    flags::for_each_set,
+};
 
 /// Working memory.
 pub(super) struct Scratch<'a> {
@@ -12,7 +15,7 @@ pub(super) struct Scratch<'a> {
     pub runs: &'a mut [i32],
     /// An entry a pixel: for each row, from its first pixel's place on, one past the last column of each run.
     pub ends: &'a mut [u16],
-    /// Two bytes a column.
+    /// Three bytes a column.
     pub flags: &'a mut [u8],
 }
 
@@ -68,7 +71,7 @@ pub(super) struct Blanked {
 pub(super) fn remove_speckles(disparity: &mut [i16], width: usize, similarity: i16, smallest: u32, scratch: Scratch<'_>) -> Blanked {
     let (pixels, width, Scratch { runs, ends, flags }) = (disparity.len(), width.max(1), scratch);
     let mut blanked = Blanked::default();
-    if smallest <= 1 || runs.len() < pixels || ends.len() < pixels || flags.len() < 2 * width {
+    if smallest <= 1 || runs.len() < pixels || ends.len() < pixels || flags.len() < 3 * width {
         return blanked;
     }
     let mut runs = Runs(runs);
@@ -105,68 +108,75 @@ fn difference(a: i16, b: i16) -> u16 {
 /// Finds the runs of all rows, numbered in scan order, those without disparity included, and unites them.
 fn find_segments(disparity: &[i16], width: usize, similarity: u16, runs: &mut Runs<'_>, ends: &mut [u16], flags: &mut [u8]) {
     let width = width.max(1);
-    let Some((breaks, touches)) = flags.split_at_mut_checked(width) else { return };
-    let (mut above, mut above_run): (&[i16], usize) = (&[], 0);
-    let mut here_run = 0;
-    let mut ends_above: &[u16] = &[];
-    for (here, ends_here) in disparity.chunks_exact(width).zip(ends.chunks_exact_mut(width)) {
+    let mut flags = flags.chunks_exact_mut(width);
+    let (Some(mut breaks_above), Some(mut breaks), Some(touches)) = (flags.next(), flags.next(), flags.next()) else { return };
+    let mut above: &[i16] = &[];
+    let (mut above_run, mut here_run) = (0, 0);
+    for (here, ends) in disparity.chunks_exact(width).zip(ends.chunks_exact_mut(width)) {
+        break_up(here, similarity, breaks);
+        let mut next_run = here_run;
         let mut start = 0;
-        let mut count = 0;
-        let mut slots = ends_here.iter_mut();
-        break_up(here, similarity, breaks, |end| {
-            runs.set(here_run + count, start - i32::from(end));
+        let mut slots = ends.iter_mut();
+        for_each_set(breaks, |last| {
+            let end = last as i32 + 1;
+            runs.set(next_run, start - end);
             if let Some(slot) = slots.next() {
-                *slot = end;
+                *slot = end as u16;
             }
-            start = i32::from(end);
-            count += 1;
+            start = end;
+            next_run += 1;
         });
-        let ends_here: &[u16] = ends_here;
-        if !ends_above.is_empty() {
+        if !above.is_empty() {
             for (touch, (&up, &here)) in touches.iter_mut().zip(above.iter().zip(here)) {
                 *touch = u8::from(difference(up, here) <= similarity) & u8::from(here != NONE);
             }
-            // Both rows' runs side by side, by the pieces on which they overlap.
-            let (mut a, mut b, mut start) = (0, 0, 0);
-            while let (Some(&end_above), Some(&end_here)) = (ends_above.get(a), ends_here.get(b)) {
-                let end = usize::from(end_above.min(end_here));
-                let touched = || touches.get(start..end).is_some_and(|touches| touches.contains(&1));
-                if here.get(start).is_some_and(|&pixel| pixel != NONE) && touched() {
-                    runs.unite(above_run + a, here_run + b);
-                }
-                start = end;
-                a += usize::from(end_above <= end_here);
-                b += usize::from(end_here <= end_above);
-                if start >= width {
-                    break;
-                }
-            }
+            for_each_contact(touches, [breaks_above, breaks], |[a, b]| runs.unite(above_run + a, here_run + b));
         }
-        (above, above_run, ends_above) = (here, here_run, ends_here);
-        here_run += count;
+        (above, above_run, here_run) = (here, here_run, next_run);
+        core::mem::swap(&mut breaks_above, &mut breaks);
     }
 }
 
-/// Calls `run` with the end of each run of a row.
-fn break_up(row: &[i16], similarity: u16, breaks: &mut [u8], mut run: impl FnMut(u16)) {
+/// Flags the last pixel of each run of a row.
+fn break_up(row: &[i16], similarity: u16, breaks: &mut [u8]) {
     for (flag, (&a, &b)) in breaks.iter_mut().zip(row.iter().zip(row.iter().skip(1))) {
         *flag = u8::from(difference(a, b) > similarity);
     }
     if let Some(last) = breaks.last_mut() {
         *last = 1;
     }
-    // Most pixels break nothing: eight at a time.
-    let (eights, rest) = breaks.as_chunks::<8>();
-    for (i, eight) in eights.iter().enumerate() {
-        let mut word = u64::from_le_bytes(*eight);
-        while word != 0 {
-            run((8 * i) as u16 + (word.trailing_zeros() / 8) as u16 + 1);
-            word &= word - 1;
+}
+
+/// Calls `each` with the numbers, from the row's first one on, of every two runs that touch: of two rows, whose runs end where `breaks` are
+/// set. Eight pixels at a time.
+fn for_each_contact(touches: &[u8], [above, here]: [&[u8]; 2], mut each: impl FnMut([usize; 2])) {
+    // The number of flags that are set: the highest byte of the product is the sum of all.
+    let count = |flags: u64| (flags.wrapping_mul(0x0101_0101_0101_0101) >> 56) as usize;
+    let mut before = [0; 2];
+    // Whether the same two runs have touched at the pixel before.
+    let mut known = 0;
+    for (touches, (above, here)) in touches.chunks(8).zip(above.chunks(8).zip(here.chunks(8))) {
+        let (touches, breaks) = (word(touches), [word(above), word(here)]);
+        let goes_on = touches & !(breaks[0] | breaks[1]);
+        let mut first = touches & !(goes_on << 8 | known);
+        known = goes_on >> 56;
+        while first != 0 {
+            let earlier = (1 << first.trailing_zeros()) - 1;
+            each([before[0] + count(breaks[0] & earlier), before[1] + count(breaks[1] & earlier)]);
+            first &= first - 1;
         }
+        before = [before[0] + count(breaks[0]), before[1] + count(breaks[1])];
     }
-    for (i, _) in rest.iter().enumerate().filter(|(_, flag)| **flag != 0) {
-        run((8 * eights.len() + i + 1) as u16);
+}
+
+/// Eight flags, or as many as there are, in a word.
+fn word(flags: &[u8]) -> u64 {
+    let mut bytes = [0; 8];
+    match flags.first_chunk() {
+        Some(all) => bytes = *all,
+        None => bytes.iter_mut().zip(flags).for_each(|(to, from)| *to = *from),
     }
+    u64::from_le_bytes(bytes)
 }
 
 #[cfg(test)]
@@ -214,7 +224,7 @@ mod tests {
             };
             let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
             let mut fast = image.clone();
-            let (mut runs, mut ends, mut flags) = (vec![7; image.len()], vec![7; image.len()], vec![7; 2 * width]);
+            let (mut runs, mut ends, mut flags) = (vec![7; image.len()], vec![7; image.len()], vec![7; 3 * width]);
             let scratch = Scratch { runs: &mut runs, ends: &mut ends, flags: &mut flags };
             let blanked = remove_speckles(&mut fast, width, 64, smallest, scratch);
             assert!(fast == plain(&image, width, 64, smallest as usize));

@@ -159,7 +159,9 @@ impl StereoMatcher<'_> {
     /// Fills gaps along rows, then along columns; returns the pixels filled.
     fn fill(&mut self, filling: Filling) -> u32 {
         let image = image_of(self.disparity, self.width * self.height);
-        gaps::fill_rows(image, self.width, filling) + gaps::fill_columns(image, self.width, filling, self.columns)
+        let (flags, last_row) = bytemuck::cast_slice_mut::<u32, u16>(self.columns).split_at_mut_checked(self.width).unwrap_or_default();
+        let flags: &mut [u8] = bytemuck::cast_slice_mut(flags);
+        gaps::fill_rows(image, self.width, filling, flags) + gaps::fill_columns(image, self.width, filling, last_row, flags)
     }
 
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
