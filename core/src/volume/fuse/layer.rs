@@ -15,6 +15,8 @@ use crate::{
 };
 use nalgebra::Vector3;
 
+/// Weights that the past can have.
+const PASTS: usize = 1 << u8::BITS;
 /// No pixel of the image.
 const OUTSIDE: u32 = u32::MAX;
 
@@ -22,24 +24,26 @@ const OUTSIDE: u32 = u32::MAX;
 pub(super) struct Shares {
     /// Share of a new observation of weight 1, times 2^23: `round(2^23 / sum)`.
     units: [i32; SHARES],
-    /// Share of one observation, times -32,768: so it fits its type even where it is all.
-    ones: [i16; SHARES],
+    /// Share of one observation, by the weight of the past, times -32,768: so it fits its type even where it is all.
+    ones: [i16; PASTS],
 }
 
 impl Shares {
     pub fn new() -> Self {
-        let mut shares = Self { units: [0; SHARES], ones: [0; SHARES] };
-        for (sum, (unit, one)) in (0i32..).zip(shares.units.iter_mut().zip(&mut shares.ones)) {
+        let mut shares = Self { units: [0; SHARES], ones: [0; PASTS] };
+        for (sum, unit) in (0i32..).zip(&mut shares.units) {
             *unit = ((1i32 << 23) + sum / 2).checked_div(sum).unwrap_or(0);
+        }
+        for (one, unit) in shares.ones.iter_mut().zip(shares.units.iter().skip(1)) {
             *one = -((*unit + 128) >> 8) as i16;
         }
         shares
     }
 
-    /// Shares of one observation where the sum of weights is 1 to `N`, times -32,768.
+    /// Shares of one observation where the past weighs 0 to `N - 1`, times -32,768.
     #[inline(always)]
     pub fn of_one<const N: usize>(&self) -> [i16; N] {
-        core::array::from_fn(|past| self.ones.get(past + 1).copied().unwrap_or(0))
+        self.ones.first_chunk().copied().unwrap_or([0; N])
     }
 
     /// Share of an observation of weight `gain`, times -32,768.
@@ -71,6 +75,8 @@ pub(super) struct Scratch {
     pub(super) hit: Layer<i16>,
     /// Weight of the observation.
     pub(super) gain: Layer<i16>,
+    /// What the past weighs against one observation.
+    past: Layer<u8>,
     /// Its share of the average, times -32,768.
     share: Layer<i16>,
 }
@@ -89,6 +95,7 @@ impl Scratch {
             target: [0; LAYER_VOXELS],
             hit: [0; LAYER_VOXELS],
             gain: [1; LAYER_VOXELS],
+            past: [0; LAYER_VOXELS],
             share: [0; LAYER_VOXELS],
         }
     }
@@ -192,14 +199,15 @@ impl Fusion<'_> {
 
     /// What each observation weighs, and its share of the average.
     #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "there is a share for every past of eight bits")]
     fn share(&self, scratch: &mut Scratch, weight: &Layer<u8>) {
         if self.plain_weights {
-            for ((past, &weight), &observed_m) in scratch.share.iter_mut().zip(weight).zip(&scratch.observed_m) {
-                *past = self.past(weight, observed_m) as i16;
+            for ((past, &weight), &observed_m) in scratch.past.iter_mut().zip(weight).zip(&scratch.observed_m) {
+                *past = self.past(weight, observed_m) as u8;
             }
             // In a loop of its own: fusion takes a fifth longer where one loop does both.
-            for share in &mut scratch.share {
-                *share = self.shares.ones.get(*share as usize + 1).copied().unwrap_or(0);
+            for (share, &past) in scratch.share.iter_mut().zip(&scratch.past) {
+                *share = self.shares.ones[usize::from(past)];
             }
             return;
         }
