@@ -105,11 +105,15 @@ impl Scratch {
     #[expect(clippy::indexing_slicing, reason = "the mask keeps voxels below LAYER_VOXELS, the length of every layer")]
     pub(super) fn pixels_at<T: Copy + Default>(&self, mut bits: u64, image: View<'_, T>, mut visit: impl FnMut(usize, T)) {
         let (pixels, stride) = image.strided();
+        // For all voxels, and so by vectors. What lies outside the image is not among the bits.
+        let mut index = [0; LAYER_VOXELS];
+        for (index, (&row, &column)) in index.iter_mut().zip(self.row.iter().zip(&self.column)) {
+            *index = (row as u32).wrapping_mul(stride as u32).wrapping_add(column as u32);
+        }
         while bits != 0 {
             let i = bits.trailing_zeros() as usize & (LAYER_VOXELS - 1);
             bits &= bits - 1;
-            let at = self.row[i] as usize * stride + self.column[i] as usize;
-            visit(i, pixels.get(at).copied().unwrap_or_default());
+            visit(i, pixels.get(index[i] as usize).copied().unwrap_or_default());
         }
     }
 }
