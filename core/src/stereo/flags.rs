@@ -1,19 +1,30 @@
-//! Flags of a row, a byte each, of which few are set.
+//! Flags of a row, a byte each, of which few are set: eight are looked at at once.
 
-/// Calls `each` with the position of every flag that is set, in ascending order: eight are looked at at once.
+/// Eight flags, each 0 or 1, or as many as there are.
+#[inline(always)]
+pub(super) fn word(flags: &[u8]) -> u64 {
+    match flags.first_chunk() {
+        Some(eight) => u64::from_le_bytes(*eight),
+        None => last_word(flags),
+    }
+}
+
+/// As [`word`], where fewer than eight are left.
+#[cold]
+#[inline(never)]
+fn last_word(flags: &[u8]) -> u64 {
+    flags.iter().rev().fold(0, |word, &flag| word << 8 | u64::from(flag))
+}
+
+/// Calls `each` with the position of every flag that is set, in ascending order.
 #[inline(always)]
 pub(super) fn for_each_set(flags: &[u8], mut each: impl FnMut(usize)) {
-    let (eights, rest) = flags.as_chunks::<8>();
-    for (i, eight) in eights.iter().enumerate() {
-        // Bytes are 0 or 1.
-        let mut word = u64::from_le_bytes(*eight);
-        while word != 0 {
-            each(8 * i + word.trailing_zeros() as usize / 8);
-            word &= word - 1;
+    for (i, eight) in flags.chunks(8).enumerate() {
+        let mut rest = word(eight);
+        while rest != 0 {
+            each(8 * i + rest.trailing_zeros() as usize / 8);
+            rest &= rest - 1;
         }
-    }
-    for (i, _) in rest.iter().enumerate().filter(|(_, flag)| **flag != 0) {
-        each(8 * eights.len() + i);
     }
 }
 

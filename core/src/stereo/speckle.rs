@@ -6,7 +6,7 @@
 
 use super::{
     dense::{FILLED, NONE},
-    flags::for_each_set,
+    flags::{for_each_set, word},
 };
 
 /// Working memory.
@@ -167,16 +167,6 @@ fn for_each_contact(touches: &[u8], [above, here]: [&[u8]; 2], mut each: impl Fn
         }
         before = [before[0] + count(breaks[0]), before[1] + count(breaks[1])];
     }
-}
-
-/// Eight flags, or as many as there are, in a word.
-fn word(flags: &[u8]) -> u64 {
-    let mut bytes = [0; 8];
-    match flags.first_chunk() {
-        Some(all) => bytes = *all,
-        None => bytes.iter_mut().zip(flags).for_each(|(to, from)| *to = *from),
-    }
-    u64::from_le_bytes(bytes)
 }
 
 #[cfg(test)]
