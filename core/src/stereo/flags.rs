@@ -1,4 +1,4 @@
-//! Flags of a row, a byte each, of which few are set: eight are looked at at once.
+//! Flags of a row, a byte each. Few are set: eight are looked at at once.
 
 /// Eight flags, each 0 or 1, or as many as there are.
 #[inline(always)]
