@@ -4,7 +4,7 @@
 //! hidden from one camera is background. Memory: three bytes a column. Time: two walks over the image.
 
 use super::{
-    GapEnds,
+    GapEnds, MAX_IMAGE_SIZE,
     dense::{FILLED, NONE},
     flags::for_each_set,
 };
@@ -79,6 +79,7 @@ fn fill_gap(row: &mut [i16], gap: Range<usize>, filling: Filling) -> u32 {
 
 /// No row: farther from every row than the widest gap.
 const NEVER: u16 = 1 << 15;
+const _: () = assert!(2 * MAX_IMAGE_SIZE <= NEVER as usize);
 
 /// Fills the gaps of each column; `last_row` and `ends` have an entry a column. Returns the pixels filled.
 ///
@@ -91,7 +92,7 @@ pub(super) fn fill_columns(disparity: &mut [i16], width: usize, filling: Filling
     for v in 0..disparity.len() / width {
         let (above, here) = disparity.split_at_mut_checked(v * width).unwrap_or_default();
         for ((end, &last), &here) in ends.iter_mut().zip(&*last_row).zip(&*here) {
-            // None of no pixels: less one they are the most there can be.
+            // No gap is one of 0 px: less one that wraps to the most there can be.
             let gap = (v as u16).wrapping_sub(last).wrapping_sub(1);
             *end = u8::from(here != NONE) & u8::from(gap.wrapping_sub(1) < widest);
         }
