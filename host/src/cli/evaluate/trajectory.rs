@@ -42,4 +42,7 @@ fn print_figures(found: &TrajectoryErrors) {
     if let (Some(percent), Some(deg_per_m)) = (found.t_err_percent, found.r_err_deg_per_m) {
         outln!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m", "all segments (t_err, r_err)");
     }
+    if let Some([right, down, forward]) = found.mean_error_percent {
+        outln!("{:<28}{right:.3} % right, {down:.3} % down, {forward:.3} % forward", "mean error as a vector");
+    }
 }

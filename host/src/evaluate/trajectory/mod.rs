@@ -32,6 +32,10 @@ pub struct TrajectoryErrors {
     /// Mean rotation error of the segments, degrees per metre.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub r_err_deg_per_m: Option<f64>,
+    /// Mean of the segments' translation errors as vectors, percent of their length, along the camera's axes at their start: right, down,
+    /// forward. Noise averages out here. What does not is a camera turned against that of the truth (right, down) or a wrong scale (forward).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_error_percent: Option<[f64; 3]>,
     /// Root mean square translation error from frame to frame, m.
     pub rpe_t_m: f64,
     /// Root mean square rotation error from frame to frame, degrees.
@@ -50,33 +54,38 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
     let travelled = travelled_m(truth);
     let long = travelled.last()? >= &LONG_M[1];
     let (lengths, step): (&[f64], usize) = if long { (&LONG_M, LONG_STEP) } else { (&SHORT_M, 1) };
-    let segment = |from: usize, to: usize| {
-        let moved = estimate[from].inverse() * estimate[to];
-        moved.inverse() * (truth[from].inverse() * truth[to])
-    };
+    let moved = |poses: &[Transform], from: usize, to: usize| poses[from].inverse() * poses[to];
+    let segment = |from: usize, to: usize| moved(estimate, from, to).inverse() * moved(truth, from, to);
     let mut all = Vec::new();
     let mut per_length = Vec::new();
     for &length_m in lengths {
-        let segments: Vec<(f64, f64)> = (0..truth.len())
+        let segments: Vec<SegmentError> = (0..truth.len())
             .step_by(step)
             .map_while(|from| {
                 let to = travelled.partition_point(|&at| at < travelled[from] + length_m);
                 (to < truth.len()).then(|| {
                     let error = segment(from, to);
-                    (error.distance_m() / length_m * 100.0, error.angle_rad().to_degrees() / length_m)
+                    let apart_m =
+                        Vector3::from(moved(estimate, from, to).translation_m) - Vector3::from(moved(truth, from, to).translation_m);
+                    SegmentError {
+                        percent: error.distance_m() / length_m * 100.0,
+                        deg_per_m: error.angle_rad().to_degrees() / length_m,
+                        vector_percent: apart_m / length_m * 100.0,
+                    }
                 })
             })
             .collect();
-        if let Some((t, r)) = means(&segments) {
-            per_length.push((length_m, t, r, segments.len()));
+        if let Some(mean) = SegmentError::mean(&segments) {
+            per_length.push((length_m, mean.percent, mean.deg_per_m, segments.len()));
         }
         all.extend(segments);
     }
     let steps: Vec<Transform> = (1..truth.len()).map(|to| segment(to - 1, to)).collect();
-    let overall = means(&all);
+    let overall = SegmentError::mean(&all);
     Some(TrajectoryErrors {
-        t_err_percent: overall.map(|(t, _)| t),
-        r_err_deg_per_m: overall.map(|(_, r)| r),
+        t_err_percent: overall.map(|mean| mean.percent),
+        r_err_deg_per_m: overall.map(|mean| mean.deg_per_m),
+        mean_error_percent: overall.map(|mean| mean.vector_percent.into()),
         rpe_t_m: rms(steps.iter().map(|error| error.distance_m())),
         rpe_r_deg: rms(steps.iter().map(|error| error.angle_rad().to_degrees())),
         ate_m: aligned_error_m(truth, estimate),
@@ -95,10 +104,29 @@ pub fn travelled_m(poses: &[Transform]) -> Vec<f64> {
         .collect()
 }
 
-fn means(segments: &[(f64, f64)]) -> Option<(f64, f64)> {
-    let count = segments.len() as f64;
-    let sum = segments.iter().fold((0.0, 0.0), |sum, segment| (sum.0 + segment.0, sum.1 + segment.1));
-    (!segments.is_empty()).then_some((sum.0 / count, sum.1 / count))
+/// Error of a segment, or the mean of several.
+#[derive(Clone, Copy, Default)]
+struct SegmentError {
+    percent: f64,
+    deg_per_m: f64,
+    /// Estimated less true translation, along the axes of the segment's first camera.
+    vector_percent: Vector3<f64>,
+}
+
+impl SegmentError {
+    fn mean(segments: &[Self]) -> Option<Self> {
+        let count = segments.len() as f64;
+        let sum = segments.iter().fold(Self::default(), |sum, segment| Self {
+            percent: sum.percent + segment.percent,
+            deg_per_m: sum.deg_per_m + segment.deg_per_m,
+            vector_percent: sum.vector_percent + segment.vector_percent,
+        });
+        (!segments.is_empty()).then(|| Self {
+            percent: sum.percent / count,
+            deg_per_m: sum.deg_per_m / count,
+            vector_percent: sum.vector_percent / count,
+        })
+    }
 }
 
 fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {

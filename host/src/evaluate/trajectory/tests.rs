@@ -34,6 +34,27 @@ fn a_trajectory_turned_and_moved_as_a_whole_has_no_error() {
     assert!(found.ate_m < 1e-9 && found.rpe_t_m < 1e-9 && found.t_err_percent.unwrap() < 1e-9, "{found:?}");
 }
 
+#[test]
+fn a_camera_turned_against_that_of_the_truth_and_a_wrong_scale_are_told_from_noise() {
+    let truth = swerving(120, 0.0);
+    // A camera that looks .5 degrees to the right of the truth's, and 1 % too long: what lies ahead appears at its left.
+    let turned = Transform::new(Vector3::new(0.0, 0.5_f64.to_radians(), 0.0), Vector3::zeros());
+    let estimate = truth.iter().map(|pose| {
+        let pose = turned.inverse() * *pose * turned;
+        Transform { translation_m: pose.translation_m.map(|metres| 1.01 * metres), ..pose }
+    });
+    let found = errors(&truth, &estimate.collect::<Vec<_>>()).unwrap();
+    let [right, down, forward] = found.mean_error_percent.unwrap();
+    assert!((right + 100.0 * 0.5_f64.to_radians()).abs() < 0.05 && down.abs() < 0.01 && (forward - 1.0).abs() < 0.05, "{found:?}");
+    let beside = |(at, pose): (usize, &Transform)| {
+        let [x, y, z] = pose.translation_m;
+        Transform { translation_m: [x + 0.05 * (1.3 * at as f64).sin(), y, z], ..*pose }
+    };
+    let noisy = errors(&truth, &truth.iter().enumerate().map(beside).collect::<Vec<_>>()).unwrap();
+    let mean = Vector3::from(noisy.mean_error_percent.unwrap()).norm();
+    assert!(mean < 0.1 * noisy.t_err_percent.unwrap(), "{noisy:?}");
+}
+
 /// The same drive in Python gave the figures of the test below: numpy with a singular value decomposition for the alignment.
 fn swerving(count: usize, noise: f64) -> Vec<Transform> {
     let step = |i: f64| {
