@@ -54,8 +54,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
     let travelled = travelled_m(truth);
     let long = travelled.last()? >= &LONG_M[1];
     let (lengths, step): (&[f64], usize) = if long { (&LONG_M, LONG_STEP) } else { (&SHORT_M, 1) };
-    let moved = |poses: &[Transform], from: usize, to: usize| poses[from].inverse() * poses[to];
-    let segment = |from: usize, to: usize| moved(estimate, from, to).inverse() * moved(truth, from, to);
+    let moved = |from: usize, to: usize| [estimate, truth].map(|poses| poses[from].inverse() * poses[to]);
     let mut all = Vec::new();
     let mut per_length = Vec::new();
     for &length_m in lengths {
@@ -63,16 +62,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
             .step_by(step)
             .map_while(|from| {
                 let to = travelled.partition_point(|&at| at < travelled[from] + length_m);
-                (to < truth.len()).then(|| {
-                    let error = segment(from, to);
-                    let apart_m =
-                        Vector3::from(moved(estimate, from, to).translation_m) - Vector3::from(moved(truth, from, to).translation_m);
-                    SegmentError {
-                        percent: error.distance_m() / length_m * 100.0,
-                        deg_per_m: error.angle_rad().to_degrees() / length_m,
-                        vector_percent: apart_m / length_m * 100.0,
-                    }
-                })
+                (to < truth.len()).then(|| SegmentError::of(&moved(from, to), length_m))
             })
             .collect();
         if let Some(mean) = SegmentError::mean(&segments) {
@@ -80,7 +70,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
         }
         all.extend(segments);
     }
-    let steps: Vec<Transform> = (1..truth.len()).map(|to| segment(to - 1, to)).collect();
+    let steps: Vec<Transform> = (1..truth.len()).map(|to| error(&moved(to - 1, to))).collect();
     let overall = SegmentError::mean(&all);
     Some(TrajectoryErrors {
         t_err_percent: overall.map(|mean| mean.percent),
@@ -104,6 +94,11 @@ pub fn travelled_m(poses: &[Transform]) -> Vec<f64> {
         .collect()
 }
 
+/// The error of an estimated motion against the true one.
+fn error([estimated, actual]: &[Transform; 2]) -> Transform {
+    estimated.inverse() * actual
+}
+
 /// Error of a segment, or the mean of several.
 #[derive(Clone, Copy, Default)]
 struct SegmentError {
@@ -114,6 +109,16 @@ struct SegmentError {
 }
 
 impl SegmentError {
+    fn of(moved: &[Transform; 2], length_m: f64) -> Self {
+        let error = error(moved);
+        let [estimated_m, actual_m] = moved.map(|moved| Vector3::from(moved.translation_m));
+        Self {
+            percent: error.distance_m() / length_m * 100.0,
+            deg_per_m: error.angle_rad().to_degrees() / length_m,
+            vector_percent: (estimated_m - actual_m) / length_m * 100.0,
+        }
+    }
+
     fn mean(segments: &[Self]) -> Option<Self> {
         let count = segments.len() as f64;
         let sum = segments.iter().fold(Self::default(), |sum, segment| Self {
