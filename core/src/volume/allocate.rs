@@ -2,7 +2,8 @@
 //!
 //! Along the ray of every second pixel of every second row, staggered, each block within `allocation_m` of the depth is visited exactly
 //! once, farther where the next rays end farther off, by walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray
-//! Tracing*, 1987). Which pixels are taken changes from frame to frame (docs/decisions/0018-allocation-from-every-fourth-pixel.md). A point
+//! Tracing*, 1987). Near surfaces, whose blocks are many pixels wide, have a quarter or a sixteenth of these rays. Which pixels are taken changes
+//! from frame to frame (docs/decisions/0018-allocation-from-every-fourth-pixel.md, 0047-fewer-rays-where-blocks-are-wide.md). A point
 //! belongs to the block of its nearest lattice point: a block's lattice points are its centre of mass, so nothing is shifted by half a voxel.
 //! Blocks farther from the surface hold none of it (docs/decisions/0046-blocks-near-the-surface.md).
 //!

@@ -12,8 +12,10 @@ use crate::{
 };
 use nalgebra::Vector3;
 
-/// Rows and columns from one pixel whose ray is walked to the next: a block is 14 px wide at 20 m and KITTI's focal length.
+/// Rows and columns from one pixel whose ray is walked to the next, where a block is narrower than [`WIDE_PX`]: at KITTI's focal length it is
+/// 14 px wide at 20 m. Twice as many from that width on, four times from twice that on (docs/decisions/0047-fewer-rays-where-blocks-are-wide.md).
 const PIXEL_STEP: usize = 2;
+const WIDE_PX: f64 = 16.0;
 /// Entries of a band's cache, as a power of two, and of its list.
 const CACHE_BITS: u32 = 11;
 const CACHE_ENTRIES: usize = 1 << CACHE_BITS;
@@ -138,6 +140,10 @@ pub(super) struct Rays<'a> {
     far_m: f32,
     /// First row, and first column of it.
     offset: [usize; 2],
+    /// The same where fewer rays are walked, in steps.
+    sparse_offset: [usize; 2],
+    /// Surfaces nearer than these have a half and a quarter of the rays across: blocks are wide there.
+    wide_m: [f32; 2],
 }
 
 impl<'a> Rays<'a> {
@@ -151,6 +157,8 @@ impl<'a> Rays<'a> {
             reach_m: [max_f32(config.allocation_m, 2.0 * config.voxel_size_m), config.truncation_m],
             far_m: config.far_m,
             offset: [(frame / 2) as usize % PIXEL_STEP, frame as usize % PIXEL_STEP],
+            sparse_offset: [3, 2].map(|bit| (frame >> bit & 1 | frame >> (bit + 1) & 2) as usize),
+            wide_m: [WIDE_PX, 2.0 * WIDE_PX].map(|width_px| (view.rig.focal_px * block_m / width_px) as f32),
         }
     }
 
@@ -159,12 +167,26 @@ impl<'a> Rays<'a> {
         (self.offset[1] + row) % PIXEL_STEP
     }
 
-    /// How far before and behind a surface its ray is walked: at least half of the way in depth to the rays above and to the left, so that no block
-    /// between them is missed where a road or a wall is seen at a grazing angle.
+    /// Steps from one ray of a surface to the next: 1, 2 or 4.
     #[inline(always)]
-    fn reach_m(&self, depth_m: f32, beside_m: [f32; 2]) -> f32 {
+    fn steps(&self, depth_m: f32) -> usize {
+        let [wide_m, wider_m] = self.wide_m;
+        1 + usize::from(depth_m < wide_m) + 2 * usize::from(depth_m < wider_m)
+    }
+
+    /// Whether so many steps from ray to ray take this one.
+    #[inline(always)]
+    fn is_taken(&self, steps: usize, [row, column]: [usize; 2]) -> bool {
+        ((row + self.sparse_offset[0]) | (column + self.sparse_offset[1])) & (steps - 1) == 0
+    }
+
+    /// How far before and behind a surface its ray is walked: at least half of the way in depth to the rays above and to the left, so that no block
+    /// between them is missed where a road or a wall is seen at a grazing angle. `beside_m` are the depths one step off.
+    #[inline(always)]
+    fn reach_m(&self, depth_m: f32, beside_m: [f32; 2], steps: usize) -> f32 {
         let [least_m, most_m] = self.reach_m;
-        let [above, left] = beside_m.map(|beside_m| if beside_m > 0.0 { 0.5 * (beside_m - depth_m).abs() } else { 0.0 });
+        let half = 0.5 * steps as f32;
+        let [above, left] = beside_m.map(|beside_m| if beside_m > 0.0 { half * (beside_m - depth_m).abs() } else { 0.0 });
         min_f32(max_f32(least_m, max_f32(above, left)), most_m)
     }
 
@@ -184,12 +206,16 @@ impl<'a> Rays<'a> {
                 if !(depth_m > 0.0 && depth_m <= self.far_m) {
                     continue;
                 }
+                let steps = self.steps(depth_m);
+                if !self.is_taken(steps, [row, first + i]) {
+                    continue;
+                }
                 if band.list.len() - band.len < MAX_BLOCKS_PER_RAY {
                     band.next = [row, first + i];
                     return;
                 }
                 let ray = ray + per_column * (first_u + PIXEL_STEP * i) as f32;
-                let reach_m = self.reach_m(depth_m, beside_m);
+                let reach_m = self.reach_m(depth_m, beside_m, steps);
                 let from = self.start + ray * max_f32(depth_m - reach_m, 0.0);
                 let to = self.start + ray * (depth_m + reach_m);
                 walk(from, to, |block| band.meet(block));
@@ -258,7 +284,10 @@ fn walk(from: Vector3<f32>, to: Vector3<f32>, mut visit: impl FnMut([i32; 3])) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use crate::{
+        geometry::{StereoRig, Transform},
+        random::Random,
+    };
     use std::{collections::BTreeSet, vec, vec::Vec};
 
     #[test]
@@ -289,6 +318,27 @@ mod tests {
     }
 
     #[test]
+    fn where_blocks_are_wide_fewer_rays_are_walked_and_each_has_its_turn() {
+        const SIDE: usize = 48;
+        let depth_m = vec![1.0; SIDE * SIDE];
+        let rig = StereoRig { focal_px: 100.0, center_u_px: 24.0, center_v_px: 24.0, baseline_m: 0.5 };
+        let view = Viewpoint { rig, width: SIDE, height: SIDE, t_world_camera: Transform::default() };
+        let mut walked = [[0; SIDE * SIDE]; 3];
+        for frame in 0..64 {
+            let rays = Rays::new(&VolumeConfig::default(), &view, View::new(&depth_m, SIDE, SIDE).unwrap(), Vector3::zeros(), frame);
+            // Blocks of .4 m are 16 px wide at 2.5 m.
+            assert_eq!([2.6, 2.4, 1.3, 1.2].map(|depth_m| rays.steps(depth_m)), [1, 2, 2, 4]);
+            for (steps, walked) in [1, 2, 4].into_iter().zip(&mut walked) {
+                for (row, column) in (0..SIDE / 2).flat_map(|row| (0..SIDE / 2).map(move |column| (row, column))) {
+                    let at = [PIXEL_STEP * row + rays.offset[0], rays.first_column(row) + PIXEL_STEP * column];
+                    walked[at[0] * SIDE + at[1]] += usize::from(rays.is_taken(steps, [row, column]));
+                }
+            }
+        }
+        assert_eq!([16, 4, 1].map(|turns| vec![turns; SIDE * SIDE]), walked.map(Vec::from), "times in 64 frames that each ray is walked");
+    }
+
+    #[test]
     fn short_lists_lose_no_block() {
         let depth_m: Vec<f32> = (0..64 * 48).map(|i| 3.0 + (i % 7) as f32).collect();
         let depth_m = View::new(&depth_m, 64, 48).unwrap();
@@ -299,6 +349,8 @@ mod tests {
             reach_m: [0.2, 0.75],
             far_m: 20.0,
             offset: [1, 0],
+            sparse_offset: [2, 1],
+            wide_m: [6.0, 4.0],
         };
         let met = |list: usize| {
             let (mut caches, mut lists) = (vec![0; BANDS * CACHE_ENTRIES], vec![0; 4 * list]);
