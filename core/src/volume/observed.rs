@@ -12,7 +12,7 @@
 
 use super::{DistanceAlong, VolumeConfig};
 use crate::{
-    geometry::{StereoRig, scalar::floored_i32},
+    geometry::StereoRig,
     image::{View, ViewMut},
     parallel::{Bands, Executor, Work, each, zip2},
     part::{part, part_mut},
@@ -139,26 +139,31 @@ impl ObservedDepth<'_> {
         let focal = self.rig.focal_px as f32;
         let y = (v as f64 - self.rig.center_v_px) as f32;
         let x_first = (first as f64 - self.rig.center_u_px) as f32;
-        // A root has no vectors everywhere: the loops before and after it do.
-        let mut normals = [0.0; BLOCK];
+        let mut levels = [0; BLOCK];
         let slopes = along_u.iter().zip(along_v);
-        for (i, ((normal, &disparity), (&a, &b))) in (0u16..).zip(normals.iter_mut().zip(here).zip(slopes)) {
+        for (i, ((level, &disparity), (&a, &b))) in (0u16..).zip(levels.iter_mut().zip(here).zip(slopes)) {
             let (d, x) = (f32::from(disparity) * (1.0 / 256.0), x_first + f32::from(i));
             let (nu, nv, nz) = (focal * a, focal * b, d - x * a - y * b);
-            *normal = nu * nu + nv * nv + nz * nz;
-        }
-        normals.iter_mut().for_each(|normal| *normal = libm::sqrtf(*normal));
-        let mut levels = [0; BLOCK];
-        for (level, (&normal, &disparity)) in levels.iter_mut().zip(normals.iter().zip(here)) {
-            let share = f32::from(disparity) * (1.0 / 256.0) / normal;
-            let level_share = share * LEVELS as f32 + 0.5;
-            // Without a disparity it is no number, which becomes 1.
-            let least = if level_share > 1.0 { level_share } else { 1.0 };
-            *level = floored_i32(if least < LEVELS as f32 { least } else { LEVELS as f32 }) as u32 - 1;
+            // The square of the cosine is compared: a root has no vectors everywhere. Without a disparity it may be no number, which is below all.
+            let square = d * d / (nu * nu + nv * nv + nz * nz);
+            *level = BETWEEN_LEVELS.iter().map(|&between| u32::from(square >= between)).sum();
         }
         levels
     }
 }
+
+/// Squares of what lies between two levels of obliqueness.
+#[expect(clippy::indexing_slicing, reason = "the loop ends with the array")]
+const BETWEEN_LEVELS: [f32; LEVELS as usize - 1] = {
+    let mut squares = [0.0; LEVELS as usize - 1];
+    let mut i = 0;
+    while i < squares.len() {
+        let between = (i as f32 + 1.5) / LEVELS as f32;
+        squares[i] = between * between;
+        i += 1;
+    }
+    squares
+};
 
 /// One of four bands of rows, from `first` on.
 struct WriteRows<'a> {
