@@ -1,6 +1,7 @@
 //! Masks scaled about the centre of their boxes.
 
 use super::{MaskHandle, MaskStore, PixelBox};
+use core::ops::Range;
 
 /// A mask scaled about the centre of its box: a bilinear resize of a 0/1 image, in integers; a pixel belongs to it if its value is 1. Not
 /// a dilation: a corner cut out of the mask is cut out of the scaled one, larger.
@@ -35,72 +36,66 @@ impl<'m, 's> ScaledMask<'m, 's> {
         rows.iter().all(|&row| columns.iter().all(|&column| set(column, row)))
     }
 
-    /// Visits the pixels of row `v` of the image that belong to the scaled mask and lie in columns `0..width`.
-    pub(crate) fn row(&self, v: i32, width: i32, mut visit: impl FnMut(usize)) {
+    /// Visits the runs of pixels of row `v` of the image that belong to the scaled mask and lie in columns `0..width`, from left to right.
+    pub(crate) fn runs(&self, v: i32, width: usize, mut visit: impl FnMut(Range<usize>)) {
         let (from, scaled) = (&self.mask.pixels, &self.pixels);
         if v < scaled.top || v - scaled.top >= scaled.height {
             return;
         }
-        let (is_box, first_bit) = (self.mask.is_box(), from.left - self.mask.origin());
-        let [above, below] = sources(v - scaled.top, from.height, scaled.height).map(|row| self.store.row(&self.mask, from.top + row));
-        // Columns between which a pixel lies are within the box.
-        let set = |column: i32| {
-            let at = (first_bit + column) as usize;
-            let both = |(above, below): (&u64, &u64)| (above & below) >> (at % 64) & 1 == 1;
-            is_box || above.get(at / 64).zip(below.get(at / 64)).is_some_and(both)
+        let mut visit_scaled = |run: Range<i32>| {
+            let run = scaled_run(run, from.width, scaled.width);
+            let [first, end] = [run.start, run.end].map(|column| (scaled.left + column).max(0) as usize);
+            if first < end.min(width) {
+                visit(first..end.min(width));
+            }
         };
-        let (first, last) = (scaled.left.max(0), (scaled.left + scaled.width).min(width));
-        for (u, [before, after]) in (first..last).zip(Sources::begin(first - scaled.left, from.width, scaled.width)) {
-            if set(before) && (before == after || set(after)) {
-                visit(u as usize);
+        if self.mask.is_box() {
+            return visit_scaled(0..from.width);
+        }
+        let [above, below] = sources(v - scaled.top, from.height, scaled.height).map(|row| self.store.row(&self.mask, from.top + row));
+        let before = from.left - self.mask.origin();
+        let words = above.iter().zip(below).map(|(above, below)| above & below);
+        runs_of_ones(words, |run| visit_scaled(run.start - before..run.end - before));
+    }
+}
+
+/// Visits the runs of bits that are set in a row of words, whose lowest bits come first.
+fn runs_of_ones(words: impl Iterator<Item = u64>, mut visit: impl FnMut(Range<i32>)) {
+    let (mut begun, mut at) = (None, 0);
+    for word in words {
+        let mut left = 64;
+        while left > 0 {
+            let rest = word >> (64 - left);
+            // A shifted word is filled up with zeros, which are no pixels.
+            let alike = if begun.is_some() { rest.trailing_ones() } else { rest.trailing_zeros() }.min(left);
+            (at, left) = (at + alike as i32, left - alike);
+            if left > 0 {
+                match begun.take() {
+                    Some(start) => visit(start..at),
+                    None => begun = Some(at),
+                }
             }
         }
     }
-}
-
-/// [`sources`] of one pixel after the other, without a division for each.
-struct Sources {
-    low: i64,
-    rest: i64,
-    /// What a pixel adds to low and rest.
-    by: [i64; 2],
-    step: i64,
-    last: i64,
-}
-
-impl Sources {
-    fn begin(at: i32, from: i32, to: i32) -> Self {
-        let position = i64::from(2 * at + 1) * i64::from(from) - i64::from(to);
-        let (step, add) = (2 * i64::from(to.max(1)), 2 * i64::from(from));
-        Self {
-            low: position.div_euclid(step),
-            rest: position.rem_euclid(step),
-            by: [add.div_euclid(step), add.rem_euclid(step)],
-            step,
-            last: i64::from((from - 1).max(0)),
-        }
-    }
-
-    fn pixels(&self) -> [i32; 2] {
-        [self.low, self.low + i64::from(self.rest != 0)].map(|pixel| pixel.clamp(0, self.last) as i32)
+    if let Some(start) = begun {
+        visit(start..at);
     }
 }
 
-impl Iterator for Sources {
-    type Item = [i32; 2];
-
-    fn next(&mut self) -> Option<[i32; 2]> {
-        let pixels = self.pixels();
-        let [low, rest] = self.by;
-        (self.low, self.rest) = (self.low + low, self.rest + rest);
-        if self.rest >= self.step {
-            (self.low, self.rest) = (self.low + 1, self.rest - self.step);
-        }
-        Some(pixels)
-    }
+/// The pixels of a line of `from` resized to `to` that lie between two of a run, or beyond the line's ends where these belong to it.
+fn scaled_run(run: Range<i32>, from: i32, to: i32) -> Range<i32> {
+    let step = 2 * i64::from(from.max(1));
+    // Where a pixel's middle falls in the line resized, from the middle of its first pixel on, in units of 1 / `step`.
+    let position = |column: i32| i64::from(2 * column + 1) * i64::from(to) - i64::from(from);
+    let start = if run.start <= 0 { 0 } else { (position(run.start) + step - 1).div_euclid(step) as i32 };
+    let end = if run.end >= from { to } else { position(run.end - 1).div_euclid(step) as i32 + 1 };
+    start..end
 }
 
 /// The two pixels of a line of `from` between which pixel `at` of the same line resized to `to` lies; the same one twice where it hits one.
 fn sources(at: i32, from: i32, to: i32) -> [i32; 2] {
-    Sources::begin(at, from, to).pixels()
+    let (position, step) = (i64::from(2 * at + 1) * i64::from(from) - i64::from(to), 2 * i64::from(to.max(1)));
+    let low = position.div_euclid(step);
+    let last = i64::from((from - 1).max(0));
+    [low, low + i64::from(position.rem_euclid(step) != 0)].map(|pixel| pixel.clamp(0, last) as i32)
 }

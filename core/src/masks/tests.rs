@@ -5,26 +5,36 @@ use crate::random::Random;
 use std::{vec, vec::Vec};
 
 #[test]
-fn the_row_by_row_walk_finds_the_pixels_that_lie_in_the_scaled_mask() {
+fn the_runs_of_rows_have_the_pixels_that_lie_in_the_scaled_mask() {
     let mut words = vec![0; 1000];
     let mut store = MaskStore::new(&mut words);
-    let pixels = PixelBox { left: 0, top: 3, width: 70, height: 21 };
+    let pixels = PixelBox { left: 70, top: 3, width: 150, height: 21 };
     let mask = store.alloc(pixels).unwrap();
     for v in 0..21 {
-        let row: Vec<u8> = (0..70).map(|u| u8::from((u * 7 + v * 13) % 11 > 1)).collect();
-        store.set_row(&mask, 3 + v, 0, &row);
+        // Holes, whole rows, whole words, and none.
+        let is_set = |u: i32| match v % 5 {
+            0 => true,
+            1 => (58..122).contains(&u),
+            2 => v < 10,
+            _ => (u * 7 + v * 13) % 11 > 1,
+        };
+        let row: Vec<u8> = (0..150).map(|u| u8::from(is_set(u))).collect();
+        store.set_row(&mask, 3 + v, 70, &row);
     }
-    for permille in [970, 1000, 1200, 1440] {
-        let scaled = ScaledMask::new(&store, mask, permille);
-        for v in -5..40 {
-            let mut found = Vec::new();
-            scaled.row(v, 60, |u| found.push(u as i32));
-            let expected: Vec<i32> = (0..60).filter(|&u| scaled.contains(u, v)).collect();
-            assert_eq!(found, expected);
+    for (mask, permille) in [mask, MaskHandle::full(pixels)].into_iter().flat_map(|mask| [300, 970, 1000, 1200, 1440].map(|by| (mask, by)))
+    {
+        for shift in [0, -90, 60] {
+            let scaled = ScaledMask::new(&store, mask, permille).moved([shift, 0]);
+            for v in -5..40 {
+                let mut found = Vec::new();
+                scaled.runs(v, 240, |run| found.extend(run));
+                let expected: Vec<usize> = (0..240).filter(|&u| scaled.contains(u as i32, v)).collect();
+                assert_eq!(found, expected, "row {v} at {permille}");
+            }
         }
     }
     let same = ScaledMask::new(&store, mask, 1000);
-    assert!((0..30).all(|v| (0..80).all(|u| same.contains(u, v) == store.contains(&mask, u, v))));
+    assert!((0..30).all(|v| (60..240).all(|u| same.contains(u, v) == store.contains(&mask, u, v))));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::{Tracker, TrackingConfig, track::Track};
 use crate::{
     image::ViewMut,
     masks::{MaskStore, ScaledMask},
+    part::part_mut,
 };
 
 /// Frames over which the depth under an undetected track's predicted mask is removed: detectors miss an object now and then.
@@ -50,11 +51,10 @@ fn remove_depth(depth_m: &mut ViewMut<'_, f32>, mask: &ScaledMask<'_, '_>) -> u3
     let (skip, take) = (mask.pixels.top.max(0), (mask.pixels.top + mask.pixels.height).max(0));
     let mut removed = 0;
     for (v, row) in (0..).zip(rows).take(take as usize).skip(skip as usize) {
-        mask.row(v, width as i32, |u| {
-            if let Some(depth) = row.get_mut(u).filter(|depth| **depth != 0.0) {
-                *depth = 0.0;
-                removed += 1;
-            }
+        mask.runs(v, width, |run| {
+            let depths = part_mut(row, run);
+            removed += depths.iter().map(|&depth_m| u32::from(depth_m != 0.0)).sum::<u32>();
+            depths.fill(0.0);
         });
     }
     removed
