@@ -47,8 +47,8 @@ impl StaticMap<'_, '_> {
             return AllocationReport::default();
         };
         let observed = ObservedDepth { config: &self.config.volume, rig: &view.rig, disparity_q8: self.disparity_q8 };
-        observed.write(&mut depth_m, executor);
-        tracked.mask_dynamic_depth(&mut depth_m);
+        executor.stage(Stage::Fuse, || observed.write(&mut depth_m, executor));
+        executor.stage(Stage::Instances, || tracked.mask_dynamic_depth(&mut depth_m));
         let observation = Observation {
             depth_m: depth_m.as_view(),
             grey: frame.left,

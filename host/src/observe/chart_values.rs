@@ -78,7 +78,7 @@ impl Point {
         set(Charted::OffsetFound, report.self_calibration.offset_px.abs());
         set(Charted::OffsetApplied, report.self_calibration.applied_offset_px.abs());
         set(Charted::Step, row.step_ms);
-        for (stage, time) in Stage::ALL.into_iter().zip(&row.stages) {
+        for (stage, time) in Stage::ALL.into_iter().zip(&row.times.stages) {
             set(Charted::Wall(stage), time.wall_ms);
             set(Charted::Cpu(stage), time.cpu_ms);
         }

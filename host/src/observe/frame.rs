@@ -18,6 +18,15 @@ pub struct StageTime {
     pub cpu_ms: f64,
 }
 
+/// What a step took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepTimes {
+    /// CPU time of all threads together, ms: of the stages, and of what is between them.
+    pub cpu_ms: f64,
+    /// By stage, in the order of `Stage::ALL`.
+    pub stages: [StageTime; STAGES],
+}
+
 /// One frame.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct FrameRow {
@@ -43,8 +52,8 @@ pub struct FrameRow {
     pub step_ms: f64,
     /// Resident memory of the process, where the system reports it.
     pub rss_bytes: Option<u64>,
-    /// Time by stage, in the order of `Stage::ALL`.
-    pub stages: [StageTime; STAGES],
+    /// CPU time of the step and times of its stages.
+    pub times: StepTimes,
 }
 
 impl FrameRow {

@@ -76,8 +76,8 @@ impl FrameLog {
     pub fn add(&mut self, row: FrameRow) -> io::Result<()> {
         self.file.append(&frame_row(&row, self.frames == 0)?);
         self.frames += 1;
-        self.step.add(StageTime { wall_ms: row.step_ms, cpu_ms: cpu_ms_within_step(&row.stages) });
-        for (times, time) in self.stages.iter_mut().zip(row.stages).filter(|(_, time)| time.wall_ms > 0.0) {
+        self.step.add(StageTime { wall_ms: row.step_ms, cpu_ms: row.times.cpu_ms });
+        for (times, time) in self.stages.iter_mut().zip(row.times.stages).filter(|(_, time)| time.wall_ms > 0.0) {
             times.add(time);
         }
         self.charts.add(&row);
@@ -117,11 +117,6 @@ impl FrameLog {
     }
 }
 
-/// The step does not raycast: the report does, on some frames.
-fn cpu_ms_within_step(stages: &[StageTime; STAGES]) -> f64 {
-    stages.iter().zip(Stage::ALL).filter(|(_, stage)| *stage != Stage::Raycast).map(|(time, _)| time.cpu_ms).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,7 +127,7 @@ mod tests {
         for ms in (1..=200).rev().map(f64::from) {
             let mut row = FrameRow { step_ms: 1.0, ..FrameRow::default() };
             if ms > 100.0 {
-                row.stages[Stage::Fuse as usize] = StageTime { wall_ms: ms, cpu_ms: 2.0 * ms };
+                row.times.stages[Stage::Fuse as usize] = StageTime { wall_ms: ms, cpu_ms: 2.0 * ms };
             }
             log.add(row).unwrap();
         }

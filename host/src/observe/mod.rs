@@ -33,7 +33,7 @@ pub use block_history::BlockHistoryObserver;
 pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
 pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
 pub use chart_values::{ChartValues, Charted};
-pub use frame::{FrameRow, STAGES, StageTime};
+pub use frame::{FrameRow, STAGES, StageTime, StepTimes};
 pub use frame_log::{FrameLog, StageStatistics};
 pub use frame_pictures::FramePictures;
 pub use gallery::GalleryObserver;

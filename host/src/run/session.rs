@@ -8,8 +8,8 @@ use super::view::LiveMap;
 use super::{FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes, stereo_frame};
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
-    EndContext, FrameContext, FramePictures, FrameRow, ObserveError, Observer, RetiredVolume, STAGES, Setup, StageTime, VolumeCopy,
-    from_first, overview,
+    EndContext, FrameContext, FramePictures, FrameRow, ObserveError, Observer, RetiredVolume, Setup, StepTimes, VolumeCopy, from_first,
+    overview,
 };
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
@@ -195,7 +195,7 @@ impl<'p, 's> Session<'p, 's> {
             pictures: FramePictures::default(),
         };
         let observed = observers.frame(&self.setup, &mut context);
-        row.stages[Stage::Raycast as usize] = view.first_raycast.unwrap_or_default();
+        row.times.stages[Stage::Raycast as usize] = view.first_raycast.unwrap_or_default();
         frames.add(row).map_err(|source| ObserveError::Write { path: frames.file().path(&self.setup.folder), source })?;
         observed?;
         self.state.write_due(&self.setup.folder)?;
@@ -232,8 +232,8 @@ impl<'p, 's> Session<'p, 's> {
         let stepped = threads.run(|| mapper.step_with(&frame, threads, store, &mut retired));
         let report = stepped.map_err(|error| refused(step_reason(error)))?;
         let step_ms = begin.elapsed().as_secs_f64() * 1e3;
-        let stages = self.threads.take_times();
-        let row = FrameRow { frame: index, stamp_ns, time_s, step_ms, stages, ..self.row(&images, report) };
+        let times = self.threads.take_times();
+        let row = FrameRow { frame: index, stamp_ns, time_s, step_ms, times, ..self.row(&images, report) };
         Ok((row, retired.0, images))
     }
 
@@ -252,7 +252,7 @@ impl<'p, 's> Session<'p, 's> {
             depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count()) + report.stereo.refused,
             step_ms: 0.0,
             rss_bytes: resident_bytes().map(|(now, _)| now),
-            stages: [StageTime::default(); STAGES],
+            times: StepTimes::default(),
         }
     }
 

@@ -1,15 +1,18 @@
-//! Threads and time for the core: a pool of N threads, and per stage the wall time and the CPU time of all threads.
+//! Threads and time for the core: a pool of N threads, the CPU time of all threads, and per stage the wall time and that CPU time.
 //!
 //! CPU time is the threads' own clock, so it counts work, not waiting, and does not grow when others use the machine. Each thread knows
 //! the stage it works for; whenever that changes (a stage begins or ends, a piece of work is taken over from another thread) the time since the
 //! last change is charged to the stage before. So work that runs elsewhere is charged once, to the right stage.
 
-use crate::observe::{STAGES, StageTime};
+use crate::observe::{STAGES, StageTime, StepTimes};
 use cpu_time::ThreadTime;
 use dynvox_core::{Executor, Stage, parallel::Vectors};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+
+/// Where work of no stage is charged.
+const OUTSIDE: usize = STAGES;
 
 /// Runs the core's work on a number of threads and takes the time.
 pub struct Threads {
@@ -17,7 +20,7 @@ pub struct Threads {
     count: usize,
     vectors: Vectors,
     wall_ns: [AtomicU64; STAGES],
-    cpu_ns: [AtomicU64; STAGES],
+    cpu_ns: [AtomicU64; STAGES + 1],
 }
 
 thread_local! {
@@ -46,18 +49,20 @@ impl Threads {
 
     /// Runs `work` within the pool, so that what it joins is spread over it.
     pub fn run<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        let work = || self.charged(Some(OUTSIDE), work);
         match &self.pool {
             Some(pool) => pool.install(work),
             None => work(),
         }
     }
 
-    /// The times since the last call, by stage, and begins anew.
-    pub fn take_times(&self) -> [StageTime; STAGES] {
+    /// The times since the last call, and begins anew.
+    pub fn take_times(&self) -> StepTimes {
         let taken = |ns: &AtomicU64| ns.swap(0, Ordering::Relaxed) as f64 * 1e-6;
-        let mut times = [StageTime::default(); STAGES];
-        for ((time, wall), cpu) in times.iter_mut().zip(&self.wall_ns).zip(&self.cpu_ns) {
+        let mut times = StepTimes { cpu_ms: taken(&self.cpu_ns[OUTSIDE]), ..StepTimes::default() };
+        for ((time, wall), cpu) in times.stages.iter_mut().zip(&self.wall_ns).zip(&self.cpu_ns) {
             *time = StageTime { wall_ms: taken(wall), cpu_ms: taken(cpu) };
+            times.cpu_ms += time.cpu_ms;
         }
         times
     }
@@ -149,11 +154,12 @@ mod tests {
                 )
             });
             let times = threads.take_times();
-            let cpu = |stage: Stage| times[stage as usize].cpu_ms;
+            let cpu = |stage: Stage| times.stages[stage as usize].cpu_ms;
             assert!((40.0..48.0).contains(&cpu(Stage::Stereo)), "{count} threads: {}", cpu(Stage::Stereo));
             assert!((30.0..38.0).contains(&cpu(Stage::SceneFlow)), "{count} threads: {}", cpu(Stage::SceneFlow));
             assert_eq!(cpu(Stage::Fuse), 0.0);
-            assert_eq!(threads.take_times(), [StageTime::default(); STAGES], "taken times are gone");
+            assert!((75.0..91.0).contains(&times.cpu_ms), "{count} threads: {}, and 5 ms of no stage", times.cpu_ms);
+            assert_eq!(threads.take_times(), StepTimes::default(), "taken times are gone");
         }
     }
 }

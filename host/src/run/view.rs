@@ -22,7 +22,7 @@ impl<'s> MapView<'s> for LiveMap<'_, 's> {
     fn raycast(&mut self, view: RaycastView) -> Option<&Raycaster<'s>> {
         let (mapper, threads) = (&mut *self.mapper, self.threads);
         let seen = threads.run(|| mapper.raycast(view, threads));
-        self.first_raycast.get_or_insert(threads.take_times()[Stage::Raycast as usize]);
+        self.first_raycast.get_or_insert(threads.take_times().stages[Stage::Raycast as usize]);
         seen.ok()
     }
 

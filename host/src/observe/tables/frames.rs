@@ -14,6 +14,7 @@ struct FrameColumns {
     time_s: f64,
     digest: String,
     step_ms: f64,
+    step_cpu_ms: f64,
     severity: &'static str,
     motion: &'static str,
     segment: u32,
@@ -171,6 +172,7 @@ fn frame_columns(row: &FrameRow) -> FrameColumns {
         time_s: row.time_s,
         digest: hex(row.report.digest),
         step_ms: rounded(row.step_ms, 4),
+        step_cpu_ms: rounded(row.times.cpu_ms, 4),
         severity: row.severity().name(),
         motion: row.motion(),
         segment: row.report.segment,
@@ -235,7 +237,7 @@ fn object_columns(row: &FrameRow) -> ObjectColumns {
 }
 
 fn time_columns(row: &FrameRow) -> TimeColumns {
-    let of = |stage: Stage, value: fn(&StageTime) -> f64| rounded(value(&row.stages[stage as usize]), 4);
+    let of = |stage: Stage, value: fn(&StageTime) -> f64| rounded(value(&row.times.stages[stage as usize]), 4);
     let wall = |stage: Stage| of(stage, |time| time.wall_ms);
     let cpu = |stage: Stage| of(stage, |time| time.cpu_ms);
     TimeColumns {

@@ -37,7 +37,7 @@ use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"DVXDRIVE";
 /// Version of the layout and of the host's state. Another one is refused: there is no conversion.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 /// Magic, version, length.
 const HEAD: usize = 20;
 /// Checksum.
