@@ -14,6 +14,7 @@ use crate::{
     image::View,
     masks::{MaskHandle, MaskStore, PixelBox},
     memory::{Capacity, Carver, region_bytes},
+    parallel::{Vectors, Work},
     part::{part, part_mut},
     state::Visitor,
 };
@@ -34,6 +35,7 @@ const EDGE_Q8: u16 = 384;
 const BLOCK: usize = 64;
 
 /// The largest disparity within [`EDGE_REACH_PX`] along row and column of each pixel of a block that begins at (`u`, `v`).
+#[inline(always)]
 fn nearest_around(disparity_q8: View<'_, u16>, u: usize, v: usize) -> [u16; BLOCK] {
     let mut nearest = [0; BLOCK];
     for px in 1..=EDGE_REACH_PX {
@@ -44,7 +46,9 @@ fn nearest_around(disparity_q8: View<'_, u16>, u: usize, v: usize) -> [u16; BLOC
             let outside = du.min(0).unsigned_abs().saturating_sub(u).min(BLOCK);
             let row = row.get(u.saturating_add_signed(du)..).unwrap_or(&[]);
             let nearest = part_mut(&mut nearest, outside..);
-            nearest.iter_mut().zip(row).for_each(|(nearest, &other)| *nearest = if other > *nearest { other } else { *nearest });
+            for (nearest, &other) in nearest.iter_mut().zip(row) {
+                *nearest = if other > *nearest { other } else { *nearest };
+            }
         }
     }
     nearest
@@ -59,6 +63,7 @@ pub(super) fn crop(
     masks: &MaskStore<'_>,
     mask: &MaskHandle,
     disparities: &mut [u16],
+    vectors: Vectors,
 ) -> u32 {
     let PixelBox { left, top, width, height } = mask.pixels;
     let (Ok(left_u), Ok(top_v)) = (usize::try_from(left), usize::try_from(top)) else { return 0 };
@@ -80,23 +85,46 @@ pub(super) fn crop(
         let disparity = rig.focal_baseline_px_m() / depth_m * 256.0;
         if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
     });
-    let mut kept = 0;
-    for (v, row) in (top_v..).zip(disparities.chunks_exact_mut(width.max(1) as usize)).take(height.max(0) as usize) {
-        for (u, block) in (left_u..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
-            // A pixel without a disparity lies below `low`, or is 0.
-            let is_kept = |disparity: u16| (disparity >= low) & (disparity <= high);
-            if !block.iter().fold(false, |any, &disparity| any | (is_kept(disparity) & (disparity > 0))) {
-                block.fill(0);
-                continue;
-            }
-            for (disparity, nearest) in block.iter_mut().zip(nearest_around(disparity_q8, u, v)) {
-                let is_behind_edge = nearest > disparity.saturating_add(EDGE_Q8);
-                *disparity = if is_kept(*disparity) & !is_behind_edge { *disparity } else { 0 };
-                kept += u32::from(*disparity > 0);
+    let size = [width.max(1) as usize, height.max(0) as usize];
+    vectors.run(LeaveOut { disparity_q8, origin: [left_u, top_v], size, limits: [low, high], disparities })
+}
+
+/// Leaves out of a crop what is too far or too near, or just behind an edge.
+struct LeaveOut<'a> {
+    disparity_q8: View<'a, u16>,
+    /// Column and row of the crop in the image.
+    origin: [usize; 2],
+    size: [usize; 2],
+    /// Least and greatest disparity that is kept.
+    limits: [u16; 2],
+    disparities: &'a mut [u16],
+}
+
+impl Work for LeaveOut<'_> {
+    /// How many pixels are left.
+    type Output = u32;
+
+    #[inline(always)]
+    fn run(self) -> u32 {
+        let ([left, top], [width, height], [low, high]) = (self.origin, self.size, self.limits);
+        let mut kept = 0;
+        for (v, row) in (top..).zip(self.disparities.chunks_exact_mut(width)).take(height) {
+            for (u, block) in (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
+                // A pixel without a disparity lies below `low`, or is 0.
+                let is_kept = |disparity: u16| (disparity >= low) & (disparity <= high);
+                if !block.iter().fold(false, |any, &disparity| any | (is_kept(disparity) & (disparity > 0))) {
+                    block.fill(0);
+                    continue;
+                }
+                for (disparity, nearest) in block.iter_mut().zip(nearest_around(self.disparity_q8, u, v)) {
+                    let is_behind_edge = nearest > disparity.saturating_add(EDGE_Q8);
+                    *disparity = if is_kept(*disparity) & !is_behind_edge { *disparity } else { 0 };
+                    kept += u32::from(*disparity > 0);
+                }
             }
         }
+        kept
     }
-    kept
 }
 
 /// A crop that is kept for later. Transforms as in the track.

@@ -69,7 +69,7 @@ impl<'s> Objects<'s> {
             return;
         };
         let extent_m = self.config.extent_m;
-        if crop::crop(frame.rig, extent_m, frame.disparity_q8, tracker.masks(), &instance.mask, disparity) == 0 {
+        if crop::crop(frame.rig, extent_m, frame.disparity_q8, tracker.masks(), &instance.mask, disparity, executor.vectors()) == 0 {
             return;
         }
         let crop = Crop {

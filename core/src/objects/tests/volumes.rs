@@ -1,7 +1,7 @@
 //! What gets into an object's volume, and what goes out of it.
 
 use super::*;
-use crate::{masks::MaskHandle, volume::BlockCoord};
+use crate::{masks::MaskHandle, parallel::Vectors, volume::BlockCoord};
 
 const SMALL: Board = Board { half_m: [0.8, 0.5], ..Board::CAR };
 /// The same as a mask twice too wide shows it.
@@ -146,7 +146,7 @@ fn cropped(disparity_px: impl Fn(i32) -> f64) -> Vec<i32> {
     let row: Vec<u16> = (0..WIDTH as i32).map(|u| (disparity_px(u - 20) * 256.0) as u16).collect();
     let disparity = row.repeat(HEIGHT);
     let mut crop = vec![7u16; pixels.area() as usize];
-    let kept = crop::crop(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &mask, &mut crop);
+    let kept = crop::crop(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &mask, &mut crop, Vectors::detect());
     let columns = |row: &[u16]| (0..60).filter(|&u| row[u as usize] > 0).collect::<Vec<i32>>();
     let first = columns(&crop[..60]);
     assert!(crop.chunks_exact(60).all(|row| columns(row) == first));
@@ -229,11 +229,13 @@ fn crops_equal_those_cut_pixel_by_pixel() {
             let bits: Vec<u8> = (0..WIDTH * HEIGHT).map(|_| u8::from(random.below(8) > 0)).collect();
             (0..HEIGHT).for_each(|v| store.set_row(&mask, v as i32, 0, &bits[v * WIDTH..][..WIDTH]));
         }
-        let mut crop = vec![7u16; pixels.area() as usize];
-        let count = crop::crop(&RIG, 3.0, disparity, &store, &mask, &mut crop);
-        assert_eq!(crop, plain_crop(3.0, disparity, |u, v| store.contains(&mask, u, v), &pixels), "round {round}");
-        assert_eq!(count as usize, crop.iter().filter(|disparity| **disparity > 0).count());
-        kept += count;
+        for vectors in Vectors::available() {
+            let mut crop = vec![7u16; pixels.area() as usize];
+            let count = crop::crop(&RIG, 3.0, disparity, &store, &mask, &mut crop, vectors);
+            assert_eq!(crop, plain_crop(3.0, disparity, |u, v| store.contains(&mask, u, v), &pixels), "round {round}");
+            assert_eq!(count as usize, crop.iter().filter(|disparity| **disparity > 0).count());
+            kept += count;
+        }
     }
     assert!(kept > 10_000, "{kept}");
 }

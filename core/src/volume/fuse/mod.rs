@@ -25,7 +25,7 @@ use self::{
     layer::{Scratch, Shares},
 };
 use super::block::{Colour, Voxels, colour_layer_mut, least_weight};
-use super::{BLOCK_SIDE, BlockCoord, CLASS_COUNT, ObservationWeight, Viewpoint, Volume, VolumeConfig};
+use super::{BLOCK_SIDE, BlockCoord, Viewpoint, Volume, VolumeConfig};
 use crate::{
     digest::Digest,
     geometry::scalar::{floor_i32, max_f32, min_f32},
@@ -35,7 +35,7 @@ use crate::{
 use nalgebra::{Point3, Rotation3, Vector3};
 
 /// Observation weights run up to this.
-const MAX_OBSERVATION_WEIGHT: i32 = 255;
+const MAX_OBSERVATION_WEIGHT: i16 = 255;
 /// Sums of a voxel's weight and an observation's run below this.
 const SHARES: usize = 512;
 
@@ -114,17 +114,6 @@ impl<'a> Fusion<'a> {
             colour_band_m: config.colour_band * config.truncation_m,
             behind_m: max_f32(config.behind_m, 2.0 * config.voxel_size_m),
         }
-    }
-
-    /// Weight of an observation at a pixel, of that depth; 0 keeps it out.
-    fn observation_weight(&self, u: usize, v: usize, depth_m: f32) -> i32 {
-        let by_depth = match self.config.observation_weight {
-            ObservationWeight::One | ObservationWeight::Nearest => 1,
-            ObservationWeight::Depth => ((100.0 / depth_m) as i32).clamp(1, 10),
-        };
-        let class = self.seen.class.and_then(|image| image.get(u, v)).map(usize::from);
-        let by_class = class.and_then(|class| self.config.class_weight.get(class % CLASS_COUNT)).copied().unwrap_or(1);
-        (by_depth * i32::from(by_class)).min(MAX_OBSERVATION_WEIGHT)
     }
 }
 
