@@ -157,7 +157,8 @@ impl<'a> Rays<'a> {
             reach_m: [max_f32(config.allocation_m, 2.0 * config.voxel_size_m), config.truncation_m],
             far_m: config.far_m,
             offset: [(frame / 2) as usize % PIXEL_STEP, frame as usize % PIXEL_STEP],
-            sparse_offset: [3, 2].map(|bit| (frame >> bit & 1 | frame >> (bit + 1) & 2) as usize),
+            // The larger change comes first: two steps from every frame, or every second one, to the next.
+            sparse_offset: [1, 0].map(|bit| (frame >> (bit + 2) & 1 | (frame >> bit ^ frame >> (bit + 4)) << 1 & 2) as usize),
             wide_m: [WIDE_PX, 2.0 * WIDE_PX].map(|width_px| (view.rig.focal_px * block_m / width_px) as f32),
         }
     }
