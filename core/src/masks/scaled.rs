@@ -84,18 +84,30 @@ fn runs_of_ones(words: impl Iterator<Item = u64>, mut visit: impl FnMut(Range<i3
 
 /// The pixels of a line of `from` resized to `to` that lie between two of a run, or beyond the line's ends where these belong to it.
 fn scaled_run(run: Range<i32>, from: i32, to: i32) -> Range<i32> {
-    let step = 2 * i64::from(from.max(1));
-    // Where a pixel's middle falls in the line resized, from the middle of its first pixel on, in units of 1 / `step`.
-    let position = |column: i32| i64::from(2 * column + 1) * i64::from(to) - i64::from(from);
-    let start = if run.start <= 0 { 0 } else { (position(run.start) + step - 1).div_euclid(step) as i32 };
-    let end = if run.end >= from { to } else { position(run.end - 1).div_euclid(step) as i32 + 1 };
+    let start = if run.start <= 0 {
+        0
+    } else {
+        let (position, unit) = resized(run.start, from, to);
+        (position + unit - 1).div_euclid(unit) as i32
+    };
+    let end = if run.end >= from {
+        to
+    } else {
+        let (position, unit) = resized(run.end - 1, from, to);
+        position.div_euclid(unit) as i32 + 1
+    };
     start..end
 }
 
 /// The two pixels of a line of `from` between which pixel `at` of the same line resized to `to` lies; the same one twice where it hits one.
 fn sources(at: i32, from: i32, to: i32) -> [i32; 2] {
-    let (position, step) = (i64::from(2 * at + 1) * i64::from(from) - i64::from(to), 2 * i64::from(to.max(1)));
-    let low = position.div_euclid(step);
+    let (position, unit) = resized(at, to, from);
+    let low = position.div_euclid(unit);
     let last = i64::from((from - 1).max(0));
-    [low, low + i64::from(position.rem_euclid(step) != 0)].map(|pixel| pixel.clamp(0, last) as i32)
+    [low, low + i64::from(position.rem_euclid(unit) != 0)].map(|pixel| pixel.clamp(0, last) as i32)
+}
+
+/// Where pixel `at` of a line of `from` lies in the same line resized to `to`, and how much a pixel is there.
+fn resized(at: i32, from: i32, to: i32) -> (i64, i64) {
+    (i64::from(2 * at + 1) * i64::from(to) - i64::from(from), 2 * i64::from(from.max(1)))
 }

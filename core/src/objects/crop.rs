@@ -67,8 +67,9 @@ pub(super) fn crop(
 ) -> u32 {
     let PixelBox { left, top, width, height } = mask.pixels;
     let (Ok(left_u), Ok(top_v)) = (usize::try_from(left), usize::try_from(top)) else { return 0 };
+    let size @ [columns, rows] = [width.max(1) as usize, height.max(0) as usize];
     let mut found = Histogram::new();
-    for (v, row) in (0..height.max(0) as usize).zip(disparities.chunks_exact_mut(width.max(1) as usize)) {
+    for (v, row) in disparities.chunks_exact_mut(columns).enumerate().take(rows) {
         let from = disparity_q8.row(top_v + v).get(left_u..).unwrap_or(&[]);
         for ((u, row), from) in (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)).zip(from.chunks(BLOCK)) {
             let bits = masks.bits(mask, u, top + v as i32);
@@ -85,7 +86,6 @@ pub(super) fn crop(
         let disparity = rig.focal_baseline_px_m() / depth_m * 256.0;
         if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
     });
-    let size = [width.max(1) as usize, height.max(0) as usize];
     vectors.run(LeaveOut { disparity_q8, origin: [left_u, top_v], size, limits: [low, high], disparities })
 }
 

@@ -3,7 +3,7 @@
 //! Each loop applies one operation to all of them and has no branches: that is what becomes
 //! vector instructions. Loops over eight voxels are unrolled before they can.
 
-use super::{Fusion, MAX_OBSERVATION_WEIGHT, SHARES};
+use super::Fusion;
 use crate::{
     geometry::scalar::{clamp_f32, floored_i32, min_f32, rounded_i32},
     image::View,
@@ -15,6 +15,10 @@ use crate::{
 };
 use nalgebra::Vector3;
 
+/// Observation weights run up to this.
+const MAX_OBSERVATION_WEIGHT: i16 = 255;
+/// Sums of a voxel's weight and an observation's run below this.
+const SHARES: usize = 512;
 /// Weights that the past can have.
 const PASTS: usize = 1 << u8::BITS;
 /// No pixel of the image.

@@ -34,11 +34,6 @@ use crate::{
 };
 use nalgebra::{Point3, Rotation3, Vector3};
 
-/// Observation weights run up to this.
-const MAX_OBSERVATION_WEIGHT: i16 = 255;
-/// Sums of a voxel's weight and an observation's run below this.
-const SHARES: usize = 512;
-
 /// Blocks nearer than this are never left out, m.
 const NEAREST_CULLED_M: f32 = 0.1;
 
