@@ -1,14 +1,17 @@
 //! Small gaps between disparities are filled, along rows and then along columns, and marked so.
 //!
 //! If both ends are one surface the gap gets their mean. Otherwise it stays, or, as published, gets the farther one's disparity: what is
-//! hidden from one camera is background. Memory: three bytes a column. Time: two walks over the image.
+//! hidden from one camera is background. Memory: four bytes a column. Time: two walks over the image.
 
 use super::{
     GapEnds, MAX_IMAGE_SIZE,
     dense::{FILLED, NONE},
     flags::for_each_set,
 };
-use crate::part::{part, part_mut};
+use crate::{
+    parallel::Work,
+    part::{part, part_mut},
+};
 use core::ops::Range;
 
 /// What fills a gap.
@@ -24,6 +27,7 @@ pub(super) struct Filling {
 
 impl Filling {
     /// What fills a gap between two ends; `None` leaves it.
+    #[inline(always)]
     fn value(self, a: i16, b: i16) -> Option<i16> {
         // A gap along a column may end at what was filled along a row.
         let (a, b) = (a & !FILLED, b & !FILLED);
@@ -36,32 +40,46 @@ impl Filling {
     }
 }
 
-/// Fills the gaps of each row; `edges` has a byte a column. Returns the pixels filled.
-pub(super) fn fill_rows(disparity: &mut [i16], width: usize, filling: Filling, edges: &mut [u8]) -> u32 {
-    let mut filled = 0;
-    let width = width.max(1);
-    let edges = part_mut(edges, ..width - 1);
-    for row in disparity.chunks_exact_mut(width) {
-        // Edges between pixels with and without disparity take turns: a gap lies between two of them.
-        for (edge, (&a, &b)) in edges.iter_mut().zip(row.iter().zip(part(row, 1..))) {
-            *edge = u8::from((a == NONE) != (b == NONE));
+/// Fills the gaps of each row, whose ends are `width` apart; `edges` has a byte a column. Returns the pixels filled.
+pub(super) struct FillRows<'a> {
+    pub rows: &'a mut [i16],
+    pub width: usize,
+    pub filling: Filling,
+    pub edges: &'a mut [u8],
+}
+
+impl Work for FillRows<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run(self) -> u32 {
+        let Self { rows, width, filling, edges } = self;
+        let mut filled = 0;
+        let width = width.max(1);
+        let edges = part_mut(edges, ..width - 1);
+        for row in rows.chunks_exact_mut(width) {
+            // Edges between pixels with and without disparity take turns: a gap lies between two of them.
+            for (edge, (&a, &b)) in edges.iter_mut().zip(row.iter().zip(part(row, 1..))) {
+                *edge = u8::from((a == NONE) != (b == NONE));
+            }
+            let mut start = None;
+            for_each_set(edges, |before| {
+                start = match start {
+                    None if row.get(before).is_some_and(|&d| d == NONE) => None,
+                    None => Some(before + 1),
+                    Some(gap) => {
+                        filled += fill_gap(row, gap..before + 1, filling);
+                        None
+                    }
+                };
+            });
         }
-        let mut start = None;
-        for_each_set(edges, |before| {
-            start = match start {
-                None if row.get(before).is_some_and(|&d| d == NONE) => None,
-                None => Some(before + 1),
-                Some(gap) => {
-                    filled += fill_gap(row, gap..before + 1, filling);
-                    None
-                }
-            };
-        });
+        filled
     }
-    filled
 }
 
 /// Fills a gap between two pixels of a row, if it is to be; returns the pixels filled.
+#[inline(always)]
 fn fill_gap(row: &mut [i16], gap: Range<usize>, filling: Filling) -> u32 {
     let length = gap.len();
     if length > filling.width {
@@ -81,36 +99,50 @@ fn fill_gap(row: &mut [i16], gap: Range<usize>, filling: Filling) -> u32 {
 const NEVER: u16 = 1 << 15;
 const _: () = assert!(2 * MAX_IMAGE_SIZE <= NEVER as usize);
 
-/// Fills the gaps of each column; `last_row` and `ends` have an entry a column. Returns the pixels filled.
+/// Fills the gaps of each column of an image; `last_row` and `ends` have an entry a column. Returns the pixels filled.
 ///
 /// Columns are walked side by side, row by row: an image is read as it lies in memory.
-pub(super) fn fill_columns(disparity: &mut [i16], width: usize, filling: Filling, last_row: &mut [u16], ends: &mut [u8]) -> u32 {
-    let (Some(last_row), Some(ends)) = (last_row.get_mut(..width), ends.get_mut(..width)) else { return 0 };
-    last_row.fill(NEVER);
-    let mut filled = 0;
-    let (width, widest) = (width.max(1), filling.width as u16);
-    for v in 0..disparity.len() / width {
-        let (above, here) = disparity.split_at_mut_checked(v * width).unwrap_or_default();
-        for ((end, &last), &here) in ends.iter_mut().zip(&*last_row).zip(&*here) {
-            // No gap is one of 0 px: less one that wraps to the most there can be.
-            let gap = (v as u16).wrapping_sub(last).wrapping_sub(1);
-            *end = u8::from(here != NONE) & u8::from(gap.wrapping_sub(1) < widest);
-        }
-        for_each_set(ends, |u| {
-            let (Some(&last), Some(&end)) = (last_row.get(u), here.get(u)) else { return };
-            // This column of the rows above, from the last one with a disparity on.
-            let mut column = above.get_mut(usize::from(last) * width + u..).unwrap_or_default().iter_mut().step_by(width);
-            let Some(value) = column.next().and_then(|start| filling.value(*start, end)) else { return };
-            for pixel in column {
-                *pixel = value;
-                filled += 1;
+pub(super) struct FillColumns<'a> {
+    pub image: &'a mut [i16],
+    pub width: usize,
+    pub filling: Filling,
+    pub last_row: &'a mut [u16],
+    pub ends: &'a mut [u8],
+}
+
+impl Work for FillColumns<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run(self) -> u32 {
+        let Self { image, width, filling, last_row, ends } = self;
+        let (Some(last_row), Some(ends)) = (last_row.get_mut(..width), ends.get_mut(..width)) else { return 0 };
+        last_row.fill(NEVER);
+        let mut filled = 0;
+        let (width, widest) = (width.max(1), filling.width as u16);
+        for v in 0..image.len() / width {
+            let (above, here) = image.split_at_mut_checked(v * width).unwrap_or_default();
+            for ((end, &last), &here) in ends.iter_mut().zip(&*last_row).zip(&*here) {
+                // No gap is one of 0 px: less one that wraps to the most there can be.
+                let gap = (v as u16).wrapping_sub(last).wrapping_sub(1);
+                *end = u8::from(here != NONE) & u8::from(gap.wrapping_sub(1) < widest);
             }
-        });
-        for (last, &here) in last_row.iter_mut().zip(&*here) {
-            *last = if here == NONE { *last } else { v as u16 };
+            for_each_set(ends, |u| {
+                let (Some(&last), Some(&end)) = (last_row.get(u), here.get(u)) else { return };
+                // This column of the rows above, from the last one with a disparity on.
+                let mut column = above.get_mut(usize::from(last) * width + u..).unwrap_or_default().iter_mut().step_by(width);
+                let Some(value) = column.next().and_then(|start| filling.value(*start, end)) else { return };
+                for pixel in column {
+                    *pixel = value;
+                    filled += 1;
+                }
+            });
+            for (last, &here) in last_row.iter_mut().zip(&*here) {
+                *last = if here == NONE { *last } else { v as u16 };
+            }
         }
+        filled
     }
-    filled
 }
 
 #[cfg(test)]
@@ -143,12 +175,19 @@ mod tests {
             let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
 
             let mut rows = image.clone();
-            let filled = fill_rows(&mut rows, width, filling, &mut vec![0; width]);
+            let filled = FillRows { rows: &mut rows, width, filling, edges: &mut vec![0; width] }.run();
             assert!(rows == image.chunks(width).flat_map(|row| plain(row, filling)).collect::<Vec<_>>());
             assert_eq!(filled as usize, image.iter().zip(&rows).filter(|(a, b)| a != b).count());
 
             let mut columns = rows.clone();
-            fill_columns(&mut columns, width, filling, &mut vec![0; width], &mut vec![0; width]);
+            FillColumns {
+                image: &mut columns,
+                width,
+                filling,
+                last_row: &mut vec![0; width],
+                ends: &mut vec![0; width],
+            }
+            .run();
             for u in 0..width {
                 let column = |image: &[i16]| image.iter().skip(u).step_by(width).copied().collect::<Vec<_>>();
                 assert!(column(&columns) == plain(&column(&rows), filling));
@@ -161,11 +200,12 @@ mod tests {
         let filling = Filling { width: 3, discontinuity: 192, ends: GapEnds::Farther };
         let image = [640, NONE, NONE, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE];
         let [surface, farther] = [670, 100].map(|disparity| disparity | FILLED);
+        let fill = |rows: &mut [i16], ends| FillRows { rows, width: 12, filling: Filling { ends, ..filling }, edges: &mut [0; 12] }.run();
         let mut row = image;
-        assert_eq!(fill_rows(&mut row, 12, filling, &mut [0; 12]), 3);
+        assert_eq!(fill(&mut row, GapEnds::Farther), 3);
         assert_eq!(row, [640, surface, surface, 700, farther, 100, NONE, NONE, NONE, NONE, 100, NONE]);
         let mut row = image;
-        assert_eq!(fill_rows(&mut row, 12, Filling { ends: GapEnds::Surface, ..filling }, &mut [0; 12]), 2);
+        assert_eq!(fill(&mut row, GapEnds::Surface), 2);
         assert_eq!(row, [640, surface, surface, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE]);
     }
 }

@@ -58,8 +58,10 @@ impl Work for CorrectRows<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let rows = self.rows.chunks_exact_mut(self.width.max(1));
-        (self.first..).zip(rows).for_each(|(v, row)| self.correction.correct_row(v, row));
+        // Not by `for_each`, whose closure is compiled for the baseline.
+        for (v, row) in (self.first..).zip(self.rows.chunks_exact_mut(self.width.max(1))) {
+            self.correction.correct_row(v, row);
+        }
     }
 }
 
@@ -200,9 +202,9 @@ impl<'s> StereoMatcher<'s> {
         }
         self.match_densely(config, executor, &mut report);
         done(StereoStep::DenseMatching);
-        self.remove_speckles(config, &mut report);
+        self.remove_speckles(config, executor, &mut report);
         done(StereoStep::Speckles);
-        self.fill_gaps(config, &mut report);
+        self.fill_gaps(config, executor, &mut report);
         done(StereoStep::Gaps);
         self.smooth(config, executor);
         done(StereoStep::Smoothing);

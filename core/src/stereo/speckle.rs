@@ -8,6 +8,7 @@ use super::{
     dense::{FILLED, NONE},
     flags::{for_each_set, word},
 };
+use crate::parallel::Work;
 
 /// Working memory.
 pub(super) struct Scratch<'a> {
@@ -24,16 +25,19 @@ struct Runs<'a>(&'a mut [i32]);
 
 impl Runs<'_> {
     /// A run's entry. Runs are numbered below the number of pixels, and as many entries there are: beyond them it is an empty root.
+    #[inline(always)]
     fn get(&self, run: usize) -> i32 {
         self.0.get(run).copied().unwrap_or(-1)
     }
 
+    #[inline(always)]
     fn set(&mut self, run: usize, entry: i32) {
         if let Some(slot) = self.0.get_mut(run) {
             *slot = entry;
         }
     }
 
+    #[inline(always)]
     fn root(&mut self, mut run: usize) -> usize {
         while let Ok(parent) = usize::try_from(self.get(run)) {
             // Halve the path, so that no chain gets long.
@@ -47,6 +51,7 @@ impl Runs<'_> {
     }
 
     /// The earlier root wins: no rank is needed, and the result does not depend on order.
+    #[inline(always)]
     fn unite(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
@@ -68,44 +73,60 @@ pub(super) struct Blanked {
 
 /// Blanks segments of fewer than `smallest` pixels, measured or filled, in an image `width` wide; neighbours differ by at most `similarity`,
 /// in the unit of the pixels and less than NONE is away from any.
-pub(super) fn remove_speckles(disparity: &mut [i16], width: usize, similarity: i16, smallest: u32, scratch: Scratch<'_>) -> Blanked {
-    let (pixels, width, Scratch { runs, ends, flags }) = (disparity.len(), width.max(1), scratch);
-    let mut blanked = Blanked::default();
-    if smallest <= 1 || runs.len() < pixels || ends.len() < pixels || flags.len() < 3 * width {
-        return blanked;
-    }
-    let mut runs = Runs(runs);
-    find_segments(disparity, width, similarity.unsigned_abs(), &mut runs, ends, flags);
-    let mut run = 0;
-    for (row, ends) in disparity.chunks_exact_mut(width).zip(ends.chunks_exact(width)) {
-        let mut start = 0;
-        for &end in ends {
-            let root = runs.root(run);
-            run += 1;
-            if let Some(pixels) = row.get_mut(start..usize::from(end))
-                && runs.0.get(root).is_some_and(|&size| size.unsigned_abs() < smallest)
-                && pixels.first().is_some_and(|&d| d != NONE)
-            {
-                let filled = pixels.iter().filter(|&&d| d & FILLED != 0).count() as u32;
-                blanked.filled += filled;
-                blanked.measured += pixels.len() as u32 - filled;
-                pixels.fill(NONE);
-            }
-            start = usize::from(end);
-            if start == width {
-                break;
+pub(super) struct RemoveSpeckles<'a> {
+    pub disparity: &'a mut [i16],
+    pub width: usize,
+    pub similarity: i16,
+    pub smallest: u32,
+    pub scratch: Scratch<'a>,
+}
+
+impl Work for RemoveSpeckles<'_> {
+    type Output = Blanked;
+
+    #[inline(always)]
+    fn run(self) -> Blanked {
+        let Self { disparity, width, similarity, smallest, scratch: Scratch { runs, ends, flags } } = self;
+        let (pixels, width) = (disparity.len(), width.max(1));
+        let mut blanked = Blanked::default();
+        if smallest <= 1 || runs.len() < pixels || ends.len() < pixels || flags.len() < 3 * width {
+            return blanked;
+        }
+        let mut runs = Runs(runs);
+        find_segments(disparity, width, similarity.unsigned_abs(), &mut runs, ends, flags);
+        let mut run = 0;
+        for (row, ends) in disparity.chunks_exact_mut(width).zip(ends.chunks_exact(width)) {
+            let mut start = 0;
+            for &end in ends {
+                let root = runs.root(run);
+                run += 1;
+                if let Some(pixels) = row.get_mut(start..usize::from(end))
+                    && runs.0.get(root).is_some_and(|&size| size.unsigned_abs() < smallest)
+                    && pixels.first().is_some_and(|&d| d != NONE)
+                {
+                    let filled = pixels.iter().filter(|&&d| d & FILLED != 0).count() as u32;
+                    blanked.filled += filled;
+                    blanked.measured += pixels.len() as u32 - filled;
+                    pixels.fill(NONE);
+                }
+                start = usize::from(end);
+                if start == width {
+                    break;
+                }
             }
         }
+        blanked
     }
-    blanked
 }
 
 /// How far apart two pixels are, whether filled or not. NONE is far from every disparity with its bit of filled pixels taken, too.
+#[inline(always)]
 fn difference(a: i16, b: i16) -> u16 {
     (a & !FILLED).abs_diff(b & !FILLED)
 }
 
 /// Finds the runs of all rows, numbered in scan order, those without disparity included, and unites them.
+#[inline(always)]
 fn find_segments(disparity: &[i16], width: usize, similarity: u16, runs: &mut Runs<'_>, ends: &mut [u16], flags: &mut [u8]) {
     let width = width.max(1);
     let mut flags = flags.chunks_exact_mut(width);
@@ -138,6 +159,7 @@ fn find_segments(disparity: &[i16], width: usize, similarity: u16, runs: &mut Ru
 }
 
 /// Flags the last pixel of each run of a row.
+#[inline(always)]
 fn break_up(row: &[i16], similarity: u16, breaks: &mut [u8]) {
     for (flag, (&a, &b)) in breaks.iter_mut().zip(row.iter().zip(row.iter().skip(1))) {
         *flag = u8::from(difference(a, b) > similarity);
@@ -149,6 +171,7 @@ fn break_up(row: &[i16], similarity: u16, breaks: &mut [u8]) {
 
 /// Calls `each` with the numbers, from the row's first one on, of every two runs that touch: of two rows, whose runs end where `breaks` are
 /// set. Eight pixels at a time.
+#[inline(always)]
 fn for_each_contact(touches: &[u8], [above, here]: [&[u8]; 2], mut each: impl FnMut([usize; 2])) {
     // The number of flags that are set: the highest byte of the product is the sum of all.
     let count = |flags: u64| (flags.wrapping_mul(0x0101_0101_0101_0101) >> 56) as usize;
@@ -216,7 +239,7 @@ mod tests {
             let mut fast = image.clone();
             let (mut runs, mut ends, mut flags) = (vec![7; image.len()], vec![7; image.len()], vec![7; 3 * width]);
             let scratch = Scratch { runs: &mut runs, ends: &mut ends, flags: &mut flags };
-            let blanked = remove_speckles(&mut fast, width, 64, smallest, scratch);
+            let blanked = RemoveSpeckles { disparity: &mut fast, width, similarity: 64, smallest, scratch }.run();
             assert!(fast == plain(&image, width, 64, smallest as usize));
             let removed = |bit| image.iter().zip(&fast).filter(|(a, b)| a != b && **a & FILLED == bit).count() as u32;
             assert_eq!(blanked, Blanked { measured: removed(0), filled: removed(FILLED) });

@@ -12,14 +12,13 @@ use crate::{
         delaunay::{SupportPoint, Triangulation},
         dense::{DenseBand, DenseMatching, FILLED, MatchBand, NONE, WORKING_ONE_PX},
         descriptor::Gradients,
-        filter_support, gaps,
-        gaps::Filling,
+        filter_support,
+        gaps::{FillColumns, FillRows, Filling},
         gradient::GradientRows,
         invalid, median, prior,
         prior::{CellGrid, DisparitySet, PlaneCost, RasterisePlanes},
         smooth::{Along, Smooth},
-        speckle,
-        speckle::{Blanked, Scratch},
+        speckle::{Blanked, RemoveSpeckles, Scratch},
         support,
         support::{MatchRows, NO_MATCH, SupportMatching},
     },
@@ -120,8 +119,8 @@ impl StereoMatcher<'_> {
         }
     }
 
-    pub(super) fn remove_speckles(&mut self, config: &StereoConfig, report: &mut StereoReport) {
-        report.speckles = self.remove_segments(config, config.speckle_size).measured;
+    pub(super) fn remove_speckles<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+        report.speckles = self.remove_segments(config, config.speckle_size, executor).measured;
         let lone_size = (config.lone_share * (self.width * self.height) as f32) as u32;
         if lone_size > 1 {
             let filling = Filling {
@@ -129,39 +128,44 @@ impl StereoMatcher<'_> {
                 discontinuity: working(config.speckle_similarity) as u16 + 1,
                 ends: GapEnds::Surface,
             };
-            report.filled = self.fill(filling);
-            let blanked = self.remove_segments(config, lone_size);
+            report.filled = self.fill(filling, executor);
+            let blanked = self.remove_segments(config, lone_size, executor);
             report.speckles += blanked.measured;
             report.filled -= blanked.filled;
         }
     }
 
-    pub(super) fn fill_gaps(&mut self, config: &StereoConfig, report: &mut StereoReport) {
-        report.filled += self.fill(Filling {
+    pub(super) fn fill_gaps<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+        let filling = Filling {
             width: config.gap_width,
             discontinuity: working(config.gap_discontinuity) as u16,
             ends: config.gap_ends,
-        });
+        };
+        report.filled += self.fill(filling, executor);
     }
 
     /// Removes segments of fewer than `smallest` pixels.
-    fn remove_segments(&mut self, config: &StereoConfig, smallest: u32) -> Blanked {
-        let similarity = working(config.speckle_similarity);
-        let image = image_of(self.disparity, self.width * self.height);
+    fn remove_segments<E: Executor>(&mut self, config: &StereoConfig, smallest: u32, executor: &E) -> Blanked {
         let scratch = Scratch {
             runs: bytemuck::cast_slice_mut(self.gradients),
             ends: bytemuck::cast_slice_mut(self.other),
             flags: bytemuck::cast_slice_mut(self.columns),
         };
-        speckle::remove_speckles(image, self.width, similarity, smallest, scratch)
+        let disparity = image_of(self.disparity, self.width * self.height);
+        let similarity = working(config.speckle_similarity);
+        executor.vectors().run(RemoveSpeckles { disparity, width: self.width, similarity, smallest, scratch })
     }
 
     /// Fills gaps along rows, then along columns; returns the pixels filled.
-    fn fill(&mut self, filling: Filling) -> u32 {
-        let image = image_of(self.disparity, self.width * self.height);
-        let (flags, last_row) = bytemuck::cast_slice_mut::<u32, u16>(self.columns).split_at_mut_checked(self.width).unwrap_or_default();
-        let flags: &mut [u8] = bytemuck::cast_slice_mut(flags);
-        gaps::fill_rows(image, self.width, filling, flags) + gaps::fill_columns(image, self.width, filling, last_row, flags)
+    fn fill<E: Executor>(&mut self, filling: Filling, executor: &E) -> u32 {
+        let (width, vectors) = (self.width, executor.vectors());
+        let image = image_of(self.disparity, width * self.height);
+        let edges = Bands::of(BANDS).split_mut(bytemuck::cast_slice_mut(self.columns), width);
+        let bands = zip2(Bands::of(self.height).split_mut(image, width), edges);
+        let along_rows = each(executor, bands, |(rows, edges)| vectors.run(FillRows { rows, width, filling, edges }));
+        let (ends, last_row) = bytemuck::cast_slice_mut::<u32, u16>(self.columns).split_at_mut_checked(width).unwrap_or_default();
+        let ends = bytemuck::cast_slice_mut(ends);
+        along_rows.iter().sum::<u32>() + vectors.run(FillColumns { image, width, filling, last_row, ends })
     }
 
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
