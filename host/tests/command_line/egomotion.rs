@@ -9,7 +9,7 @@ use tempfile::TempDir;
 fn the_depth_tracker_tracks_a_slow_camera_and_reports_tracking_failures() {
     let root = TempDir::new().unwrap();
     let street =
-        ["--set", "street.width=640", "--set", "street.height=192", "--set", "street.frames=5", "--set", "street.traffic.mode=none"];
+        ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=5", "--set", "street.traffic.mode=none"];
     let run = |speed: &str, more: &[&str]| {
         let speed = format!("street.speed_m_s={speed}");
         let args =
@@ -23,11 +23,12 @@ fn the_depth_tracker_tracks_a_slow_camera_and_reports_tracking_failures() {
         let motions = csv.lines().skip(1).map(|line| line.split(',').nth(at).unwrap().to_owned()).collect::<Vec<_>>();
         (summary["egomotion"].clone(), motions, String::from_utf8_lossy(&run.stdout).into_owned(), read("report.html"))
     };
-    let (slow, motions, ..) = run("0.4", &["--quiet"]);
+    // Disparities that are smoothed twice make the tracker less accurate (decision 43).
+    let (slow, motions, ..) = run("0.4", &["--quiet", "--set", "stereo.adaptive_mean=1"]);
     assert_eq!((&slow["source"], &slow["status"], &slow["tracking_failures"]), (&"icp".into(), &"ok".into(), &0.into()));
     assert_eq!(motions, ["first", "tracked", "tracked", "tracked", "tracked"]);
-    assert!(slow["ate_m"].as_f64().unwrap() < 0.02, "{slow}");
-    let (fast, motions, printed, report) = run("14", &[]);
+    assert!(slow["ate_m"].as_f64().unwrap() < 0.05, "{slow}");
+    let (fast, motions, printed, report) = run("9", &[]);
     assert_eq!(fast["status"], "tracking failure");
     assert_eq!(fast["tracking_failures"], motions.iter().filter(|motion| motion.starts_with("tracking_failure_")).count());
     assert_eq!(fast["first_failure"], motions.iter().position(|motion| motion.starts_with("tracking_failure_")).unwrap());
