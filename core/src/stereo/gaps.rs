@@ -40,7 +40,7 @@ impl Filling {
     }
 }
 
-/// Fills the gaps of each row, whose ends are `width` apart; `edges` has a byte a column. Returns the pixels filled.
+/// Fills the gaps of each of the rows, `width` pixels each; `edges` has a byte a column. Returns the pixels filled.
 pub(super) struct FillRows<'a> {
     pub rows: &'a mut [i16],
     pub width: usize,
