@@ -8,6 +8,7 @@ use super::{MIN_HEIGHT, MIN_WIDTH};
 use crate::memory::Capacity;
 use crate::objects::MAX_OBJECTS;
 use crate::planning::MAX_SIDE_CELLS;
+use crate::scene_flow::FEATURES_MAX;
 use crate::tracking::MAX_DETECTIONS;
 use core::fmt;
 
@@ -109,7 +110,7 @@ const SHORT_HISTORY_FRAMES: usize = 64;
 impl Capacity {
     /// The largest capacity of at most `bytes` for images of `width` x `height` px: `capacity.bytes() <= bytes`, always.
     ///
-    /// One pixel in 16 may be a feature and one in 40 a match; masks may cover 8 images of pixels; 64 detections and tracks. The
+    /// One pixel in 16 may be a feature and one in 40 a match, at most 16,000 of either; masks may cover 8 images of pixels; 64 detections and tracks. The
     /// pruning window is 200 frames where `bytes` is 96 MiB or more, else 64. Objects and blocks share the rest as the module says.
     ///
     /// ```
@@ -228,8 +229,9 @@ impl<'o> Question<'o> {
             image_height: self.height,
             raw_width,
             raw_height,
-            features: (pixels / 16).max(2_000),
-            matches: (pixels / 40).max(1_000),
+            features: (pixels / 16).clamp(2_000, FEATURES_MAX),
+            // A match begins with a feature.
+            matches: (pixels / 40).clamp(1_000, FEATURES_MAX),
             blocks: 0,
             visible_blocks: 0,
             history_frames: if self.bytes >= 96 << 20 { 200 } else { SHORT_HISTORY_FRAMES },
@@ -299,7 +301,7 @@ impl<'o> Question<'o> {
     fn too_many_blocks(&self, capacity: &Capacity) -> usize {
         // A block has at least 512 voxels of 3 bytes.
         let block_bytes = 512 * if capacity.colour { 6 } else { 3 };
-        let most = self.bytes.saturating_sub(capacity.bytes()) / block_bytes;
+        let most = self.bytes.saturating_sub(self.with_blocks(capacity, 0).bytes()) / block_bytes;
         if most < MAX_COUNT { most + 1 } else { MAX_COUNT + 1 }
     }
 

@@ -165,7 +165,7 @@ section!(stereo: StereoConfig {
     adaptive_mean, median,
 });
 section!(scene_flow: SceneFlowConfig {
-    response_min, search_radius_px, stereo_tolerance_px, disparity_tolerance_px, flow_tolerance_px, support_min, refine, bucket_px,
+    response_min, features_max, search_radius_px, stereo_tolerance_px, disparity_tolerance_px, flow_tolerance_px, support_min, refine, bucket_px,
     bucket_matches,
 });
 section!(egomotion: EgomotionConfig {

@@ -18,7 +18,7 @@ pub struct Capacity {
     pub raw_width: usize,
     /// Highest raw image, px; as the width.
     pub raw_height: usize,
-    /// Features kept per image and pass. Further ones are dropped in scan order and counted.
+    /// Features kept per image and pass: the strongest. Further ones are dropped and counted.
     pub features: usize,
     /// Matches kept per pass. Further ones are dropped and counted.
     pub matches: usize,
@@ -106,7 +106,7 @@ impl Capacity {
         image_height: 384,
         raw_width: 0,
         raw_height: 0,
-        features: 24_000,
+        features: 16_000,
         matches: 10_000,
         blocks: 53_000,
         visible_blocks: 24_000,
@@ -129,8 +129,8 @@ impl Capacity {
         image_height: 1_088,
         raw_width: 0,
         raw_height: 0,
-        features: 32_000,
-        matches: 20_000,
+        features: 16_000,
+        matches: 10_000,
         blocks: 550_000,
         visible_blocks: 60_000,
         history_frames: 200,

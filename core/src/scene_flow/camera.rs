@@ -1,8 +1,10 @@
 //! What is kept of one camera: two frames, the previous and the current one, swapped by index.
 
 use super::{
+    SceneFlowConfig,
     features::{Features, table},
     filter::{COLUMN_SUMS, Responses, filter},
+    strongest::{Strongest, counts},
     suppression::{Candidate, Field, SCRATCH_ROWS, suppress},
 };
 use crate::{
@@ -22,7 +24,7 @@ pub struct FeatureCount {
     pub dense: u32,
     /// Features of the sparse pass kept.
     pub sparse: u32,
-    /// Features found beyond `capacity.features` (dense) or a quarter of it (sparse), and dropped.
+    /// Features wanted beyond `capacity.features` (dense) or a quarter of it (sparse), and dropped.
     pub dropped: u32,
 }
 
@@ -45,6 +47,7 @@ pub(super) struct Camera<'s> {
     corner: &'s mut [i16],
     sums: &'s mut [i16],
     candidates: &'s mut [Candidate],
+    last: &'s mut [u32],
 }
 
 /// Names of one camera's regions.
@@ -58,6 +61,7 @@ pub(super) struct Names {
     pub corner: &'static str,
     pub sums: &'static str,
     pub candidate: &'static str,
+    pub last: &'static str,
 }
 
 /// Rows that the filters work on, and then suppression.
@@ -85,6 +89,7 @@ impl<'s> Camera<'s> {
             + 2 * region_bytes::<i16>(pixels)
             + region_bytes::<i16>(WORKING_ROWS * capacity.image_width)
             + region_bytes::<Candidate>(capacity.features)
+            + region_bytes::<u32>(counts(capacity))
     }
 
     pub(super) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Self {
@@ -108,6 +113,7 @@ impl<'s> Camera<'s> {
             corner: carver.alloc(names.corner, pixels),
             sums: carver.alloc(names.sums, WORKING_ROWS * capacity.image_width),
             candidates: carver.alloc(names.candidate, capacity.features),
+            last: carver.alloc(names.last, counts(capacity)),
         }
     }
 
@@ -122,7 +128,7 @@ impl<'s> Camera<'s> {
         &mut self,
         image: View<'_, u8>,
         invalid: Option<&InvalidPixels<'_>>,
-        response_min: i16,
+        config: &SceneFlowConfig,
         vectors: Vectors,
     ) -> FeatureCount {
         self.current = !self.current;
@@ -132,7 +138,7 @@ impl<'s> Camera<'s> {
         for (copied, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
             copied.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
         }
-        self.describe([width, height], invalid, response_min, vectors)
+        self.describe([width, height], invalid, config, vectors)
     }
 
     /// Makes the previous frame the current one again: the next image overwrites the last one.
@@ -149,7 +155,16 @@ impl<'s> Camera<'s> {
     /// Visits the pixels of the current frame; [`Camera::describe`] finds the rest. The frame before is not
     /// looked at again.
     pub(super) fn visit(&mut self, [width, height]: [usize; 2], visitor: &mut impl Visitor) {
-        let Self { frames: [a, b], current, gradient: _, blob: _, corner: _, sums: _, candidates: _ } = self;
+        let Self {
+            frames: [a, b],
+            current,
+            gradient: _,
+            blob: _,
+            corner: _,
+            sums: _,
+            candidates: _,
+            last: _,
+        } = self;
         let Frame { pixels, dense: _, sparse: _ } = if *current { b } else { a };
         pixels.chunks_mut(width.max(1)).take(height).for_each(|row| visitor.bytes(row));
     }
@@ -159,10 +174,10 @@ impl<'s> Camera<'s> {
         &mut self,
         size: [usize; 2],
         invalid: Option<&InvalidPixels<'_>>,
-        response_min: i16,
+        config: &SceneFlowConfig,
         vectors: Vectors,
     ) -> FeatureCount {
-        vectors.run(FindFeatures { camera: self, size, invalid, response_min })
+        vectors.run(FindFeatures { camera: self, size, invalid, config })
     }
 }
 
@@ -171,7 +186,7 @@ struct FindFeatures<'a, 's> {
     camera: &'a mut Camera<'s>,
     size: [usize; 2],
     invalid: Option<&'a InvalidPixels<'a>>,
-    response_min: i16,
+    config: &'a SceneFlowConfig,
 }
 
 impl Work for FindFeatures<'_, '_> {
@@ -179,7 +194,7 @@ impl Work for FindFeatures<'_, '_> {
 
     #[inline(always)]
     fn run(self) -> FeatureCount {
-        let Self { camera, size: [width, height], invalid, response_min } = self;
+        let Self { camera, size: [width, height], invalid, config } = self;
         let [a, b] = &mut camera.frames;
         let frame = if camera.current { b } else { a };
         let pixels = width * height;
@@ -196,16 +211,13 @@ impl Work for FindFeatures<'_, '_> {
             silence(invalid, width, blob);
             silence(invalid, width, corner);
         }
-        let mut found = 0;
-        let mut slots = camera.candidates.iter_mut();
-        suppress(Field { response: blob, width }, Field { response: corner, width }, response_min, camera.sums, |candidate| {
-            found += 1;
-            if let Some(slot) = slots.next() {
-                *slot = candidate;
-            }
-        });
-        let candidates = camera.candidates.iter().take(found).copied();
-        let mut dropped = found.saturating_sub(camera.candidates.len());
+        let wanted = config.features_max as usize;
+        let mut strongest = Strongest::new(camera.candidates, camera.last, [width, height], wanted);
+        let response_min = config.response_min.min(i16::MAX as u16) as i16;
+        let (blob, corner) = (Field { response: blob, width }, Field { response: corner, width });
+        suppress(blob, corner, response_min, camera.sums, |candidate| strongest.add(candidate));
+        let (mut dropped, kept) = strongest.finish();
+        let candidates = kept.iter().copied();
         dropped += frame.dense.fill(candidates.clone(), gradient, width, height);
         dropped += frame.sparse.fill(candidates.filter(|candidate| candidate.sparse == 1), gradient, width, height);
         FeatureCount {

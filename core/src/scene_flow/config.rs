@@ -2,12 +2,18 @@
 
 use crate::problem::{Problems, require};
 
-/// Settings of the scene flow. Defaults are DynSLAM's, with sub-pixel refinement.
+/// Most features of an image by default: as many as the presets of [`crate::Capacity`] have memory for.
+pub(crate) const FEATURES_MAX: usize = 16_000;
+
+/// Settings of the scene flow. Defaults are DynSLAM's, with sub-pixel refinement and no more features than motion gains by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct SceneFlowConfig {
     /// Smallest filter response of a feature, grey levels times filter weights; 1..=2000. DynSLAM: 50, which finds a third more features and no better motion.
     pub response_min: u16,
+    /// Most features of an image, 100..=1,000,000; of more the strongest are used, and no more than the capacity holds. 16,000
+    /// (docs/decisions/0048-the-strongest-of-each-cell.md); DynSLAM: all.
+    pub features_max: u32,
     /// Farthest a feature moves between two frames or two cameras, px in each direction; 16..=500. DynSLAM: 200.
     pub search_radius_px: u16,
     /// Rows two stereo partners may differ by; 0..=8. DynSLAM: 2.
@@ -30,6 +36,7 @@ impl Default for SceneFlowConfig {
     fn default() -> Self {
         Self {
             response_min: 100,
+            features_max: FEATURES_MAX as u32,
             search_radius_px: 200,
             stereo_tolerance_px: 2,
             disparity_tolerance_px: 5.0,
@@ -47,6 +54,7 @@ impl SceneFlowConfig {
     pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         require(problems, (1..=2000).contains(&self.response_min), "scene_flow.response_min", "must be in 1..=2000");
+        require(problems, (100..=1_000_000).contains(&self.features_max), "scene_flow.features_max", "must be in 100..=1000000");
         require(problems, (16..=500).contains(&self.search_radius_px), "scene_flow.search_radius_px", "must be in 16..=500");
         require(problems, self.stereo_tolerance_px <= 8, "scene_flow.stereo_tolerance_px", "must be in 0..=8");
         require(problems, positive(self.disparity_tolerance_px), "scene_flow.disparity_tolerance_px", "must be above 0");

@@ -62,6 +62,7 @@ const LEFT: Names = Names {
     corner: "scene_flow.left.corner",
     sums: "scene_flow.left.sums",
     candidate: "scene_flow.left.candidate",
+    last: "scene_flow.left.last",
 };
 
 const RIGHT: Names = Names {
@@ -74,12 +75,8 @@ const RIGHT: Names = Names {
     corner: "scene_flow.right.corner",
     sums: "scene_flow.right.sums",
     candidate: "scene_flow.right.candidate",
+    last: "scene_flow.right.last",
 };
-
-/// Least response of a feature, as responses are stored.
-fn response_min(config: &SceneFlowConfig) -> i16 {
-    config.response_min.min(i16::MAX as u16) as i16
-}
 
 /// Sparse matches stored.
 const fn sparse_matches(capacity: &Capacity) -> usize {
@@ -240,8 +237,8 @@ impl<'s> FlowMatcher<'s> {
     pub(crate) fn rebuild(&mut self, config: &SceneFlowConfig, invalid: Option<&InvalidPair<'_>>) {
         if let Some([width, height]) = self.last {
             let vectors = Vectors::BASELINE;
-            self.left.describe([width, height], invalid.map(|pair| &pair.left), response_min(config), vectors);
-            self.right.describe([width, height], invalid.map(|pair| &pair.right), response_min(config), vectors);
+            self.left.describe([width, height], invalid.map(|pair| &pair.left), config, vectors);
+            self.right.describe([width, height], invalid.map(|pair| &pair.right), config, vectors);
         }
     }
 
@@ -271,13 +268,10 @@ impl<'s> FlowMatcher<'s> {
             self.last = None;
             return FlowReport { status: FlowStatus::Refused, ..FlowReport::default() };
         }
-        let response_min = response_min(config);
         let [invalid_left, invalid_right] = [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
         let vectors = executor.vectors();
-        let (left, right) = executor.join(
-            || self.left.take(left, invalid_left, response_min, vectors),
-            || self.right.take(right, invalid_right, response_min, vectors),
-        );
+        let (left, right) = executor
+            .join(|| self.left.take(left, invalid_left, config, vectors), || self.right.take(right, invalid_right, config, vectors));
         let mut report = FlowReport { left, right, ..FlowReport::default() };
         if self.last.replace(size) != Some(size) {
             return FlowReport { status: FlowStatus::First, ..report };

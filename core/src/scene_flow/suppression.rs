@@ -31,10 +31,14 @@ pub(super) struct Candidate {
     pub u: u16,
     /// Row, px.
     pub v: u16,
+    /// Magnitude of the filter's response.
+    pub response: u16,
     /// 0..[`CLASSES`].
     pub class: u8,
     /// 1 when it is a peak within [`SPARSE_RADIUS`] as well.
     pub sparse: u8,
+    /// Where the one before it of its class and cell is held.
+    pub next: u32,
 }
 
 /// A filter's responses.
@@ -192,7 +196,14 @@ impl<const SIGN: i16> Block<'_, SIGN> {
         let about = Surroundings::of(u, width);
         let beaten = about.any(self.strongest, row, |x| x * SIGN > SIGN * response)?;
         let sparse = !beaten && is_peak::<SIGN>(self.field, u, v, SIGN * response);
-        Some(Candidate { u: u as u16, v: v as u16, class: 0, sparse: u8::from(sparse) })
+        Some(Candidate {
+            u: u as u16,
+            v: v as u16,
+            response: response.unsigned_abs(),
+            class: 0,
+            sparse: u8::from(sparse),
+            next: 0,
+        })
     }
 }
 

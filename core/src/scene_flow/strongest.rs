@@ -1,0 +1,161 @@
+//! The strongest features of every part of an image.
+//!
+//! An image has as many features as it has texture, and the time of matching grows with their square. Where cells have more than
+//! their share the weakest go, class by class: chosen over the whole image the strongest stand in trees and on walls, and it is those on
+//! the road that tell best how far the camera moved.
+//!
+//! Time: a look at each feature, and at those of its cell. Memory: 12 bytes for each that is kept, and 4 bytes for each class of a cell.
+
+use super::suppression::{CLASSES, Candidate};
+use crate::memory::Capacity;
+
+/// Side of the smallest cells, px: two to the power of this.
+const CELL_SHIFT: u32 = 5;
+/// Side of the largest, as wide as the largest image.
+const CELL_SHIFT_MAX: u32 = 13;
+/// Features a cell may have of a class, at least: where there are fewer to give, cells are larger.
+const QUOTA_MIN: usize = 4;
+
+/// Cells of an image, and of a row of them.
+const fn cells(width: usize, height: usize, shift: u32) -> [usize; 2] {
+    let columns = width.div_ceil(1 << shift);
+    [columns * height.div_ceil(1 << shift), columns]
+}
+
+/// Classes of all cells of the largest image.
+pub(super) const fn counts(capacity: &Capacity) -> usize {
+    CLASSES * cells(capacity.image_width, capacity.image_height, CELL_SHIFT)[0]
+}
+
+/// No further feature of a cell.
+const END: u32 = u32::MAX;
+
+/// The strongest so far.
+pub(super) struct Strongest<'a> {
+    slots: &'a mut [Candidate],
+    len: usize,
+    /// For each class of each cell where its last feature is.
+    last: &'a mut [u32],
+    /// How many of a class a cell may keep.
+    quota: usize,
+    columns: usize,
+    shift: u32,
+    dropped: usize,
+}
+
+impl<'a> Strongest<'a> {
+    /// None yet, of an image of that size. At most `wanted` will be kept, and as many as there are slots; `last` has [`counts`] entries.
+    pub(super) fn new(slots: &'a mut [Candidate], last: &'a mut [u32], [width, height]: [usize; 2], wanted: usize) -> Self {
+        let is_enough = |shift: &u32| CLASSES * QUOTA_MIN * cells(width, height, *shift)[0] <= wanted;
+        let shift = (CELL_SHIFT..CELL_SHIFT_MAX).find(is_enough).unwrap_or(CELL_SHIFT_MAX);
+        let [cells, columns] = cells(width, height, shift);
+        last.fill(END);
+        let quota = wanted.checked_div(CLASSES * cells).unwrap_or_default();
+        Self { slots, len: 0, last, quota, columns, shift, dropped: 0 }
+    }
+
+    /// Takes in the next one. It is kept while fewer of its class and cell than may be are as strong.
+    #[inline(always)]
+    pub(super) fn add(&mut self, candidate: Candidate) {
+        let cell = usize::from(candidate.v >> self.shift) * self.columns + usize::from(candidate.u >> self.shift);
+        let Some(last) = self.last.get_mut(cell * CLASSES + usize::from(candidate.class)) else { return };
+        let (mut at, mut weakest, mut least) = (*last, END, u16::MAX);
+        for _ in 0..self.quota {
+            let Some(held) = self.slots.get(at as usize) else {
+                match self.slots.get_mut(self.len) {
+                    Some(free) => *free = Candidate { next: *last, ..candidate },
+                    None => return self.dropped += 1,
+                }
+                *last = self.len as u32;
+                self.len += 1;
+                return;
+            };
+            if held.response < least {
+                (weakest, least) = (at, held.response);
+            }
+            at = held.next;
+        }
+        if let Some(held) = self.slots.get_mut(weakest as usize)
+            && least < candidate.response
+        {
+            *held = Candidate { next: held.next, ..candidate };
+        }
+    }
+
+    /// How many of those to be kept found no slot, and the others.
+    pub(super) fn finish(self) -> (usize, &'a [Candidate]) {
+        let Self { slots, len, dropped, .. } = self;
+        (dropped, slots.get(..len).unwrap_or_default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::{vec, vec::Vec};
+
+    const SIZE: [usize; 2] = [150, 70];
+
+    /// What is kept, in order of position, and how many found no slot.
+    fn keep(found: &[Candidate], slots: usize, wanted: usize) -> (Vec<Candidate>, usize) {
+        let (mut slots, mut last) = (vec![Candidate::default(); slots], [7; CLASSES * 5 * 3]);
+        let mut strongest = Strongest::new(&mut slots, &mut last, SIZE, wanted);
+        found.iter().for_each(|candidate| strongest.add(*candidate));
+        let (dropped, kept) = strongest.finish();
+        (sorted(kept.iter().map(|held| Candidate { next: 0, ..*held }).collect()), dropped)
+    }
+
+    fn sorted(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+        candidates.sort_by_key(|c| (c.v, c.u, c.class));
+        candidates
+    }
+
+    /// One for each pixel and class, strong in the upper half.
+    fn scatter(random: &mut Random, responses: u32) -> Vec<Candidate> {
+        let pixels = (0..SIZE[1] as u16).flat_map(|v| (0..SIZE[0] as u16).map(move |u| (u, v)));
+        pixels
+            .map(|(u, v)| Candidate {
+                u,
+                v,
+                response: random.below(responses) as u16 + if v < 35 { 900 } else { 0 },
+                class: random.below(4) as u8,
+                ..Candidate::default()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_cell_and_class_keeps_its_strongest() {
+        let mut random = Random::new(7);
+        for responses in [3, 800] {
+            let found = scatter(&mut random, responses);
+            // 5 x 3 cells of 32 px.
+            let (kept, dropped) = keep(&found, 400, 300);
+            assert_eq!((kept.len(), dropped), (300, 0));
+            for key in 0..CLASSES as u16 * 15 {
+                let of = |from: &[Candidate]| {
+                    let own = from.iter().filter(|c| (c.v / 32 * 5 + c.u / 32) * 4 + u16::from(c.class) == key);
+                    let mut responses: Vec<u16> = own.map(|c| c.response).collect();
+                    responses.sort_by_key(|response| core::cmp::Reverse(*response));
+                    responses
+                };
+                assert_eq!(of(&kept), of(&found)[..5]);
+            }
+            assert!(kept.iter().all(|c| found.contains(c)));
+        }
+    }
+
+    #[test]
+    fn cells_grow_where_few_are_wanted_and_what_finds_no_slot_is_counted() {
+        let found = scatter(&mut Random::new(8), 800);
+        // Of 32 px they would have three for each class; of 64 px there are six cells, of 128 px two.
+        let kept_of = |wanted| keep(&found, 1_000, wanted).0.len();
+        assert_eq!([240, 239, 96, 95, 32].map(kept_of), [240, 216, 96, 88, 32]);
+        assert_eq!([31, 4, 3, 0].map(kept_of), [28, 4, 0, 0]);
+        assert_eq!(keep(&found, found.len(), usize::MAX), (found.clone(), 0));
+        let (first, dropped) = keep(&found, 70, usize::MAX);
+        assert_eq!((&first[..], dropped), (&found[..70], found.len() - 70));
+        assert_eq!(keep(&[], 100, 100), (Vec::new(), 0));
+    }
+}
