@@ -47,12 +47,13 @@ fn rasterise_planes(RasterisePlanes { mesh, slope_max, first, width, out }: Rast
     // A slope of 1000 fits.
     let slope_max = (slope_max * ONE as f32) as i64;
     for mut corners in mesh.triangles() {
-        corners.sort_unstable_by_key(|point| (point.v, point.u));
-        let [top, middle, bottom] = corners;
-        let (from, to) = (usize::from(top.v).max(first), (usize::from(bottom.v) + 1).min(first + rows));
+        let [a, b, c] = corners.map(|point| usize::from(point.v));
+        let (from, to) = (a.min(b).min(c).max(first), (a.max(b).max(c) + 1).min(first + rows));
         if from >= to {
             continue;
         }
+        corners.sort_unstable_by_key(|point| (point.v, point.u));
+        let [top, middle, bottom] = corners;
         let Some(plane) = Plane::through(corners) else { continue };
         let mark = if plane.slope_u.abs() > slope_max || plane.slope_v.abs() > slope_max { STEEP } else { 0 };
         let (long, upper, lower) = (Edge::new(top, bottom), Edge::new(top, middle), Edge::new(middle, bottom));
