@@ -25,7 +25,7 @@ pub enum GapEnds {
 }
 
 /// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving, [`StereoConfig::dynslam`] DynSLAM's, which fills wider
-/// gaps; [`Default`] trusts the images more and the planes between support points less (docs/decisions/0042-less-trust-in-planes.md), fills
+/// gaps; [`Default`] trusts the images more and the planes between support points less (docs/decisions/0049-still-less-trust-in-planes.md), fills
 /// gaps only within a surface, wide ones too (docs/decisions/0028-gaps-within-a-surface.md), and asks less of a support match.
 ///
 /// ```
@@ -53,19 +53,19 @@ pub struct StereoConfig {
     pub plausible_threshold: u16,
     /// Least number of support points in the window, itself included. Published: 5.
     pub plausible_min: u16,
-    /// A support point between two alike ones at most so many candidates away, on a row or a column, is redundant; 0 keeps all. Published: 5.
+    /// A support point between two alike ones at most so many candidates away, on a row or a column, is redundant; 0 keeps all. 8; published: 5.
     pub redundant_distance: usize,
     /// Alike is what differs by at most this, px. Published: 1.
     pub redundant_threshold: u16,
-    /// Side of a cell of the grid prior, px, 10..=256. Published: 20.
+    /// Side of a cell of the grid prior, px, 10..=256. 16, two vectors; published: 20.
     pub grid_size: usize,
     /// Weight of the descriptor distance against the prior (beta), above 0. Published: 0.02.
     pub beta: f32,
-    /// Uniform share of the prior (gamma), above 0: the larger, the less a disparity far from the plane costs. 6; published: 3.
+    /// Uniform share of the prior (gamma), above 0: the larger, the less a disparity far from the plane costs. 10; published: 3.
     pub gamma: f32,
     /// Standard deviation of disparities about the prior plane (sigma), px, above 0. Published: 1.
     pub sigma: f32,
-    /// Disparities searched to each side of the prior plane, in sigmas, 0..=16. Published: 2.
+    /// Disparities searched to each side of the prior plane, in sigmas, 0..=16. 1; published: 2.
     pub plane_radius_sigmas: f32,
     /// A triangle steeper than this bridges two surfaces: its plane is searched but not preferred. Disparity per px,
     /// 0..=1000. Own choice: 0.7; without a limit 4.8 instead of 4.5 % are off on KITTI 2012.
@@ -84,7 +84,7 @@ pub struct StereoConfig {
     /// Lone segments smaller than this share of the image are removed as well: no pixel of another one that is as similar is within `lone_gap`
     /// px along a row or column. 0..=1; 0 keeps all. 0.002 (docs/decisions/0043-lone-segments.md); published: 0.
     pub lone_share: f32,
-    /// Widest gap to the next segment of the same surface, px: a segment with wider ones is lone. No more than `gap_width` counts. 32.
+    /// Widest gap to the next segment of the same surface, px: a segment with wider ones is lone. No more than `gap_width` counts. 70.
     pub lone_gap: usize,
     /// Widest gap filled along rows and columns, px; 0 fills none. 70; published: 3; DynSLAM: 21.
     pub gap_width: usize,
@@ -124,7 +124,7 @@ impl StereoConfig {
             speckle_similarity: 1,
             speckle_size: 200,
             lone_share: 0.0,
-            lone_gap: 32,
+            lone_gap: 70,
             gap_width: 3,
             gap_discontinuity: 3,
             gap_ends: GapEnds::Farther,
@@ -170,7 +170,10 @@ impl Default for StereoConfig {
     fn default() -> Self {
         Self {
             support_ratio: 0.9,
-            gamma: 6.0,
+            redundant_distance: 8,
+            grid_size: 16,
+            gamma: 10.0,
+            plane_radius_sigmas: 1.0,
             consistency_threshold: 1,
             lone_share: 0.002,
             gap_width: 70,
