@@ -46,8 +46,10 @@ pub(super) struct Strongest<'a> {
 impl<'a> Strongest<'a> {
     /// None yet, of an image of that size. At most `wanted` will be kept, and as many as there are slots; `last` has [`counts`] entries.
     pub(super) fn new(slots: &'a mut [Candidate], last: &'a mut [u32], [width, height]: [usize; 2], wanted: usize) -> Self {
-        let is_enough = |shift: &u32| CLASSES * QUOTA_MIN * cells(width, height, *shift)[0] <= wanted;
-        let shift = (CELL_SHIFT..CELL_SHIFT_MAX).find(is_enough).unwrap_or(CELL_SHIFT_MAX);
+        let mut shift = CELL_SHIFT;
+        while shift < CELL_SHIFT_MAX && CLASSES * QUOTA_MIN * cells(width, height, shift)[0] > wanted {
+            shift += 1;
+        }
         let [cells, columns] = cells(width, height, shift);
         last.fill(END);
         let quota = wanted.checked_div(CLASSES * cells).unwrap_or_default();

@@ -15,7 +15,7 @@ struct Target {
 }
 
 /// Upper bounds: the script fails where its program takes more.
-const TARGETS: [Target; 1] = [Target { name: "cortex-m7", code_bytes: 776 << 10, stack_bytes: 32 << 10 }];
+const TARGETS: [Target; 1] = [Target { name: "cortex-m7", code_bytes: 780 << 10, stack_bytes: 32 << 10 }];
 
 /// Prints, for each capacity and target, what a program takes in all.
 pub fn show(capacities: &[(String, Capacity)], as_json: bool) -> anyhow::Result<()> {
