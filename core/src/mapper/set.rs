@@ -165,8 +165,8 @@ section!(stereo: StereoConfig {
     adaptive_mean, median,
 });
 section!(scene_flow: SceneFlowConfig {
-    response_min, features_max, search_radius_px, stereo_tolerance_px, disparity_tolerance_px, flow_tolerance_px, support_min, refine, bucket_px,
-    bucket_matches,
+    response_min, features_max, search_radius_px, stereo_tolerance_px, disparity_tolerance_px, flow_tolerance_px, support_min, refine,
+    bucket_px, bucket_matches,
 });
 section!(egomotion: EgomotionConfig {
     samples, confidence, inlier_px, refined_inlier_px, matches_min, inlier_share_min, acceleration_max_m_s2, inlier_share_strong,

@@ -4,8 +4,8 @@ use super::{
     SceneFlowConfig,
     features::{Features, table},
     filter::{COLUMN_SUMS, Responses, filter},
-    strongest::{Strongest, counts},
-    suppression::{Candidate, Field, SCRATCH_ROWS, suppress},
+    strongest::{Held, Strongest, lists},
+    suppression::{Field, SCRATCH_ROWS, suppress},
 };
 use crate::{
     image::{InvalidPixels, View},
@@ -46,8 +46,8 @@ pub(super) struct Camera<'s> {
     blob: &'s mut [i16],
     corner: &'s mut [i16],
     sums: &'s mut [i16],
-    candidates: &'s mut [Candidate],
-    last: &'s mut [u32],
+    candidates: &'s mut [Held],
+    lists: &'s mut [u32],
 }
 
 /// Names of one camera's regions.
@@ -61,7 +61,7 @@ pub(super) struct Names {
     pub corner: &'static str,
     pub sums: &'static str,
     pub candidate: &'static str,
-    pub last: &'static str,
+    pub list: &'static str,
 }
 
 /// Rows that the filters work on, and then suppression.
@@ -88,8 +88,8 @@ impl<'s> Camera<'s> {
             + region_bytes::<u16>(pixels)
             + 2 * region_bytes::<i16>(pixels)
             + region_bytes::<i16>(WORKING_ROWS * capacity.image_width)
-            + region_bytes::<Candidate>(capacity.features)
-            + region_bytes::<u32>(counts(capacity))
+            + region_bytes::<Held>(capacity.features)
+            + region_bytes::<u32>(lists(capacity))
     }
 
     pub(super) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Self {
@@ -113,7 +113,7 @@ impl<'s> Camera<'s> {
             corner: carver.alloc(names.corner, pixels),
             sums: carver.alloc(names.sums, WORKING_ROWS * capacity.image_width),
             candidates: carver.alloc(names.candidate, capacity.features),
-            last: carver.alloc(names.last, counts(capacity)),
+            lists: carver.alloc(names.list, lists(capacity)),
         }
     }
 
@@ -163,7 +163,7 @@ impl<'s> Camera<'s> {
             corner: _,
             sums: _,
             candidates: _,
-            last: _,
+            lists: _,
         } = self;
         let Frame { pixels, dense: _, sparse: _ } = if *current { b } else { a };
         pixels.chunks_mut(width.max(1)).take(height).for_each(|row| visitor.bytes(row));
@@ -212,12 +212,12 @@ impl Work for FindFeatures<'_, '_> {
             silence(invalid, width, corner);
         }
         let wanted = config.features_max as usize;
-        let mut strongest = Strongest::new(camera.candidates, camera.last, [width, height], wanted);
+        let mut strongest = Strongest::new(camera.candidates, camera.lists, [width, height], wanted);
         let response_min = config.response_min.min(i16::MAX as u16) as i16;
         let (blob, corner) = (Field { response: blob, width }, Field { response: corner, width });
         suppress(blob, corner, response_min, camera.sums, |candidate| strongest.add(candidate));
         let (mut dropped, kept) = strongest.finish();
-        let candidates = kept.iter().copied();
+        let candidates = kept.iter().map(|held| held.candidate);
         dropped += frame.dense.fill(candidates.clone(), gradient, width, height);
         dropped += frame.sparse.fill(candidates.filter(|candidate| candidate.sparse == 1), gradient, width, height);
         FeatureCount {

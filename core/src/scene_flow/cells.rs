@@ -24,9 +24,14 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    pub(super) fn new(width: usize, height: usize, cell_px: usize) -> Self {
-        let cell_px = cell_px.max(1);
+    pub(super) const fn new(width: usize, height: usize, cell_px: usize) -> Self {
+        let cell_px = if cell_px > 0 { cell_px } else { 1 };
         Self { cell_px, columns: width.div_ceil(cell_px), rows: height.div_ceil(cell_px) }
+    }
+
+    /// How many cells there are.
+    pub(super) const fn cells(self) -> usize {
+        self.columns * self.rows
     }
 
     /// Column and row of the cell a match lies in.
@@ -38,7 +43,7 @@ impl Shape {
 }
 
 const fn table(capacity: &Capacity) -> usize {
-    capacity.image_width.div_ceil(CELL_MIN_PX) * capacity.image_height.div_ceil(CELL_MIN_PX) + 1
+    Shape::new(capacity.image_width, capacity.image_height, CELL_MIN_PX).cells() + 1
 }
 
 impl<'s> Cells<'s> {
@@ -55,7 +60,7 @@ impl<'s> Cells<'s> {
 
     /// Sorts. Returns the cells' starts (one more than cells) and the matches' positions, cell by cell.
     pub(super) fn sort(&mut self, matches: &[Match], shape: Shape) -> (&[u32], &mut [u32]) {
-        let cells = shape.columns * shape.rows;
+        let cells = shape.cells();
         let (Some(start), Some(order)) = (self.start.get_mut(..=cells), self.order.get_mut(..matches.len())) else {
             return (&[], &mut []);
         };

@@ -62,7 +62,7 @@ const LEFT: Names = Names {
     corner: "scene_flow.left.corner",
     sums: "scene_flow.left.sums",
     candidate: "scene_flow.left.candidate",
-    last: "scene_flow.left.last",
+    list: "scene_flow.left.list",
 };
 
 const RIGHT: Names = Names {
@@ -75,7 +75,7 @@ const RIGHT: Names = Names {
     corner: "scene_flow.right.corner",
     sums: "scene_flow.right.sums",
     candidate: "scene_flow.right.candidate",
-    last: "scene_flow.right.last",
+    list: "scene_flow.right.list",
 };
 
 /// Sparse matches stored.

@@ -6,8 +6,12 @@
 //!
 //! Time: a look at each feature, and at those of its cell. Memory: 12 bytes for each that is kept, and 4 bytes for each class of a cell.
 
-use super::suppression::{CLASSES, Candidate};
+use super::{
+    cells::Shape,
+    suppression::{CLASSES, Candidate},
+};
 use crate::memory::Capacity;
+use bytemuck::{Pod, Zeroable};
 
 /// Side of the smallest cells, px: two to the power of this.
 const CELL_SHIFT: u32 = 5;
@@ -16,27 +20,30 @@ const CELL_SHIFT_MAX: u32 = 13;
 /// Features a cell may have of a class, at least: where there are fewer to give, cells are larger.
 const QUOTA_MIN: usize = 4;
 
-/// Cells of an image, and of a row of them.
-const fn cells(width: usize, height: usize, shift: u32) -> [usize; 2] {
-    let columns = width.div_ceil(1 << shift);
-    [columns * height.div_ceil(1 << shift), columns]
+/// Lists of the largest image: one for each class of each cell.
+pub(super) const fn lists(capacity: &Capacity) -> usize {
+    CLASSES * Shape::new(capacity.image_width, capacity.image_height, 1 << CELL_SHIFT).cells()
 }
 
-/// Classes of all cells of the largest image.
-pub(super) const fn counts(capacity: &Capacity) -> usize {
-    CLASSES * cells(capacity.image_width, capacity.image_height, CELL_SHIFT)[0]
-}
-
-/// No further feature of a cell.
+/// No further feature of a list.
 const END: u32 = u32::MAX;
+
+/// A feature of a list.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Held {
+    pub candidate: Candidate,
+    /// Where the one before it of its list is held.
+    before: u32,
+}
 
 /// The strongest so far.
 pub(super) struct Strongest<'a> {
-    slots: &'a mut [Candidate],
+    slots: &'a mut [Held],
     len: usize,
-    /// For each class of each cell where its last feature is.
+    /// Where each list's last feature is held.
     last: &'a mut [u32],
-    /// How many of a class a cell may keep.
+    /// How many a list may have.
     quota: usize,
     columns: usize,
     shift: u32,
@@ -44,16 +51,17 @@ pub(super) struct Strongest<'a> {
 }
 
 impl<'a> Strongest<'a> {
-    /// None yet, of an image of that size. At most `wanted` will be kept, and as many as there are slots; `last` has [`counts`] entries.
-    pub(super) fn new(slots: &'a mut [Candidate], last: &'a mut [u32], [width, height]: [usize; 2], wanted: usize) -> Self {
+    /// None yet, of an image of that size. At most `wanted` will be kept, and as many as there are slots; `last` has an entry for each of [`lists`].
+    pub(super) fn new(slots: &'a mut [Held], last: &'a mut [u32], [width, height]: [usize; 2], wanted: usize) -> Self {
         let mut shift = CELL_SHIFT;
-        while shift < CELL_SHIFT_MAX && CLASSES * QUOTA_MIN * cells(width, height, shift)[0] > wanted {
+        let mut shape = Shape::new(width, height, 1 << shift);
+        while shift < CELL_SHIFT_MAX && CLASSES * QUOTA_MIN * shape.cells() > wanted {
             shift += 1;
+            shape = Shape::new(width, height, 1 << shift);
         }
-        let [cells, columns] = cells(width, height, shift);
         last.fill(END);
-        let quota = wanted.checked_div(CLASSES * cells).unwrap_or_default();
-        Self { slots, len: 0, last, quota, columns, shift, dropped: 0 }
+        let quota = wanted.checked_div(CLASSES * shape.cells()).unwrap_or_default();
+        Self { slots, len: 0, last, quota, columns: shape.columns, shift, dropped: 0 }
     }
 
     /// Takes in the next one. It is kept while fewer of its class and cell than may be are as strong.
@@ -64,28 +72,27 @@ impl<'a> Strongest<'a> {
         let (mut at, mut weakest, mut least) = (*last, END, u16::MAX);
         for _ in 0..self.quota {
             let Some(held) = self.slots.get(at as usize) else {
-                match self.slots.get_mut(self.len) {
-                    Some(free) => *free = Candidate { next: *last, ..candidate },
-                    None => return self.dropped += 1,
-                }
+                // The list has space.
+                let Some(free) = self.slots.get_mut(self.len) else { return self.dropped += 1 };
+                *free = Held { candidate, before: *last };
                 *last = self.len as u32;
                 self.len += 1;
                 return;
             };
-            if held.response < least {
-                (weakest, least) = (at, held.response);
+            if held.candidate.response < least {
+                (weakest, least) = (at, held.candidate.response);
             }
-            at = held.next;
+            at = held.before;
         }
         if let Some(held) = self.slots.get_mut(weakest as usize)
             && least < candidate.response
         {
-            *held = Candidate { next: held.next, ..candidate };
+            held.candidate = candidate;
         }
     }
 
     /// How many of those to be kept found no slot, and the others.
-    pub(super) fn finish(self) -> (usize, &'a [Candidate]) {
+    pub(super) fn finish(self) -> (usize, &'a [Held]) {
         let Self { slots, len, dropped, .. } = self;
         (dropped, slots.get(..len).unwrap_or_default())
     }
@@ -101,11 +108,11 @@ mod tests {
 
     /// What is kept, in order of position, and how many found no slot.
     fn keep(found: &[Candidate], slots: usize, wanted: usize) -> (Vec<Candidate>, usize) {
-        let (mut slots, mut last) = (vec![Candidate::default(); slots], [7; CLASSES * 5 * 3]);
+        let (mut slots, mut last) = (vec![Held::default(); slots], [7; CLASSES * 5 * 3]);
         let mut strongest = Strongest::new(&mut slots, &mut last, SIZE, wanted);
         found.iter().for_each(|candidate| strongest.add(*candidate));
         let (dropped, kept) = strongest.finish();
-        (sorted(kept.iter().map(|held| Candidate { next: 0, ..*held }).collect()), dropped)
+        (sorted(kept.iter().map(|held| held.candidate).collect()), dropped)
     }
 
     fn sorted(mut candidates: Vec<Candidate>) -> Vec<Candidate> {

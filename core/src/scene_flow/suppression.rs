@@ -37,8 +37,6 @@ pub(super) struct Candidate {
     pub class: u8,
     /// 1 when it is a peak within [`SPARSE_RADIUS`] as well.
     pub sparse: u8,
-    /// Where the one before it of its class and cell is held.
-    pub next: u32,
 }
 
 /// A filter's responses.
@@ -202,7 +200,6 @@ impl<const SIGN: i16> Block<'_, SIGN> {
             response: response.unsigned_abs(),
             class: 0,
             sparse: u8::from(sparse),
-            next: 0,
         })
     }
 }

@@ -14,7 +14,7 @@ mod tests;
 use self::{eight::Row, fraction::refine_row};
 use super::{
     StereoConfig,
-    descriptor::{Descriptor, Gradients, MARGIN},
+    descriptor::{Descriptor, Gradients, MARGIN, describe_rows},
     prior::{CellGrid, DisparitySet, NO_PLANE, PlaneCost},
 };
 use crate::{
@@ -80,12 +80,8 @@ impl DenseMatching<'_> {
         let rows = band.left.chunks_exact_mut(width).zip(band.right.chunks_exact_mut(width));
         for (i, (left, right)) in rows.enumerate() {
             let v = band.first + i;
-            let mut described = true;
-            // Not by `all`, whose closure is compiled for the baseline.
-            for (image, row) in self.gradients.iter().zip([&mut *left_row, right_row]) {
-                described &= image.describe_row(v, row);
-            }
-            if described {
+            let [left_image, right_image] = self.gradients;
+            if describe_rows([(left_image, v, &mut *left_row), (right_image, v, &mut *right_row)]) {
                 self.match_row::<true>(left_row, right_row, v, left, kernels);
                 self.match_row::<false>(right_row, left_row, v, right, kernels);
                 let [matched, contradicted] = check_consistency(left, right, self.config.consistency_threshold);

@@ -66,6 +66,17 @@ impl<'a> Gradients<'a> {
     }
 }
 
+/// Builds the descriptors of rows, each of an image into its own output. Returns whether all have any.
+#[inline(always)]
+pub(super) fn describe_rows<const N: usize>(rows: [(Gradients<'_>, usize, &mut [Descriptor]); N]) -> bool {
+    let mut described = true;
+    // Not by `all`, whose closure is compiled for the baseline.
+    for (image, v, out) in rows {
+        described &= image.describe_row(v, out);
+    }
+    described
+}
+
 /// The gradients of the rows above, at and below the one described.
 struct SampledRows<'a> {
     du: [&'a [u8]; 3],

@@ -16,7 +16,7 @@ use core::ops::RangeInclusive;
 use super::{
     StereoConfig,
     config::DISPARITY_LIMIT,
-    descriptor::{Descriptor, Gradients, MARGIN, UNTEXTURED, eight, texture},
+    descriptor::{Descriptor, Gradients, MARGIN, UNTEXTURED, describe_rows, eight, texture},
 };
 
 /// No match at this candidate.
@@ -110,13 +110,9 @@ impl SupportMatching<'_> {
             let v = (first + j) * step;
             let Some(above) = v.checked_sub(CORNER) else { continue };
             let below = v + CORNER;
-            let described = [(self.left, above, &mut *l0), (self.left, below, l1), (self.right, above, r0), (self.right, below, r1)];
-            let mut is_described = true;
-            // Not by `all`, whose closure is compiled for the baseline.
-            for (image, v, row) in described {
-                is_described &= image.describe_row(v, row);
-            }
-            if is_described {
+            let rows =
+                [(self.left, above, &mut *l0), (self.left, below, &mut *l1), (self.right, above, &mut *r0), (self.right, below, &mut *r1)];
+            if describe_rows(rows) {
                 self.match_row(&Rows { above: l0, below: l1 }, &Rows { above: r0, below: r1 }, out, kernels);
             }
         }
