@@ -6,6 +6,8 @@ use crate::problem::{Problems, require};
 pub const DISPARITY_LIMIT: u16 = 255;
 /// Smallest distance between two support candidates, px: the bound on support points follows from it.
 pub const MIN_CANDIDATE_STEP: usize = 5;
+/// Widest window to each side of a support point in which alike ones are counted, candidates.
+pub(super) const MAX_PLAUSIBLE_WINDOW: usize = 16;
 /// Smallest cell of the grid prior, px: the bound on cells follows from it.
 pub const MIN_GRID_SIZE: usize = 10;
 /// Most passes of the adaptive mean.
@@ -145,7 +147,7 @@ impl StereoConfig {
         check((10..=DISPARITY_LIMIT).contains(&self.disparity_max), "stereo.disparity_max", "must be within 10..=255 px");
         check(positive(self.support_ratio) && self.support_ratio <= 1.0, "stereo.support_ratio", "must be above 0 and at most 1");
         check((MIN_CANDIDATE_STEP..=64).contains(&self.candidate_step), "stereo.candidate_step", "must be within 5..=64 px");
-        check((1..=16).contains(&self.plausible_window), "stereo.plausible_window", "must be within 1..=16 candidates");
+        check((1..=MAX_PLAUSIBLE_WINDOW).contains(&self.plausible_window), "stereo.plausible_window", "must be within 1..=16 candidates");
         check(self.redundant_distance <= 64, "stereo.redundant_distance", "must be at most 64 candidates");
         check((MIN_GRID_SIZE..=256).contains(&self.grid_size), "stereo.grid_size", "must be within 10..=256 px");
         check(positive(self.beta), "stereo.beta", "must be above 0");

@@ -1,68 +1,167 @@
 //! Support points that stand alone, or that add nothing, are taken back (Geiger et al., section 3.1; the published parameters).
+//!
+//! Every candidate of a row is asked at once, whether it has a match or not: which have one no processor can foresee.
 
-use crate::part::part;
+use crate::{
+    parallel::Work,
+    part::{part, part_mut},
+};
 
-use super::{StereoConfig, support::NO_MATCH};
+use super::{StereoConfig, config::MAX_PLAUSIBLE_WINDOW, support::NO_MATCH};
 
-/// Removes the points with fewer than `plausible_min` alike ones in the window about them, all tested before any is removed. `scratch`
-/// is as long as `grid`. Returns how many were removed.
-pub(super) fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, scratch: &mut [i16]) -> u32 {
-    let (Some(before), window) = (scratch.get_mut(..grid.len()), config.plausible_window) else { return 0 };
+/// Candidates looked at together.
+const BLOCK: usize = 64;
+/// Those, and the widest window to both sides of them.
+const AROUND: usize = BLOCK + 2 * MAX_PLAUSIBLE_WINDOW;
+
+/// Removes from a grid of candidates, `columns` wide, the implausible and then the redundant points; says how many of each went.
+pub(super) struct FilterSupport<'a> {
+    pub config: &'a StereoConfig,
+    pub grid: &'a mut [i16],
+    pub columns: usize,
+    /// As long as the grid, at least.
+    pub scratch: &'a mut [i16],
+}
+
+impl Work for FilterSupport<'_> {
+    type Output = [u32; 2];
+
+    #[inline(always)]
+    fn run(self) -> [u32; 2] {
+        let Self { config, grid, columns, scratch } = self;
+        let scratch = part_mut(scratch, ..grid.len());
+        [remove_implausible(config, grid, columns, scratch), remove_redundant(config, grid, columns, scratch)]
+    }
+}
+
+/// Removes the points with fewer than `plausible_min` alike ones in the window about them, all tested before any is removed.
+#[inline(always)]
+fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, before: &mut [i16]) -> u32 {
+    let (window, threshold) = (config.plausible_window.min(MAX_PLAUSIBLE_WINDOW), config.plausible_threshold);
     let width = width.max(1);
     before.iter_mut().zip(&*grid).for_each(|(to, from)| *to = *from);
-    let threshold = config.plausible_threshold.min(i16::MAX as u16);
     let mut removed = 0;
     for (v, row) in grid.chunks_exact_mut(width).enumerate() {
         let (top, rows) = (v.saturating_sub(window), v.min(window) + window + 1);
-        for (u, point) in row.iter_mut().enumerate().filter(|(_, point)| **point != NO_MATCH) {
-            let (left, columns) = (u.saturating_sub(window), u.min(window) + window + 1);
-            let alike = |other: &&i16| **other != NO_MATCH && other.abs_diff(*point) <= threshold;
-            let mut missing = usize::from(config.plausible_min);
+        for (first, points) in (0usize..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
+            let here: [i16; BLOCK] = load(points, 0, 0);
+            let mut found = [0u16; BLOCK];
             for row in before.chunks_exact(width).skip(top).take(rows) {
-                missing = missing.saturating_sub(part(row, left..).iter().take(columns).filter(alike).count());
+                // What lies left of the row is no match.
+                let around: [i16; AROUND] = load(row, first.saturating_sub(window), window - window.min(first));
+                for others in around.array_windows::<BLOCK>().take(2 * window + 1) {
+                    for ((found, &other), &point) in found.iter_mut().zip(others).zip(&here) {
+                        *found += u16::from(are_alike(other, point, threshold));
+                    }
+                }
                 // Most have found enough after a row or two.
+                let mut missing = 0;
+                for (&found, &point) in found.iter().zip(&here) {
+                    missing |= u16::from(found < config.plausible_min) & u16::from(point != NO_MATCH);
+                }
                 if missing == 0 {
                     break;
                 }
             }
-            if missing > 0 {
-                *point = NO_MATCH;
-                removed += 1;
-            }
+            found.iter_mut().for_each(|found| *found = u16::from(*found < config.plausible_min));
+            removed += remove(points, &found);
         }
     }
     removed
 }
 
 /// Removes the points that lie between two alike ones on their column, then on their row; in scan order, each tested against what is left.
-/// Returns how many were removed.
-pub(super) fn remove_redundant(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 {
+#[inline(always)]
+fn remove_redundant(config: &StereoConfig, grid: &mut [i16], width: usize, turned: &mut [i16]) -> u32 {
     let height = grid.len() / width.max(1);
     let mut removed = 0;
-    for (stride, length, lines, line_stride) in [(width, height, width, 1), (1, width, height, width)] {
-        for line in 0..lines {
-            for i in 0..length {
-                removed += u32::from(thin(config, grid, line * line_stride, stride, length, i));
+    // Rows are the columns of the grid on its side; after the second turn it stands again.
+    let (mut from, mut to) = (grid, turned);
+    for width in [width, height] {
+        removed += remove_between(config, from, width);
+        transpose(from, width, to);
+        core::mem::swap(&mut from, &mut to);
+    }
+    removed
+}
+
+/// Removes the points that lie between two alike ones on their column, from the top down.
+#[inline(always)]
+fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 {
+    let (reach, threshold, width) = (config.redundant_distance, config.redundant_threshold, width.max(1));
+    let mut removed = 0;
+    for start in (0..grid.len()).step_by(width) {
+        let Some((above, rest)) = grid.split_at_mut_checked(start) else { break };
+        let Some((row, below)) = rest.split_at_mut_checked(width) else { break };
+        for (first, points) in (0usize..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
+            let here: [i16; BLOCK] = load(points, 0, 0);
+            let mut between = [1; BLOCK];
+            for rows in [part(above, above.len().saturating_sub(reach * width)..), part(below, ..below.len().min(reach * width))] {
+                let any = any_alike(rows.chunks_exact(width), first, &here, threshold);
+                between.iter_mut().zip(any).for_each(|(between, any)| *between &= any);
             }
+            removed += remove(points, &between);
         }
     }
     removed
 }
 
-/// Removes item `i` of a line if it has an alike one on both sides; says whether it did.
-fn thin(config: &StereoConfig, grid: &mut [i16], start: usize, stride: usize, length: usize, i: usize) -> bool {
-    let item = |k: usize| grid.get(start + k * stride).copied().unwrap_or(NO_MATCH);
-    let here = item(i);
-    if here == NO_MATCH {
-        return false;
+/// 1 for each of the points from column `first` on that has an alike one on its column in any of the rows, else 0.
+#[inline(always)]
+fn any_alike<'r>(rows: impl Iterator<Item = &'r [i16]>, first: usize, points: &[i16; BLOCK], threshold: u16) -> [u16; BLOCK] {
+    let mut any = [0u16; BLOCK];
+    for row in rows {
+        let others: [i16; BLOCK] = load(row, first, 0);
+        for ((any, other), &point) in any.iter_mut().zip(others).zip(points) {
+            *any |= u16::from(are_alike(other, point, threshold));
+        }
     }
-    let alike = |k: usize| item(k) != NO_MATCH && item(k).abs_diff(here) <= config.redundant_threshold;
-    let reach = config.redundant_distance;
-    let between = (i.saturating_sub(reach)..i).any(alike) && (i + 1..length.min(i + reach + 1)).any(alike);
-    if between && let Some(point) = grid.get_mut(start + i * stride) {
-        *point = NO_MATCH;
+    any
+}
+
+/// Whether a candidate has a match, and its disparity is that of a point within the threshold.
+#[inline(always)]
+fn are_alike(other: i16, point: i16, threshold: u16) -> bool {
+    (other != NO_MATCH) & (other.abs_diff(point) <= threshold)
+}
+
+/// The candidates of a row from column `start` on, after `skip` of no match; those beyond the row have none.
+#[inline(always)]
+fn load<const N: usize>(row: &[i16], start: usize, skip: usize) -> [i16; N] {
+    match row.get(start..).and_then(|rest| rest.first_chunk()) {
+        Some(all) if skip == 0 => *all,
+        _ => load_border(row, start, skip),
     }
-    between
+}
+
+/// As [`load`], where a border of the row is among them.
+#[inline(never)]
+fn load_border<const N: usize>(row: &[i16], start: usize, skip: usize) -> [i16; N] {
+    let mut candidates = [NO_MATCH; N];
+    candidates.iter_mut().skip(skip).zip(row.iter().skip(start)).for_each(|(to, from)| *to = *from);
+    candidates
+}
+
+/// Takes the points whose flag is 1, not 0; says how many there were.
+#[inline(always)]
+fn remove(points: &mut [i16], flags: &[u16; BLOCK]) -> u32 {
+    let mut removed = 0u16;
+    for (point, &flag) in points.iter_mut().zip(flags) {
+        let goes = flag & u16::from(*point != NO_MATCH);
+        *point = if goes == 1 { NO_MATCH } else { *point };
+        removed += goes;
+    }
+    u32::from(removed)
+}
+
+/// Makes columns of rows.
+#[inline(always)]
+fn transpose(from: &[i16], width: usize, to: &mut [i16]) {
+    let height = from.len() / width.max(1);
+    for (u, column) in to.chunks_exact_mut(height.max(1)).enumerate() {
+        let values = part(from, u..).iter().step_by(width.max(1));
+        column.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
+    }
 }
 
 #[cfg(test)]
@@ -111,7 +210,7 @@ mod tests {
     #[test]
     fn a_flat_wall_is_thinned_but_its_corners_stay() {
         let mut grid = vec![12i16; 31 * 17];
-        let removed = remove_redundant(&StereoConfig::robotics(), &mut grid, 31);
+        let removed = remove_redundant(&StereoConfig::robotics(), &mut grid, 31, &mut [0; 31 * 17]);
         assert_eq!(removed as usize, grid.iter().filter(|&&d| d == NO_MATCH).count());
         for corner in [0, 30, 16 * 31, 16 * 31 + 30] {
             assert_eq!(grid[corner], 12);
@@ -120,6 +219,32 @@ mod tests {
         // What is left still says 12 within the reach of every removed point.
         for v in 0..17usize {
             assert!(v == 0 || v == 16 || (v.saturating_sub(5)..(v + 6).min(17)).any(|w| grid[w * 31..][..31].contains(&12)));
+        }
+    }
+
+    #[test]
+    fn the_redundant_are_those_that_a_walk_in_scan_order_takes() {
+        let config = StereoConfig::default();
+        let mut random = Random::new(73);
+        for (width, height) in [(23, 17), (150, 9), (64, 70), (1, 5), (5, 1)] {
+            let mut grid: Vec<i16> =
+                (0..width * height).map(|_| if random.below(5) == 0 { NO_MATCH } else { random.below(4) as i16 }).collect();
+            let mut expected = grid.clone();
+            for (stride, length, lines, line_stride) in [(width, height, width, 1), (1, width, height, width)] {
+                for (line, i) in (0..lines).flat_map(|line| (0..length).map(move |i| (line, i))) {
+                    let at = |k: usize| line * line_stride + k * stride;
+                    let here = expected[at(i)];
+                    let alike = |k: usize| expected[at(k)] != NO_MATCH && expected[at(k)].abs_diff(here) <= config.redundant_threshold;
+                    let reach = config.redundant_distance;
+                    if (i.saturating_sub(reach)..i).any(alike) && (i + 1..length.min(i + reach + 1)).any(alike) {
+                        expected[at(i)] = NO_MATCH;
+                    }
+                }
+            }
+            let before = grid.clone();
+            let removed = remove_redundant(&config, &mut grid, width, &mut vec![0; before.len()]);
+            assert_eq!(grid, expected);
+            assert_eq!(removed as usize, before.iter().zip(&grid).filter(|(a, b)| a != b).count());
         }
     }
 }

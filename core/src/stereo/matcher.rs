@@ -33,7 +33,7 @@ pub struct StereoMatcher<'s> {
     other: &'s mut [i16],
     rows: &'s mut [Descriptor],
     support: &'s mut [i16],
-    support_before: &'s mut [i16],
+    support_scratch: &'s mut [i16],
     left_mesh: Triangulation<'s>,
     right_mesh: Triangulation<'s>,
     left_cells: &'s mut [DisparitySet],
@@ -113,7 +113,7 @@ impl<'s> StereoMatcher<'s> {
             other: carver.alloc("stereo.other", pixels),
             rows: carver.alloc("stereo.rows", BANDS * ROWS * capacity.image_width),
             support: carver.alloc("stereo.support", points),
-            support_before: carver.alloc("stereo.support_before", points),
+            support_scratch: carver.alloc("stereo.support_scratch", points),
             left_mesh: Triangulation::new_in(points, ["stereo.points_left", "stereo.triangles_left", "stereo.hull_left"], carver),
             right_mesh: Triangulation::new_in(points, ["stereo.points_right", "stereo.triangles_right", "stereo.hull_right"], carver),
             left_cells: carver.alloc("stereo.cells_left", cells),
@@ -192,7 +192,7 @@ impl<'s> StereoMatcher<'s> {
         done(StereoStep::Gradients);
         self.match_support(config, executor, &mut report);
         done(StereoStep::Support);
-        self.filter_support_points(config, &mut report);
+        self.filter_support_points(config, executor, &mut report);
         done(StereoStep::Sifting);
         self.triangulate(config, executor, &mut report);
         done(StereoStep::Triangulation);

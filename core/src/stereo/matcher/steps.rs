@@ -12,7 +12,7 @@ use crate::{
         delaunay::{SupportPoint, Triangulation},
         dense::{DenseBand, DenseMatching, FILLED, MatchBand, NONE, WORKING_ONE_PX},
         descriptor::Gradients,
-        filter_support,
+        filter_support::FilterSupport,
         gaps::{FillColumns, FillRows, Filling},
         gradient::GradientRows,
         invalid, median, prior,
@@ -58,12 +58,12 @@ impl StereoMatcher<'_> {
         report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
     }
 
-    pub(super) fn filter_support_points(&mut self, config: &StereoConfig, report: &mut StereoReport) {
+    pub(super) fn filter_support_points<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
         let step = config.candidate_step;
         let (columns, rows) = (support::candidates(self.width, step), support::candidates(self.height, step));
         let Some(grid) = self.support.get_mut(..columns * rows) else { return };
-        report.implausible = filter_support::remove_implausible(config, grid, columns, self.support_before);
-        report.redundant = filter_support::remove_redundant(config, grid, columns);
+        let filter = FilterSupport { config, grid, columns, scratch: self.support_scratch };
+        [report.implausible, report.redundant] = executor.vectors().run(filter);
         self.left_mesh.clear();
         self.right_mesh.clear();
         for (j, row) in grid.chunks_exact(columns.max(1)).enumerate() {
