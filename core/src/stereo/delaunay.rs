@@ -62,20 +62,45 @@ pub(super) struct Triangulation<'s> {
     triangles: usize,
 }
 
+/// The half-edge before one in its triangle.
+#[inline(always)]
+fn before(half_edge: u32) -> u32 {
+    if half_edge.is_multiple_of(3) { half_edge + 2 } else { half_edge - 1 }
+}
+
 /// Twice the signed area of the triangle a, b, c.
 fn orientation(a: SupportPoint, b: SupportPoint, c: SupportPoint) -> i64 {
     let d = |x: u16, y: u16| i64::from(x) - i64::from(y);
     d(b.u, a.u) * d(c.v, a.v) - d(b.v, a.v) * d(c.u, a.u)
 }
 
-/// Whether p lies strictly within the circle through a, b, c, whose orientation is positive.
-fn in_circle(a: SupportPoint, b: SupportPoint, c: SupportPoint, p: SupportPoint) -> bool {
-    let from_p = |q: SupportPoint| {
-        let (x, y) = (i64::from(q.u) - i64::from(p.u), i64::from(q.v) - i64::from(p.v));
-        (x, y, x * x + y * y)
-    };
-    let ((ax, ay, al), (bx, by, bl), (cx, cy, cl)) = (from_p(a), from_p(b), from_p(c));
-    al * (bx * cy - by * cx) - bl * (ax * cy - ay * cx) + cl * (ax * by - ay * bx) > 0
+/// A point as seen from another.
+#[derive(Clone, Copy)]
+struct Offset {
+    x: i64,
+    y: i64,
+    /// Square of its length.
+    square: i64,
+}
+
+impl Offset {
+    #[inline(always)]
+    fn new(point: SupportPoint, from: SupportPoint) -> Self {
+        let (x, y) = (i64::from(point.u) - i64::from(from.u), i64::from(point.v) - i64::from(from.v));
+        Self { x, y, square: x * x + y * y }
+    }
+
+    /// Twice the signed area of the triangle with another and the point that both are seen from.
+    #[inline(always)]
+    fn cross(self, other: Self) -> i64 {
+        self.x * other.y - self.y * other.x
+    }
+}
+
+/// Whether the point from which a, b and c are seen lies strictly within the circle through them, whose orientation is positive.
+#[inline(always)]
+fn in_circle([a, b, c]: [Offset; 3]) -> bool {
+    a.square * b.cross(c) - b.square * a.cross(c) + c.square * a.cross(b) > 0
 }
 
 impl<'s> Triangulation<'s> {
@@ -197,30 +222,36 @@ impl<'s> Triangulation<'s> {
         first
     }
 
-    /// Flips the edges opposite to p that are not Delaunay, walking along the fan about p from triangle t.
+    /// Flips the edges opposite to p that are not Delaunay, walking along the fan about p from triangle t = (b, a, p).
     fn legalise(&mut self, p: u32, mut t: u32) {
+        let at_p = self.point(p);
+        let seen = |mesh: &Self, half_edge: u32| Offset::new(mesh.point(mesh.corner.get(half_edge)), at_p);
+        // What the next triangle shares with this one is not asked for again.
+        let (mut a, mut b) = (seen(self, 3 * t + 1), seen(self, 3 * t));
         loop {
             let opposite = self.twin.get(3 * t);
-            if opposite != NONE && self.flip_if_needed(p, t, opposite) {
-                continue;
+            if opposite != NONE {
+                let c = seen(self, before(opposite));
+                if in_circle([a, b, c]) {
+                    self.flip(p, t, opposite);
+                    b = c;
+                    continue;
+                }
             }
             let next = self.twin.get(3 * t + 2);
             if next == NONE {
                 return;
             }
             t = next / 3;
+            (a, b) = (b, seen(self, 3 * t));
         }
     }
 
-    /// Triangle t = (b, a, p) and, beyond its edge b-a, (a, b, c): makes them (c, a, p) and (b, c, p) if p is in the circle of a, b, c.
-    fn flip_if_needed(&mut self, p: u32, t: u32, opposite: u32) -> bool {
+    /// Makes of triangle t = (b, a, p) and, beyond its edge b-a, (a, b, c) the triangles (c, a, p) and (b, c, p).
+    fn flip(&mut self, p: u32, t: u32, opposite: u32) {
         let other = opposite / 3;
-        let (after, before) = (3 * other + (opposite + 1) % 3, 3 * other + (opposite + 2) % 3);
-        let (a, b, c) = (self.corner.get(opposite), self.corner.get(after), self.corner.get(before));
-        let at = |i: u32| self.point(i);
-        if !in_circle(at(a), at(b), at(c), at(p)) {
-            return false;
-        }
+        let (after, before) = (before(before(opposite)), before(opposite));
+        let (b, c) = (self.corner.get(after), self.corner.get(before));
         let (beyond_bc, beyond_ca, beyond_pb) = (self.twin.get(after), self.twin.get(before), self.twin.get(3 * t + 2));
         self.corner.set(3 * t, c);
         for (corner, point) in (3 * other..).zip([b, c, p]) {
@@ -230,7 +261,6 @@ impl<'s> Triangulation<'s> {
         self.link_or_hull(3 * other, beyond_bc, b);
         self.link_or_hull(3 * other + 2, beyond_pb, p);
         self.link(3 * t + 2, 3 * other + 1);
-        true
     }
 
     /// Whether p lies strictly outside the hull edge that begins at a.
@@ -297,7 +327,10 @@ mod tests {
         for &[a, b, c] in &triangles {
             assert!(orientation(a, b, c) > 0);
             area += orientation(a, b, c);
-            assert!(!mesh.points().iter().any(|&p| in_circle(a, b, c, p)), "a point within the circle of {a:?} {b:?} {c:?}");
+            assert!(
+                !mesh.points().iter().any(|&p| in_circle([a, b, c].map(|corner| Offset::new(corner, p)))),
+                "a point within the circle of {a:?} {b:?} {c:?}"
+            );
         }
         assert_eq!(area, hull_area(mesh.points()), "the triangles fill the hull");
         triangles.len()

@@ -58,12 +58,12 @@ fn rasterise_planes(RasterisePlanes { mesh, slope_max, first, width, out }: Rast
         let mark = if plane.slope_u.abs() > slope_max || plane.slope_v.abs() > slope_max { STEEP } else { 0 };
         let (long, upper, lower) = (Edge::new(top, bottom), Edge::new(top, middle), Edge::new(middle, bottom));
         let covered = out.chunks_exact_mut(width).enumerate().take(to - first).skip(from - first);
-        for (v, row) in covered.map(|(i, row)| ((first + i) as i64, row)) {
-            let (a, b) = (long.column(v), if v < i64::from(middle.v) { upper.column(v) } else { lower.column(v) });
+        for (v, row) in covered.map(|(i, row)| ((first + i) as i32, row)) {
+            let (a, b) = (long.column(v), if v < i32::from(middle.v) { upper.column(v) } else { lower.column(v) });
             let (left, right) = (a.min(b) >> SHIFT, (a.max(b) >> SHIFT) + 1);
             let end = width.min(right as usize + 1);
             if let Some(span) = row.get_mut(left as usize..end) {
-                plane.rasterise(left, v, mark, span);
+                plane.rasterise(left.into(), v.into(), mark, span);
             }
         }
     }
@@ -74,21 +74,21 @@ const SHIFT: u32 = 16;
 /// One px in that unit.
 const ONE: i64 = 1 << SHIFT;
 
-/// An edge of a triangle, downwards.
+/// An edge of a triangle, downwards. Coordinates are below 2^13: 32 bits hold its columns, and their division is a short one.
 struct Edge {
     from: SupportPoint,
-    slope: i64,
+    slope: i32,
 }
 
 impl Edge {
     fn new(from: SupportPoint, to: SupportPoint) -> Self {
-        let (columns, rows) = (i64::from(to.u) - i64::from(from.u), i64::from(to.v) - i64::from(from.v));
+        let (columns, rows) = (i32::from(to.u) - i32::from(from.u), i32::from(to.v) - i32::from(from.v));
         // An edge along the row is met in its own row only, where the other edges give its ends.
-        Self { from, slope: (columns * ONE).checked_div(rows).unwrap_or(0) }
+        Self { from, slope: (columns << SHIFT).checked_div(rows).unwrap_or(0) }
     }
 
-    fn column(&self, v: i64) -> i64 {
-        i64::from(self.from.u) * ONE + self.slope * (v - i64::from(self.from.v))
+    fn column(&self, v: i32) -> i32 {
+        (i32::from(self.from.u) << SHIFT) + self.slope * (v - i32::from(self.from.v))
     }
 }
 
