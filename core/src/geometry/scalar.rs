@@ -33,7 +33,7 @@ pub(crate) fn floor_i32(value: f32) -> i32 {
 
 /// The nearest integer to a `value` within ±2^22, ties to even, by the float format itself; any bits at all beyond.
 #[inline(always)]
-pub(crate) fn rounded_i32(value: f32) -> i32 {
+pub(crate) const fn rounded_i32(value: f32) -> i32 {
     const MAGIC: f32 = 12_582_912.0;
     ((value + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)
 }

@@ -2,7 +2,7 @@
 
 use super::{
     Fusion,
-    layer::{Scratch, averaged},
+    layer::{Scratch, averaged, share_of_one},
 };
 use crate::volume::{
     block::{LAYER_VOXELS, Layer, packed},
@@ -10,7 +10,18 @@ use crate::volume::{
 };
 
 /// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
-const PAST_MAX: usize = 5;
+const PAST_MAX: u8 = 5;
+/// The shares of one observation for each weight of the past, times -32,768.
+#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
+const SHARES: [i16; PAST_MAX as usize + 1] = {
+    let mut shares = [0; PAST_MAX as usize + 1];
+    let mut past = 0;
+    while past <= PAST_MAX {
+        shares[past as usize] = share_of_one(past);
+        past += 1;
+    }
+    shares
+};
 
 impl Fusion<'_> {
     /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is that after this observation.
@@ -18,10 +29,11 @@ impl Fusion<'_> {
     #[inline(always)]
     pub(super) fn colour_layer(&self, scratch: &Scratch, [red, green, blue]: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
         let near = self.near_surface(scratch);
-        let bits = packed(&near);
-        if bits == 0 {
+        // Most layers have none; bits take longer than a look.
+        if near.iter().fold(0, |any, near| any | near) == 0 {
             return;
         }
+        let bits = packed(&near);
         let share = self.colour_shares(scratch, &near, [red, green, blue], weight);
         let (mut reds, mut greens, mut blues) = ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
         match self.seen.colour {
@@ -59,7 +71,7 @@ impl Fusion<'_> {
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
     fn colour_shares(&self, scratch: &Scratch, near: &Layer<u8>, planes: [&Layer<u8>; 3], weight: &Layer<u8>) -> Layer<i16> {
-        let [all, second, third, fourth, fifth, sixth]: [i16; PAST_MAX + 1] = self.shares.of_one();
+        let [all, second, third, fourth, fifth, sixth] = SHARES;
         let noted = self.seen.noted;
         let mut share = [0; LAYER_VOXELS];
         for (share, &weight) in share.iter_mut().zip(weight) {

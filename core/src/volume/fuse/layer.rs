@@ -19,8 +19,6 @@ use nalgebra::Vector3;
 const MAX_OBSERVATION_WEIGHT: i16 = 255;
 /// Sums of a voxel's weight and an observation's run below this.
 const SHARES: usize = 512;
-/// Weights that the past can have.
-const PASTS: usize = 1 << u8::BITS;
 /// No pixel of the image.
 const OUTSIDE: u32 = u32::MAX;
 
@@ -28,26 +26,15 @@ const OUTSIDE: u32 = u32::MAX;
 pub(super) struct Shares {
     /// Share of a new observation of weight 1, times 2^23: `round(2^23 / sum)`.
     units: [i32; SHARES],
-    /// Share of one observation, by the weight of the past, times -32,768: so it fits its type even where it is all.
-    ones: [i16; PASTS],
 }
 
 impl Shares {
     pub fn new() -> Self {
-        let mut shares = Self { units: [0; SHARES], ones: [0; PASTS] };
+        let mut shares = Self { units: [0; SHARES] };
         for (sum, unit) in (0i32..).zip(&mut shares.units) {
             *unit = ((1i32 << 23) + sum / 2).checked_div(sum).unwrap_or(0);
         }
-        for (one, unit) in shares.ones.iter_mut().zip(shares.units.iter().skip(1)) {
-            *one = -((*unit + 128) >> 8) as i16;
-        }
         shares
-    }
-
-    /// Shares of one observation where the past weighs 0 to `N - 1`, times -32,768.
-    #[inline(always)]
-    pub fn of_one<const N: usize>(&self) -> [i16; N] {
-        self.ones.first_chunk().copied().unwrap_or([0; N])
     }
 
     /// Share of an observation of weight `gain`, times -32,768.
@@ -56,6 +43,12 @@ impl Shares {
         let unit = self.units.get(sum as usize).copied().unwrap_or(0);
         -((gain * unit + 128) >> 8) as i16
     }
+}
+
+/// Share of one observation where the past weighs `past`, times -32,768: so it fits its type even where it is all.
+#[inline(always)]
+pub(super) const fn share_of_one(past: u8) -> i16 {
+    -rounded_i32(32_768.0 / (past as f32 + 1.0)) as i16
 }
 
 /// What is computed of a layer on the way.
@@ -207,16 +200,13 @@ impl Fusion<'_> {
 
     /// What each observation weighs, and its share of the average.
     #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "there is a share for every past of eight bits")]
     fn share(&self, scratch: &mut Scratch, weight: &Layer<u8>) {
         for ((past, &weight), &observed_m) in scratch.past.iter_mut().zip(weight).zip(&scratch.observed_m) {
             *past = self.past(weight, observed_m) as u8;
         }
-        // In a loop of its own: fusion takes a fifth longer where one loop does both.
         if self.plain_weights {
-            for (share, &past) in scratch.share.iter_mut().zip(&scratch.past) {
-                *share = self.shares.ones[usize::from(past)];
-            }
+            // A division for each: it has vectors, a table has none.
+            scratch.share.iter_mut().zip(&scratch.past).for_each(|(share, &past)| *share = share_of_one(past));
             return;
         }
         self.weigh(scratch);
@@ -285,5 +275,18 @@ fn average(scratch: &Scratch, sdf: &mut Layer<i16>) {
     for (sdf, ((&share, &target), &hit)) in sdf.iter_mut().zip(observed) {
         let new = averaged(i32::from(*sdf), i32::from(target), share) as i16;
         *sdf = (new & hit) | (*sdf & !hit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_of_one_observation_is_that_of_a_gain_of_one() {
+        let shares = Shares::new();
+        for past in 0..=u8::MAX {
+            assert_eq!(share_of_one(past), shares.of(i32::from(past) + 1, 1), "{past}");
+        }
     }
 }

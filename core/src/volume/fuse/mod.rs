@@ -36,6 +36,8 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 /// Blocks nearer than this are never left out, m.
 const NEAREST_CULLED_M: f32 = 0.1;
+/// Corners of a block.
+const CORNERS: usize = 8;
 
 /// What a camera saw, as the map takes it.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +64,8 @@ struct Fusion<'a> {
     steps: [Vector3<f32>; 3],
     /// The change of each coordinate from a row's first voxel to each of its voxels, m.
     along_x: [[f32; BLOCK_SIDE]; 3],
+    /// The change of each coordinate from a block's first voxel to those at its corners, m.
+    corners: [[f32; CORNERS]; 3],
     horizon: Option<Horizon<'a>>,
     focal_px: f32,
     center_u_px: f32,
@@ -95,6 +99,7 @@ impl<'a> Fusion<'a> {
             camera,
             steps,
             along_x: [steps[0].x, steps[0].y, steps[0].z].map(|step| core::array::from_fn(|x| step * x as f32)),
+            corners: corners(&steps),
             horizon,
             focal_px: view.rig.focal_px as f32,
             center_u_px: view.rig.center_u_px as f32,
@@ -178,33 +183,52 @@ impl Fusion<'_> {
 
     /// Whether no voxel of the block whose first one lies at `corner` can be observed: it is outside the image, or behind all that is
     /// observed where it can fall.
+    #[inline(always)]
     fn is_hidden(&self, corner: Vector3<f32>) -> bool {
         let Some(horizon) = self.horizon else { return false };
-        let across = self.steps.map(|step| step * (BLOCK_SIDE - 1) as f32);
-        let mut bounds = [[f32::MAX, f32::MIN]; 3];
-        for n in 0..8u8 {
-            let ends = (0u8..).zip(across).filter(|(axis, _)| n >> axis & 1 == 1);
-            let end = ends.fold(corner, |end, (_, across)| end + across);
-            let scale = self.focal_px / end.z;
-            let seen = [end.x * scale + self.center_u_px, end.y * scale + self.center_v_px, end.z];
-            for ([low, high], seen) in bounds.iter_mut().zip(seen) {
-                (*low, *high) = (min_f32(*low, seen), max_f32(*high, seen));
-            }
+        let [x_m, y_m, z_m] = &self.corners;
+        let [mut columns, mut rows, mut depths_m] = [[0.0; CORNERS]; 3];
+        let seen = columns.iter_mut().zip(&mut rows).zip(&mut depths_m);
+        for (((column, row), depth_m), ((&x_m, &y_m), &z_m)) in seen.zip(x_m.iter().zip(y_m).zip(z_m)) {
+            *depth_m = corner.z + z_m;
+            let scale = self.focal_px / *depth_m;
+            *column = (corner.x + x_m) * scale + self.center_u_px;
+            *row = (corner.y + y_m) * scale + self.center_v_px;
         }
-        let [columns, rows, [nearest_m, _]] = bounds;
+        let nearest_m = least(&depths_m);
         // So near, what is between the corners need not be seen between them.
         if nearest_m < NEAREST_CULLED_M {
             return false;
         }
         // A pixel more, so that no rounding hides what is seen.
-        let span = |[low, high]: [f32; 2], size: u32| {
-            let (first, last) = (floor_i32(low) - 1, floor_i32(high) + 2);
+        let span = |seen: &[f32; CORNERS], size: u32| {
+            let (first, last) = (floor_i32(least(seen)) - 1, floor_i32(greatest(seen)) + 2);
             (last >= 0 && first < size as i32).then(|| [first.max(0) as usize, last.min(size as i32 - 1) as usize])
         };
-        let (Some(columns), Some(rows)) = (span(columns, self.width), span(rows, self.height)) else { return true };
+        let (Some(columns), Some(rows)) = (span(&columns, self.width), span(&rows, self.height)) else { return true };
         // A twentieth of a voxel more, for the same reason.
         horizon.greatest_m(columns, rows) + self.config.truncation_m < nearest_m - 0.05 * self.config.voxel_size_m
     }
+}
+
+/// The coordinates of a block's corners, from its first voxel's, m.
+fn corners(steps: &[Vector3<f32>; 3]) -> [[f32; CORNERS]; 3] {
+    let side = (BLOCK_SIDE - 1) as f32;
+    [0, 1, 2].map(|axis| {
+        core::array::from_fn(|n| steps.iter().enumerate().filter(|(along, _)| n >> along & 1 == 1).map(|(_, step)| step[axis] * side).sum())
+    })
+}
+
+/// The least of a coordinate of a block's corners.
+#[inline(always)]
+fn least(corners: &[f32; CORNERS]) -> f32 {
+    corners.iter().fold(f32::MAX, |least, &corner| min_f32(least, corner))
+}
+
+/// The greatest of a coordinate of a block's corners.
+#[inline(always)]
+fn greatest(corners: &[f32; CORNERS]) -> f32 {
+    corners.iter().fold(f32::MIN, |greatest, &corner| max_f32(greatest, corner))
 }
 
 /// Digest of a block's coordinates and content.
