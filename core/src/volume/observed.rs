@@ -12,14 +12,17 @@
 
 use super::{DistanceAlong, VolumeConfig};
 use crate::{
-    geometry::StereoRig,
+    geometry::{
+        StereoRig,
+        scalar::{floored_i32, min_f32},
+    },
     image::{View, ViewMut},
     parallel::{Bands, Executor, Work, each, zip2},
     part::{part, part_mut},
 };
 
 /// Columns worked on at once.
-const BLOCK: usize = 128;
+const BLOCK: usize = 64;
 /// What differs by more than this is across an edge: 1.5 px.
 const EDGE_Q8: u16 = 384;
 /// How far an edge spoils colours, px.
@@ -68,26 +71,36 @@ impl ObservedDepth<'_> {
     #[inline(always)]
     fn write_block(&self, first: usize, v: usize, depths: &mut [f32]) {
         let here = self.tap(first, v, 0, 0);
+        let scale = (self.rig.focal_baseline_px_m() * 256.0) as f32;
+        let (near_m, far_m) = (self.config.near_m, self.config.far_m);
+        let mut within = [0.0; BLOCK];
+        for (within, &disparity) in within.iter_mut().zip(&here) {
+            // Disparity 0 gives infinity, which is beyond far.
+            let value = scale / f32::from(disparity);
+            *within = if (value >= near_m) & (value <= far_m) { value } else { 0.0 };
+        }
+        // In half of an image nothing is: sky, and what is too far.
+        if within.iter().fold(0, |any, value| any | value.to_bits()) == 0 {
+            depths.fill(0.0);
+            return;
+        }
         let [behind, spoiling] = self.farthest(first, v);
         // Not by `map` of an array, which compilers leave as a call for the baseline.
         let tap = |du, dv| self.tap(first, v, du, dv);
         let levels = match self.config.distance {
-            DistanceAlong::Ray => [LEVELS - 1; BLOCK],
+            DistanceAlong::Ray => [LEVELS as u16 - 1; BLOCK],
             DistanceAlong::Normal => {
                 let along_u = slope(&here, &tap(SLOPE_REACH, 0), &tap(-SLOPE_REACH, 0));
                 let along_v = slope(&here, &tap(0, SLOPE_REACH), &tap(0, -SLOPE_REACH));
                 self.levels(first, v, &here, [&along_u, &along_v])
             }
         };
-        let scale = (self.rig.focal_baseline_px_m() * 256.0) as f32;
-        let (near_m, far_m) = (self.config.near_m, self.config.far_m);
         let edges = behind.iter().zip(&spoiling);
-        for (((depth, &disparity), (&behind, &spoiling)), &level) in depths.iter_mut().zip(&here).zip(edges).zip(&levels) {
-            // Disparity 0 gives infinity, which is beyond far.
-            let value = scale / f32::from(disparity);
-            let fused = (value >= near_m) & (value <= far_m) & (disparity <= behind.saturating_add(EDGE_Q8));
+        let notes = here.iter().zip(edges).zip(&levels);
+        for ((depth, &within), ((&disparity, (&behind, &spoiling)), &level)) in depths.iter_mut().zip(&within).zip(notes) {
             let spoiled = if disparity > spoiling.saturating_add(EDGE_Q8) { SPOILED } else { 0 };
-            *depth = if fused { f32::from_bits(value.to_bits() & !NOTES | level | spoiled) } else { 0.0 };
+            let noted = f32::from_bits(within.to_bits() & !NOTES | u32::from(level) | spoiled);
+            *depth = if (within > 0.0) & (disparity <= behind.saturating_add(EDGE_Q8)) { noted } else { 0.0 };
         }
     }
 
@@ -135,35 +148,52 @@ impl ObservedDepth<'_> {
 
     /// Levels of obliqueness of a block with these slopes along columns and rows.
     #[inline(always)]
-    fn levels(&self, first: usize, v: usize, here: &[u16; BLOCK], [along_u, along_v]: [&[f32; BLOCK]; 2]) -> [u32; BLOCK] {
+    fn levels(&self, first: usize, v: usize, here: &[u16; BLOCK], [along_u, along_v]: [&[f32; BLOCK]; 2]) -> [u16; BLOCK] {
         let focal = self.rig.focal_px as f32;
         let y = (v as f64 - self.rig.center_v_px) as f32;
         let x_first = (first as f64 - self.rig.center_u_px) as f32;
-        let mut levels = [0; BLOCK];
+        let mut squares = [0i16; BLOCK];
         let slopes = along_u.iter().zip(along_v);
-        for (i, ((level, &disparity), (&a, &b))) in (0u16..).zip(levels.iter_mut().zip(here).zip(slopes)) {
+        for (i, ((square, &disparity), (&a, &b))) in (0u16..).zip(squares.iter_mut().zip(here).zip(slopes)) {
             let (d, x) = (f32::from(disparity) * (1.0 / 256.0), x_first + f32::from(i));
             let (nu, nv, nz) = (focal * a, focal * b, d - x * a - y * b);
-            // The square of the cosine is compared: a root has no vectors everywhere. Without a disparity it may be no number, which is below all.
-            let square = d * d / (nu * nu + nv * nv + nz * nz);
-            *level = BETWEEN_LEVELS.iter().map(|&between| u32::from(square >= between)).sum();
+            // The square of the cosine is compared: a root has no vectors everywhere. Without a disparity it may be any number.
+            *square = fixed(d * d / (nu * nu + nv * nv + nz * nz));
         }
+        let mut levels = [0; BLOCK];
+        levels.iter_mut().zip(&squares).for_each(|(level, &square)| *level = level_of(square));
         levels
     }
 }
 
-/// Squares of what lies between two levels of obliqueness.
+/// A square of 1 in fixed point.
+const SQUARE_ONE: f32 = 32_768.0;
+
+/// Squares of what lies between two levels of obliqueness, in fixed point, where all of them are whole numbers.
 #[expect(clippy::indexing_slicing, reason = "the loop ends with the array")]
-const BETWEEN_LEVELS: [f32; LEVELS as usize - 1] = {
-    let mut squares = [0.0; LEVELS as usize - 1];
+const BETWEEN_LEVELS: [i16; LEVELS as usize - 1] = {
+    let mut squares = [0; LEVELS as usize - 1];
     let mut i = 0;
     while i < squares.len() {
-        let between = (i as f32 + 1.5) / LEVELS as f32;
-        squares[i] = between * between;
+        // (i + 1.5) / 16, squared, times 32,768.
+        let doubled = 2 * i as i16 + 3;
+        squares[i] = 32 * doubled * doubled;
         i += 1;
     }
     squares
 };
+
+/// A square in fixed point, rounded down, held at the most there is.
+#[inline(always)]
+fn fixed(square: f32) -> i16 {
+    floored_i32(min_f32(square * SQUARE_ONE, f32::from(i16::MAX))) as i16
+}
+
+/// The level of obliqueness of a cosine's square in fixed point.
+#[inline(always)]
+fn level_of(square: i16) -> u16 {
+    BETWEEN_LEVELS.iter().map(|&between| u16::from(square >= between)).sum()
+}
 
 /// One of four bands of rows, from `first` on.
 struct WriteRows<'a> {
@@ -242,6 +272,21 @@ mod tests {
         }
         let along_z = observed(&VolumeConfig { distance: DistanceAlong::Ray, ..config }, |_, v| 256 * (2 + v as u16 / 4));
         assert!(along_z.iter().all(|&depth_m| obliqueness(depth_m) == 1.0 || depth_m == 0.0));
+    }
+
+    #[test]
+    fn levels_in_fixed_point_are_those_of_floats() {
+        let plain = |square: f32| (0..LEVELS - 1).filter(|&i| square >= ((i as f32 + 1.5) / LEVELS as f32).powi(2)).count();
+        let borders = (0..LEVELS - 1).map(|i| ((i as f32 + 1.5) / LEVELS as f32).powi(2));
+        let beside = borders.flat_map(|border| [border.next_down(), border, border.next_up()]);
+        for square in beside.chain((0..=4_000).map(|i| i as f32 / 3_217.0)) {
+            assert_eq!(usize::from(level_of(fixed(square))), plain(square), "{square}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_fused_where_all_is_too_far() {
+        assert!(observed(&VolumeConfig::default(), |_, _| 256).iter().all(|&depth_m| depth_m == 0.0));
     }
 
     #[test]
