@@ -10,14 +10,14 @@ use crate::volume::{
 };
 
 /// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
-const PAST_MAX: u8 = 5;
+const PAST_MAX: usize = 5;
 /// The shares of one observation for each weight of the past, times -32,768.
 #[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
-const SHARES: [i16; PAST_MAX as usize + 1] = {
-    let mut shares = [0; PAST_MAX as usize + 1];
+const SHARES: [i16; PAST_MAX + 1] = {
+    let mut shares = [0; PAST_MAX + 1];
     let mut past = 0;
     while past <= PAST_MAX {
-        shares[past as usize] = share_of_one(past);
+        shares[past] = share_of_one(past as i32);
         past += 1;
     }
     shares
@@ -34,12 +34,13 @@ impl Fusion<'_> {
             return;
         }
         let bits = packed(&near);
-        let share = self.colour_shares(scratch, &near, [red, green, blue], weight);
         let (mut reds, mut greens, mut blues) = ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
         match self.seen.colour {
             Some(image) => scratch.pixels_at(bits, image, |i, pixel| [reds[i], greens[i], blues[i]] = pixel),
             None => scratch.pixels_at(bits, self.seen.grey, |i, pixel| reds[i] = pixel),
         }
+        // In between, bytes stored one by one arrive where vectors read them.
+        let share = self.colour_shares(scratch, &near, [red, green, blue], weight);
         // What was grey stays grey: one plane is the others.
         let grey = self.seen.colour.is_none() && red == green && green == blue;
         average(red, &reds, &share);

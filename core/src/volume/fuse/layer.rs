@@ -45,9 +45,10 @@ impl Shares {
     }
 }
 
-/// Share of one observation where the past weighs `past`, times -32,768: so it fits its type even where it is all.
+/// Share of one observation where the past weighs `past`, up to 255, times -32,768: so it fits its type even where it is all. A division has
+/// vectors, a table has none.
 #[inline(always)]
-pub(super) const fn share_of_one(past: u8) -> i16 {
+pub(super) const fn share_of_one(past: i32) -> i16 {
     -rounded_i32(32_768.0 / (past as f32 + 1.0)) as i16
 }
 
@@ -201,14 +202,12 @@ impl Fusion<'_> {
     /// What each observation weighs, and its share of the average.
     #[inline(always)]
     fn share(&self, scratch: &mut Scratch, weight: &Layer<u8>) {
-        for ((past, &weight), &observed_m) in scratch.past.iter_mut().zip(weight).zip(&scratch.observed_m) {
-            *past = self.past(weight, observed_m) as u8;
-        }
+        let pasts = weight.iter().zip(&scratch.observed_m).map(|(&weight, &observed_m)| self.past(weight, observed_m));
         if self.plain_weights {
-            // A division for each: it has vectors, a table has none.
-            scratch.share.iter_mut().zip(&scratch.past).for_each(|(share, &past)| *share = share_of_one(past));
+            scratch.share.iter_mut().zip(pasts).for_each(|(share, past)| *share = share_of_one(past));
             return;
         }
+        scratch.past.iter_mut().zip(pasts).for_each(|(to, past)| *to = past as u8);
         self.weigh(scratch);
         for ((share, &gain), &past) in scratch.share.iter_mut().zip(&scratch.gain).zip(&scratch.past) {
             *share = self.shares.of(i32::from(past) + i32::from(gain), i32::from(gain));
@@ -285,8 +284,8 @@ mod tests {
     #[test]
     fn a_share_of_one_observation_is_that_of_a_gain_of_one() {
         let shares = Shares::new();
-        for past in 0..=u8::MAX {
-            assert_eq!(share_of_one(past), shares.of(i32::from(past) + 1, 1), "{past}");
+        for past in 0..=255 {
+            assert_eq!(share_of_one(past), shares.of(past + 1, 1), "{past}");
         }
     }
 }
