@@ -165,31 +165,26 @@ fn store(row: &mut [i16], u: usize, pixels: Eight<i16>) {
     }
 }
 
-/// Pixels checked at once.
-const BLOCK: usize = 64;
-
 /// Takes from the left row what the right row contradicts; both in px, [`NO_PLANE`] where there is no disparity. Returns how many matches
-/// there were and how many of them went.
+/// there were and how many of them went. The right row is used up.
 #[inline(always)]
-fn check_consistency(left: &mut [i16], right: &[i16], threshold: u16) -> [u32; 2] {
-    let (mut matched, mut contradicted) = (0, 0);
-    for (i, left) in left.chunks_mut(BLOCK).enumerate() {
-        // First what cannot be done many at a time.
-        let mut partners = [NO_PLANE; BLOCK];
-        for ((u, partner), d) in (i * BLOCK..).zip(&mut partners).zip(&*left) {
-            *partner = right.get(u.wrapping_sub(usize::from(d.unsigned_abs()))).copied().unwrap_or(NO_PLANE);
+fn check_consistency(left: &mut [i16], right: &mut [i16], threshold: u16) -> [u32; 2] {
+    // First what cannot be done many at a time: each pixel's partner takes its place in the right row. None is to its right, so that from
+    // the end on none is gone before it is asked for.
+    for (u, disparity) in left.iter().enumerate().rev() {
+        let partner = right.get(u.wrapping_sub(usize::from(disparity.unsigned_abs()))).copied().unwrap_or(NO_PLANE);
+        if let Some(place) = right.get_mut(u) {
+            *place = partner;
         }
-        let (mut matched_here, mut contradicted_here) = (0u16, 0u16);
-        for (disparity, &back) in left.iter_mut().zip(&partners) {
-            // Which pixels agree is a coin toss at edges: no branches.
-            let d = *disparity;
-            let (is_match, agrees) = (d != NO_PLANE, (back != NO_PLANE) & (back.abs_diff(d) <= threshold));
-            matched_here += u16::from(is_match);
-            contradicted_here += u16::from(is_match & !agrees);
-            *disparity = if is_match & agrees { d } else { NO_PLANE };
-        }
-        matched += u32::from(matched_here);
-        contradicted += u32::from(contradicted_here);
     }
-    [matched, contradicted]
+    let (mut matched, mut contradicted) = (0u16, 0u16);
+    for (disparity, &back) in left.iter_mut().zip(&*right) {
+        // Which pixels agree is a coin toss at edges: no branches.
+        let d = *disparity;
+        let (is_match, agrees) = (d != NO_PLANE, (back != NO_PLANE) & (back.abs_diff(d) <= threshold));
+        matched += u16::from(is_match);
+        contradicted += u16::from(is_match & !agrees);
+        *disparity = if is_match & agrees { d } else { NO_PLANE };
+    }
+    [matched.into(), contradicted.into()]
 }
