@@ -134,7 +134,7 @@ impl<'a> SampledRows<'a> {
 }
 
 /// Texture of a descriptor: the sum of its gradients' magnitudes.
-#[inline(never)]
+#[inline(always)]
 pub(super) fn texture(a: &Descriptor) -> u32 {
     distance(a, &Descriptor::UNTEXTURED)
 }

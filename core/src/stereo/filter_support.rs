@@ -143,7 +143,7 @@ fn load_border<const N: usize>(row: &[i16], start: usize, skip: usize) -> [i16; 
 }
 
 /// Takes the points whose flag is 1, not 0; says how many there were.
-#[inline(always)]
+#[inline(never)]
 fn remove(points: &mut [i16], flags: &[u16; BLOCK]) -> u32 {
     let mut removed = 0u16;
     for (point, &flag) in points.iter_mut().zip(flags) {

@@ -23,10 +23,10 @@ impl Work for GradientRows<'_> {
         let Self { image, first, du, dv } = self;
         let width = image.width().max(1);
         for (v, (du, dv)) in (first..).zip(du.chunks_exact_mut(width).zip(dv.chunks_exact_mut(width))) {
-            du.fill(FLAT);
-            dv.fill(FLAT);
-            if v > 0 && v + 1 < image.height() {
-                row(image.row(v - 1), image.row(v), image.row(v + 1), du, dv);
+            let is_inner = v > 0 && v + 1 < image.height();
+            if !is_inner || row(image.row(v - 1), image.row(v), image.row(v + 1), du, dv).is_none() {
+                du.fill(FLAT);
+                dv.fill(FLAT);
             }
         }
     }
@@ -45,6 +45,10 @@ fn row(above: &[u8], here: &[u8], below: &[u8], du: &mut [u8], dv: &mut [u8]) ->
     let (a0, a1, a2) = (above.get(..n)?, above.get(1..)?.get(..n)?, above.get(2..)?.get(..n)?);
     let (h0, h2) = (here.get(..n)?, here.get(2..)?.get(..n)?);
     let (b0, b1, b2) = (below.get(..n)?, below.get(1..)?.get(..n)?, below.get(2..)?.get(..n)?);
+    for gradients in [&mut *du, &mut *dv] {
+        *gradients.first_mut()? = FLAT;
+        *gradients.last_mut()? = FLAT;
+    }
     let (du, dv) = (du.get_mut(1..)?.get_mut(..n)?, dv.get_mut(1..)?.get_mut(..n)?);
     let wide = i16::from;
     for i in 0..n {

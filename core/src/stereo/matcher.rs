@@ -186,6 +186,7 @@ impl<'s> StereoMatcher<'s> {
         let status = self.begin(config, left, right);
         let mut report = StereoReport { status, pixels: (self.width * self.height) as u32, ..StereoReport::default() };
         if report.status != StereoStatus::Matched {
+            self.disparity.fill(0);
             return report;
         }
         self.find_gradients(left, right, invalid, executor);
@@ -198,6 +199,7 @@ impl<'s> StereoMatcher<'s> {
         done(StereoStep::Triangulation);
         if report.triangles_left == 0 || report.triangles_right == 0 {
             report.status = StereoStatus::TooFewSupportPoints;
+            self.disparity.fill(0);
             return report;
         }
         self.match_densely(config, executor, &mut report);
@@ -250,7 +252,6 @@ impl<'s> StereoMatcher<'s> {
     fn begin(&mut self, config: &StereoConfig, left: View<'_, u8>, right: View<'_, u8>) -> StereoStatus {
         self.width = left.width().min(self.image_width).max(1);
         self.height = left.height().min(self.image_height).max(1);
-        self.disparity.fill(0);
         let mut problems = Problems::new();
         config.validate(&mut problems);
         if !problems.is_empty() {
