@@ -35,6 +35,11 @@ fn a_matcher_remembers_nothing_of_the_pair_before() {
             let report = matcher.compute(&config, left.view(), right.view(), &Serial);
             let disparity: Vec<u16> = matcher.disparity_q8().rows().flatten().copied().collect();
             assert!((report, disparity) == fresh, "a larger buffer and another pair before");
+            for unlike in [flat(200, 80, 0), flat(199, 80, 0)] {
+                matcher.compute(&config, left.view(), right.view(), &Serial);
+                matcher.compute(&config, left.view(), unlike.view(), &Serial);
+                assert!(matcher.disparity_q8().rows().flatten().all(|&d| d == 0), "without an answer nothing of it is left");
+            }
         }
     });
 }
