@@ -169,12 +169,12 @@ fn store(row: &mut [i16], u: usize, pixels: Eight<i16>) {
 /// there were and how many of them went. The right row is used up.
 #[inline(always)]
 fn check_consistency(left: &mut [i16], right: &mut [i16], threshold: u16) -> [u32; 2] {
-    // First what cannot be done many at a time: each pixel's partner takes its place in the right row. None is to its right, so that from
-    // the end on none is gone before it is asked for.
+    // First what cannot be done many at a time: the right row becomes that of each pixel's partner. None is to a pixel's right, so that
+    // from the end on none is gone before it is asked for.
     for (u, disparity) in left.iter().enumerate().rev() {
         let partner = right.get(u.wrapping_sub(usize::from(disparity.unsigned_abs()))).copied().unwrap_or(NO_PLANE);
-        if let Some(place) = right.get_mut(u) {
-            *place = partner;
+        if let Some(slot) = right.get_mut(u) {
+            *slot = partner;
         }
     }
     let (mut matched, mut contradicted) = (0u16, 0u16);
