@@ -3,7 +3,11 @@
 //! Memory: that of the cache of requested blocks, which fusion does not need; tiles are as small as fits, from 8 px on, and every 4 x 4
 //! of them are one tile of a coarser level.
 
-use crate::{geometry::scalar::max_f32, image::View, part::part_mut};
+use crate::{
+    geometry::scalar::max_f32,
+    image::View,
+    part::{part, part_mut},
+};
 
 /// Least side of a tile, px, as a shift.
 const TILE_SHIFT: u32 = 3;
@@ -37,8 +41,8 @@ impl<'a> Horizon<'a> {
         let coarse = coarse.get_mut(..tiles(shift + LEVEL_SHIFT))?;
         let [columns, _] = columns_rows(shift);
         let [coarse_columns, _] = columns_rows(shift + LEVEL_SHIFT);
-        greatest(depth_m.rows(), shift, columns, fine);
-        greatest(fine.chunks(columns.max(1)), LEVEL_SHIFT, coarse_columns, coarse);
+        greatest(depth_m, shift, columns, fine);
+        greatest(View::new(fine, columns, fine.len().checked_div(columns)?)?, LEVEL_SHIFT, coarse_columns, coarse);
         Some(Self {
             fine: Tiles { depth_m: fine, columns, shift },
             coarse: Tiles { depth_m: coarse, columns: coarse_columns, shift: shift + LEVEL_SHIFT },
@@ -63,13 +67,25 @@ impl<'a> Horizon<'a> {
     }
 }
 
+/// Columns looked at together.
+const BLOCK: usize = 64;
+
 /// The greatest of each `1 << shift` columns and rows.
-fn greatest<'d>(rows: impl Iterator<Item = &'d [f32]>, shift: u32, columns: usize, tiles: &mut [f32]) {
+#[inline(never)]
+fn greatest(image: View<'_, f32>, shift: u32, columns: usize, tiles: &mut [f32]) {
     tiles.fill(0.0);
-    for (v, row) in rows.enumerate() {
-        let tiles = part_mut(tiles, (v >> shift) * columns..);
-        for (tile, pixels) in tiles.iter_mut().zip(row.chunks(1 << shift)) {
-            *tile = pixels.iter().fold(*tile, |greatest, &depth_m| max_f32(depth_m, greatest));
+    let side = 1 << shift;
+    for (first, tiles) in (0..image.height()).step_by(side).zip(tiles.chunks_exact_mut(columns.max(1))) {
+        for start in (0..image.width()).step_by(BLOCK) {
+            // Of each column first: many at a time.
+            let mut along = [0.0; BLOCK];
+            for v in first..image.height().min(first + side) {
+                let pixels = part(image.row(v), start..);
+                along.iter_mut().zip(pixels).for_each(|(greatest, &depth_m)| *greatest = max_f32(depth_m, *greatest));
+            }
+            for (tile, along) in part_mut(tiles, start >> shift..).iter_mut().zip(along.chunks(side)) {
+                *tile = along.iter().fold(*tile, |greatest, &depth_m| max_f32(depth_m, greatest));
+            }
         }
     }
 }
