@@ -25,6 +25,24 @@ pub(crate) fn part_mut<T, R: SliceIndex<[T], Output = [T]>>(slice: &mut [T], ran
     found.unwrap_or(&mut [])
 }
 
+/// `N` entries of `row` from `start` on, after `skip` times `none`; those beyond the row are `none`.
+#[inline(always)]
+pub(crate) fn padded<T: Copy, const N: usize>(row: &[T], start: usize, skip: usize, none: T) -> [T; N] {
+    match row.get(start..).and_then(|rest| rest.first_chunk()) {
+        Some(all) if skip == 0 => *all,
+        _ => padded_at_border(row, start, skip, none),
+    }
+}
+
+/// As [`padded`], where a border of the row is among them.
+#[cold]
+#[inline(never)]
+fn padded_at_border<T: Copy, const N: usize>(row: &[T], start: usize, skip: usize, none: T) -> [T; N] {
+    let mut entries = [none; N];
+    entries.iter_mut().skip(skip).zip(row.iter().skip(start)).for_each(|(to, from)| *to = *from);
+    entries
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -35,6 +53,16 @@ mod tests {
         assert_eq!((part(&numbers, 1..3), part(&numbers, 4..)), (&[2, 3][..], &[][..]));
         part_mut(&mut numbers, ..2).fill(0);
         assert_eq!(numbers, [0, 0, 3, 4]);
+    }
+
+    #[test]
+    fn what_lies_beyond_a_row_is_padded() {
+        let row = [1, 2, 3, 4, 5];
+        assert_eq!(padded(&row, 1, 0, 0), [2, 3, 4]);
+        assert_eq!(padded(&row, 3, 0, 0), [4, 5, 0]);
+        assert_eq!(padded(&row, 0, 2, 9), [9, 9, 1]);
+        assert_eq!(padded(&row, 4, 1, 0), [0, 5, 0]);
+        assert_eq!((padded(&row, 5, 0, 7), padded(&row, 8, 0, 7)), ([7; 3], [7; 3]));
     }
 
     #[test]

@@ -64,14 +64,8 @@ pub(super) struct Triangulation<'s> {
 
 /// The half-edge before one in its triangle.
 #[inline(always)]
-fn before(half_edge: u32) -> u32 {
+fn previous(half_edge: u32) -> u32 {
     if half_edge.is_multiple_of(3) { half_edge + 2 } else { half_edge - 1 }
-}
-
-/// Twice the signed area of the triangle a, b, c.
-fn orientation(a: SupportPoint, b: SupportPoint, c: SupportPoint) -> i64 {
-    let d = |x: u16, y: u16| i64::from(x) - i64::from(y);
-    d(b.u, a.u) * d(c.v, a.v) - d(b.v, a.v) * d(c.u, a.u)
 }
 
 /// A point as seen from another.
@@ -95,6 +89,11 @@ impl Offset {
     fn cross(self, other: Self) -> i64 {
         self.x * other.y - self.y * other.x
     }
+}
+
+/// Twice the signed area of the triangle a, b, c.
+fn orientation(a: SupportPoint, b: SupportPoint, c: SupportPoint) -> i64 {
+    Offset::new(b, a).cross(Offset::new(c, a))
 }
 
 /// Whether the point from which a, b and c are seen lies strictly within the circle through them, whose orientation is positive.
@@ -231,7 +230,7 @@ impl<'s> Triangulation<'s> {
         loop {
             let opposite = self.twin.get(3 * t);
             if opposite != NONE {
-                let c = seen(self, before(opposite));
+                let c = seen(self, previous(opposite));
                 if in_circle([a, b, c]) {
                     self.flip(p, t, opposite);
                     b = c;
@@ -250,7 +249,7 @@ impl<'s> Triangulation<'s> {
     /// Makes of triangle t = (b, a, p) and, beyond its edge b-a, (a, b, c) the triangles (c, a, p) and (b, c, p).
     fn flip(&mut self, p: u32, t: u32, opposite: u32) {
         let other = opposite / 3;
-        let (after, before) = (before(before(opposite)), before(opposite));
+        let (after, before) = (previous(previous(opposite)), previous(opposite));
         let (b, c) = (self.corner.get(after), self.corner.get(before));
         let (beyond_bc, beyond_ca, beyond_pb) = (self.twin.get(after), self.twin.get(before), self.twin.get(3 * t + 2));
         self.corner.set(3 * t, c);

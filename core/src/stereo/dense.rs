@@ -18,7 +18,7 @@ use super::{
     prior::{CellGrid, DisparitySet, NO_PLANE, PlaneCost},
 };
 use crate::{
-    part::{part, part_mut},
+    part::{padded, part, part_mut},
     sad::{Comparison, Eight, Kernels, LANES},
 };
 
@@ -140,19 +140,7 @@ fn list_candidates<'l>(set: &DisparitySet, cost: u32, list: &'l mut [u32; 256]) 
 /// Eight pixels of a row from column `u` on; those beyond it have no plane.
 #[inline(always)]
 fn load(row: &[i16], u: usize) -> Eight<i16> {
-    match row.get(u..).and_then(|row| row.first_chunk()) {
-        Some(all) => *all,
-        None => load_last(row, u),
-    }
-}
-
-/// As [`load`], where fewer than eight are left.
-#[cold]
-#[inline(never)]
-fn load_last(row: &[i16], u: usize) -> Eight<i16> {
-    let mut pixels = [NO_PLANE; LANES];
-    pixels.iter_mut().zip(row.iter().skip(u)).for_each(|(to, from)| *to = *from);
-    pixels
+    padded(row, u, 0, NO_PLANE)
 }
 
 /// Writes eight pixels, those within the row.

@@ -4,7 +4,7 @@
 
 use crate::{
     parallel::Work,
-    part::{part, part_mut},
+    part::{padded, part, part_mut},
 };
 
 use super::{StereoConfig, config::MAX_PLAUSIBLE_WINDOW, support::NO_MATCH};
@@ -44,27 +44,25 @@ fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, bef
     for (v, row) in grid.chunks_exact_mut(width).enumerate() {
         let (top, rows) = (v.saturating_sub(window), v.min(window) + window + 1);
         for (first, points) in (0usize..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
-            let here: [i16; BLOCK] = load(points, 0, 0);
-            let mut found = [0u16; BLOCK];
+            let here: [i16; BLOCK] = padded(points, 0, 0, NO_MATCH);
+            let (mut found, mut lonely) = ([0u16; BLOCK], [0; BLOCK]);
             for row in before.chunks_exact(width).skip(top).take(rows) {
                 // What lies left of the row is no match.
-                let around: [i16; AROUND] = load(row, first.saturating_sub(window), window - window.min(first));
+                let around: [i16; AROUND] = padded(row, first.saturating_sub(window), window - window.min(first), NO_MATCH);
                 for others in around.array_windows::<BLOCK>().take(2 * window + 1) {
                     for ((found, &other), &point) in found.iter_mut().zip(others).zip(&here) {
                         *found += u16::from(are_alike(other, point, threshold));
                     }
                 }
-                // Most have found enough after a row or two.
-                let mut missing = 0;
-                for (&found, &point) in found.iter().zip(&here) {
-                    missing |= u16::from(found < config.plausible_min) & u16::from(point != NO_MATCH);
+                for (lonely, (&found, &point)) in lonely.iter_mut().zip(found.iter().zip(&here)) {
+                    *lonely = u16::from(found < config.plausible_min) & u16::from(point != NO_MATCH);
                 }
-                if missing == 0 {
+                // Most have found enough after a row or two.
+                if lonely.iter().fold(0, |any, lonely| any | lonely) == 0 {
                     break;
                 }
             }
-            found.iter_mut().for_each(|found| *found = u16::from(*found < config.plausible_min));
-            removed += remove(points, &found);
+            removed += remove(points, &lonely);
         }
     }
     removed
@@ -94,7 +92,7 @@ fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 
         let Some((above, rest)) = grid.split_at_mut_checked(start) else { break };
         let Some((row, below)) = rest.split_at_mut_checked(width) else { break };
         for (first, points) in (0usize..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
-            let here: [i16; BLOCK] = load(points, 0, 0);
+            let here: [i16; BLOCK] = padded(points, 0, 0, NO_MATCH);
             let mut between = [1; BLOCK];
             for rows in [part(above, above.len().saturating_sub(reach * width)..), part(below, ..below.len().min(reach * width))] {
                 let any = any_alike(rows.chunks_exact(width), first, &here, threshold);
@@ -111,7 +109,7 @@ fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 
 fn any_alike<'r>(rows: impl Iterator<Item = &'r [i16]>, first: usize, points: &[i16; BLOCK], threshold: u16) -> [u16; BLOCK] {
     let mut any = [0u16; BLOCK];
     for row in rows {
-        let others: [i16; BLOCK] = load(row, first, 0);
+        let others: [i16; BLOCK] = padded(row, first, 0, NO_MATCH);
         for ((any, other), &point) in any.iter_mut().zip(others).zip(points) {
             *any |= u16::from(are_alike(other, point, threshold));
         }
@@ -123,23 +121,6 @@ fn any_alike<'r>(rows: impl Iterator<Item = &'r [i16]>, first: usize, points: &[
 #[inline(always)]
 fn are_alike(other: i16, point: i16, threshold: u16) -> bool {
     (other != NO_MATCH) & (other.abs_diff(point) <= threshold)
-}
-
-/// The candidates of a row from column `start` on, after `skip` of no match; those beyond the row have none.
-#[inline(always)]
-fn load<const N: usize>(row: &[i16], start: usize, skip: usize) -> [i16; N] {
-    match row.get(start..).and_then(|rest| rest.first_chunk()) {
-        Some(all) if skip == 0 => *all,
-        _ => load_border(row, start, skip),
-    }
-}
-
-/// As [`load`], where a border of the row is among them.
-#[inline(never)]
-fn load_border<const N: usize>(row: &[i16], start: usize, skip: usize) -> [i16; N] {
-    let mut candidates = [NO_MATCH; N];
-    candidates.iter_mut().skip(skip).zip(row.iter().skip(start)).for_each(|(to, from)| *to = *from);
-    candidates
 }
 
 /// Takes the points whose flag is 1, not 0; says how many there were.

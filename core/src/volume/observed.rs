@@ -18,7 +18,7 @@ use crate::{
     },
     image::{View, ViewMut},
     parallel::{Bands, Executor, Work, each, zip2},
-    part::{part, part_mut},
+    part::padded,
 };
 
 /// Columns worked on at once.
@@ -107,18 +107,9 @@ impl ObservedDepth<'_> {
     /// The disparities of a block, moved by so many pixels; 0 outside the image.
     #[inline(always)]
     fn tap(&self, first: usize, v: usize, du: isize, dv: isize) -> [u16; BLOCK] {
-        let mut tap = [0; BLOCK];
-        let Some(v) = v.checked_add_signed(dv).filter(|&v| v < self.disparity_q8.height()) else { return tap };
+        let Some(v) = v.checked_add_signed(dv).filter(|&v| v < self.disparity_q8.height()) else { return [0; BLOCK] };
         let outside = du.min(0).unsigned_abs().saturating_sub(first).min(BLOCK);
-        let start = first.saturating_add_signed(du);
-        let row = part(self.disparity_q8.row(v), start..);
-        match row.first_chunk() {
-            Some(all) if outside == 0 => *all,
-            _ => {
-                part_mut(&mut tap, outside..).iter_mut().zip(row).for_each(|(to, from)| *to = *from);
-                tap
-            }
-        }
+        padded(self.disparity_q8.row(v), first.saturating_add_signed(du), outside, 0)
     }
 
     /// The least disparity about each pixel of a block: of what has one within the reach of edges, and of all, none being 0, within that of colours.
@@ -175,9 +166,9 @@ const BETWEEN_LEVELS: [i16; LEVELS as usize - 1] = {
     let mut squares = [0; LEVELS as usize - 1];
     let mut i = 0;
     while i < squares.len() {
-        // (i + 1.5) / 16, squared, times 32,768.
-        let doubled = 2 * i as i16 + 3;
-        squares[i] = 32 * doubled * doubled;
+        // (i + 1.5) / LEVELS, squared.
+        let doubled = 2 * i as u32 + 3;
+        squares[i] = (SQUARE_ONE as u32 / (2 * LEVELS).pow(2) * doubled.pow(2)) as i16;
         i += 1;
     }
     squares

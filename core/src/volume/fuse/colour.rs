@@ -11,17 +11,9 @@ use crate::volume::{
 
 /// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
 const PAST_MAX: usize = 5;
-/// The shares of one observation for each weight of the past, times -32,768.
-#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
-const SHARES: [i16; PAST_MAX + 1] = {
-    let mut shares = [0; PAST_MAX + 1];
-    let mut past = 0;
-    while past <= PAST_MAX {
-        shares[past] = share_of_one(past as i32);
-        past += 1;
-    }
-    shares
-};
+/// The shares of a colour seen for each weight of the past, times -32,768.
+const COLOUR_SHARES: [i16; PAST_MAX + 1] =
+    [share_of_one(0), share_of_one(1), share_of_one(2), share_of_one(3), share_of_one(4), share_of_one(5)];
 
 impl Fusion<'_> {
     /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is that after this observation.
@@ -72,7 +64,7 @@ impl Fusion<'_> {
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
     fn colour_shares(&self, scratch: &Scratch, near: &Layer<u8>, planes: [&Layer<u8>; 3], weight: &Layer<u8>) -> Layer<i16> {
-        let [all, second, third, fourth, fifth, sixth] = SHARES;
+        let [all, second, third, fourth, fifth, sixth] = COLOUR_SHARES;
         let noted = self.seen.noted;
         let mut share = [0; LAYER_VOXELS];
         for (share, &weight) in share.iter_mut().zip(weight) {
