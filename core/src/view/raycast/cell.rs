@@ -3,11 +3,6 @@
 use super::ray_camera::{AXES, Ray};
 use crate::geometry::scalar::{max_f32, min_f32};
 
-/// Most steps towards a root; the first hits it where the field is linear.
-const MAX_REFINEMENTS: usize = 6;
-/// A root is good when the field is this near 0, in units of truncation / 32,767.
-const GOOD_ENOUGH: f32 = 8.0;
-
 /// The eight corners of a cell; corner `x + 2 y + 4 z`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Corners {
@@ -58,106 +53,54 @@ impl Corners {
 
 /// The trilinear field in a cell, as the coefficients of 1, x, y, z, xy, xz, yz, xyz for x, y, z from 0 to 1.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Field {
-    one: f32,
-    x: f32,
-    y: f32,
-    z: f32,
-    xy: f32,
-    xz: f32,
-    yz: f32,
-    xyz: f32,
-}
+pub(super) struct Field(pub [f32; 8]);
 
 impl Field {
-    #[inline]
+    #[inline(always)]
     pub fn new(corners: &[f32; 8]) -> Self {
         let [a, b, c, d, e, f, g, h] = *corners;
         let (x, y, z) = (b - a, c - a, e - a);
         let (xy, xz, yz) = (d - c - x, f - e - x, g - e - y);
-        Self { one: a, x, y, z, xy, xz, yz, xyz: (h - g) - (f - e) - xy }
+        Self([a, x, y, z, xy, xz, yz, (h - g) - (f - e) - xy])
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, [x, y, z]: [f32; 3]) -> f32 {
-        (self.one + self.z * z) + y * (self.y + self.yz * z) + x * ((self.x + self.xz * z) + y * (self.xy + self.xyz * z))
+        let [one, by_x, by_y, by_z, by_xy, by_xz, by_yz, by_xyz] = self.0;
+        (one + by_z * z) + y * (by_y + by_yz * z) + x * ((by_x + by_xz * z) + y * (by_xy + by_xyz * z))
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn gradient(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let [_, by_x, by_y, by_z, by_xy, by_xz, by_yz, by_xyz] = self.0;
         [
-            (self.x + self.xz * z) + y * (self.xy + self.xyz * z),
-            (self.y + self.yz * z) + x * (self.xy + self.xyz * z),
-            (self.z + self.yz * y) + x * (self.xz + self.xyz * y),
+            (by_x + by_xz * z) + y * (by_xy + by_xyz * z),
+            (by_y + by_yz * z) + x * (by_xy + by_xyz * z),
+            (by_z + by_yz * y) + x * (by_xz + by_xyz * y),
         ]
     }
-}
-
-/// A ray's way through a cell, from where it enters to where it leaves, in the cell's own coordinates.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RaySegment {
-    from: [f32; 3],
-    to: [f32; 3],
 }
 
 /// In place of an axis: within a cell, not on a face.
 pub(super) const NO_AXIS: usize = 3;
 
-impl RaySegment {
-    /// The way between two depths through a cell that the ray enters and leaves across `axes` ([`NO_AXIS`] where it begins within), given
-    /// where the ray would be at depth 0 from the cell's first corner. Coordinates on these faces are exactly 0 or 1.
-    #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn new(ray: &Ray, offset: [f32; 3], depths_m: [f32; 2], axes: [usize; 2]) -> Self {
-        let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
-        for axis in AXES {
-            let ahead = ray.ahead[axis] as f32;
-            let first = within(offset[axis], ray.slope[axis], depths_m[0]);
-            let last = within(offset[axis], ray.slope[axis], depths_m[1]);
-            from[axis] = if axes[0] == axis { 1.0 - ahead } else { first };
-            to[axis] = if axes[1] == axis { ahead } else { last };
-        }
-        Self { from, to }
-    }
+/// The point a share of a ray's way through a cell, from where it enters to where it leaves.
+#[inline(always)]
+pub(super) fn along([[x, y, z], [to_x, to_y, to_z]]: [[f32; 3]; 2], share: f32) -> [f32; 3] {
+    [x + (to_x - x) * share, y + (to_y - y) * share, z + (to_z - z) * share]
+}
 
-    /// The point a share of the way through.
-    #[inline]
-    pub fn at(&self, share: f32) -> [f32; 3] {
-        let ([x, y, z], [to_x, to_y, to_z]) = (self.from, self.to);
-        [x + (to_x - x) * share, y + (to_y - y) * share, z + (to_z - z) * share]
+/// Where a ray that begins `offset` from a cell's first corner is at a depth, in the cell's coordinates: exactly 0 or 1 along the axis of the
+/// face that it passes, lower (0) or upper (1); [`NO_AXIS`] where it passes none.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+pub(super) fn position(ray: &Ray, offset: [f32; 3], depth_m: f32, face: usize, upper: u32) -> [f32; 3] {
+    let mut position = [0.0; 3];
+    for axis in AXES {
+        let between = within(offset[axis], ray.slope[axis], depth_m);
+        position[axis] = if axis == face { upper as f32 } else { between };
     }
-
-    /// Where the ray enters, or where it leaves.
-    #[inline]
-    pub fn end(&self, leaves: bool) -> [f32; 3] {
-        if leaves { self.to } else { self.from }
-    }
-
-    /// The share of the way at which `field` falls from `first` > 0 to 0, where it ends at `last` <= 0: false position, which halves the
-    /// weight of an end that stays (the Illinois rule), so that both ends close in.
-    #[inline]
-    pub fn root(&self, field: &Field, first: f32, last: f32) -> f32 {
-        let (mut low, mut high) = ([0.0, first], [1.0, last]);
-        let mut share = 0.0;
-        let mut side = 0;
-        for _ in 0..MAX_REFINEMENTS {
-            share = low[0] + (high[0] - low[0]) * (low[1] / (low[1] - high[1]));
-            let value = field.at(self.at(share));
-            if value < GOOD_ENOUGH && value > -GOOD_ENOUGH {
-                break;
-            }
-            if value > 0.0 {
-                low = [share, value];
-                high[1] *= if side > 0 { 0.5 } else { 1.0 };
-                side = 1;
-            } else {
-                high = [share, value];
-                low[1] *= if side < 0 { 0.5 } else { 1.0 };
-                side = -1;
-            }
-        }
-        max_f32(0.0, min_f32(share, 1.0))
-    }
+    position
 }
 
 /// The coordinate in a cell of a ray that begins `offset` from its first corner, held within the cell.

@@ -1,138 +1,91 @@
-//! A lattice point of a block in one word, so that a step, the block it leads to and a voxel are a few integer operations.
+//! Cells of a block and their corners as words, so that a step, the block it leads to and a voxel are a few integer operations.
 
-use crate::volume::BLOCK_VOXELS;
+use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS};
 
-/// A lattice point or cell of a block: `x + 32 y + 1024 z` with 8 added to each coordinate, from -1 (7) to 8 (16).
+/// The last coordinate in a block.
+const LAST: u32 = BLOCK_SIDE as u32 - 1;
+
+/// Steps from one cell or voxel to the next along an axis.
+#[inline(always)]
+pub(super) const fn stride(axis: usize) -> u32 {
+    1 << (3 * axis as u32)
+}
+
+/// The lowest bit of each coordinate of a [`CellIndex`].
+const UNITS: u32 = 0o111;
+
+/// A cell of a block, `x + 8 y + 64 z`: the voxel of its first corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct CellIndex {
-    at: u32,
-}
+pub(super) struct CellIndex(u32);
 
-/// Bits per coordinate.
-const FIELD: u32 = 5;
-/// One step along each axis.
-const UNITS: [u32; 3] = [1, 1 << FIELD, 1 << (2 * FIELD)];
-/// The bits set for coordinates from 0 to 7.
-const INSIDE: u32 = 8 * (1 | 1 << FIELD | 1 << (2 * FIELD));
-/// The bits set for a coordinate of 8: in the next block.
-const BEYOND: u32 = 2 * INSIDE;
-/// Steps from one voxel to the next along each axis.
-const VOXEL_STRIDES: [usize; 3] = [1, 8, 64];
-
-/// How a cell's faces across one axis are laid out.
-#[derive(Debug)]
-pub(super) struct CellFace {
-    /// The other axes.
-    pub u: usize,
-    /// The other axes.
-    pub v: usize,
-    /// From the lower face to the upper.
-    pub delta: u32,
-    /// From a face's first corner along `v`.
-    pub delta_v: u32,
-    /// From a face's first corner to its last.
-    pub far: u32,
-    /// From voxel to voxel along `u`.
-    pub stride_u: usize,
-    /// From voxel to voxel along `v`.
-    pub stride_v: usize,
-}
-
-/// By axis.
-pub(super) static FACES: [CellFace; 3] = [face(0, 1, 2), face(1, 0, 2), face(2, 0, 1)];
-
-#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
-const fn face(axis: usize, u: usize, v: usize) -> CellFace {
-    CellFace {
-        u,
-        v,
-        delta: UNITS[axis],
-        delta_v: UNITS[v],
-        far: UNITS[u] + UNITS[v],
-        stride_u: VOXEL_STRIDES[u],
-        stride_v: VOXEL_STRIDES[v],
-    }
+/// A lattice point: which of the blocks around a block's last corner it is in, 1 the next in x, 2 in y, 4 in z, and its voxel there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Point {
+    block: u32,
+    voxel: u32,
 }
 
 impl CellIndex {
-    /// From a cell's first corner to its last.
-    pub const FAR: u32 = UNITS[0] + UNITS[1] + UNITS[2];
-
-    /// A cell in its block.
+    /// The cell in its block.
     #[inline(always)]
     pub fn new(cell: [i32; 3]) -> Self {
-        Self { at: Self::steps(cell.map(|c| c as u32 & 7)) + INSIDE }
+        let [x, y, z] = cell.map(|c| c as u32 & 7);
+        Self(x | y << 3 | z << 6)
     }
 
-    /// Steps along the axes as one number for [`Self::plus`].
+    /// Some steps on, along one axis, within the block.
     #[inline(always)]
-    pub fn steps([x, y, z]: [u32; 3]) -> u32 {
-        x | y << FIELD | z << (2 * FIELD)
+    pub fn plus(self, steps: u32) -> Self {
+        Self(self.0.wrapping_add(steps))
     }
 
-    /// One step along an axis, upwards if `ahead` is 1, downwards if 0.
+    /// The coordinate along an axis, from 0 to 7.
     #[inline(always)]
-    pub fn delta(axis: usize, ahead: i32) -> u32 {
-        ((2 * ahead - 1) as u32) << (FIELD * axis as u32)
+    pub fn coordinate(self, axis: usize) -> u32 {
+        self.0 >> (3 * axis as u32) & 7
     }
 
-    #[inline(always)]
-    pub fn plus(self, delta: u32) -> Self {
-        Self { at: self.at.wrapping_add(delta) }
-    }
-
-    /// Whether the last step led out of the block.
-    #[inline(always)]
-    pub fn is_outside(self) -> bool {
-        self.at & INSIDE != INSIDE
-    }
-
-    /// The coordinate along an axis, from -1 to 8.
-    #[inline(always)]
-    pub fn coordinate(self, axis: usize) -> i32 {
-        (self.at >> (FIELD * axis as u32) & 0x1F) as i32 - 8
-    }
-
-    /// The layer, below 8, and the bit of a cell in it.
+    /// The layer, below 8, and the bit of the cell in it.
     #[inline(always)]
     pub fn bit(self) -> (usize, u32) {
-        ((self.at >> (2 * FIELD) & 7) as usize, (self.at & 7) | (self.at >> (FIELD - 3) & 0x38))
+        ((self.0 >> 6 & 7) as usize, self.0 & 63)
     }
 
-    /// The voxel in its block, below 512.
+    /// The voxel of the first corner.
     #[inline(always)]
     pub fn voxel(self) -> usize {
-        ((self.at & 7) | (self.at >> (FIELD - 3) & 0x38) | (self.at >> (2 * FIELD - 6) & 0x1C0)) as usize
+        self.0 as usize
     }
 
-    /// Which of the blocks around a block's last corner this point is in: 1 the next in x, 2 in y, 4 in z.
+    /// Whether all corners lie in the block: no coordinate is 7.
     #[inline(always)]
-    pub fn block(self) -> usize {
-        ((self.at >> 4 & 1) | (self.at >> (FIELD + 3) & 2) | (self.at >> (2 * FIELD + 2) & 4)) as usize
+    pub fn is_inner(self) -> bool {
+        self.0 & self.0 >> 1 & self.0 >> 2 & UNITS == 0
     }
 
+    /// The first corner.
     #[inline(always)]
-    pub fn is_in_own_block(self) -> bool {
-        self.at & BEYOND == 0
+    pub fn first(self) -> Point {
+        Point { block: 0, voxel: self.0 }
     }
 
-    /// Whether the point some steps on lies in the same block.
+    /// From a corner to the next along an axis.
     #[inline(always)]
-    pub fn shares_block(self, delta: u32) -> bool {
-        (self.at ^ (self.at + delta)) & BEYOND == 0
+    pub fn edge(self, axis: usize) -> Point {
+        let (stride, is_last) = (stride(axis), self.coordinate(axis) == LAST);
+        Point {
+            block: if is_last { 1 << axis } else { 0 },
+            voxel: if is_last { (LAST * stride).wrapping_neg() } else { stride },
+        }
     }
 
-    /// The corners of the cell.
+    /// The corners.
     #[inline(always)]
-    pub fn corners(self) -> [Self; 8] {
-        [0, 1, 2, 3, 4, 5, 6, 7].map(|corner: u32| self.plus(Self::steps([corner & 1, corner >> 1 & 1, corner >> 2])))
-    }
-
-    /// The block a step led to, relative to the one left, and the place in it.
-    #[inline(always)]
-    pub fn arrived(self) -> ([i32; 3], Self) {
-        let block = [self.coordinate(0) >> 3, self.coordinate(1) >> 3, self.coordinate(2) >> 3];
-        (block, Self { at: self.at & (INSIDE - INSIDE / 8) | INSIDE })
+    pub fn corners(self) -> [Point; 8] {
+        let (a, [x, y, z]) = (self.first(), [self.edge(0), self.edge(1), self.edge(2)]);
+        let (b, c, e) = (a.plus(x), a.plus(y), a.plus(z));
+        let (d, f, g) = (c.plus(x), e.plus(x), e.plus(y));
+        [a, b, c, d, e, f, g, g.plus(x)]
     }
 
     /// The corners of a cell whose corners all lie in the block.
@@ -141,5 +94,46 @@ impl CellIndex {
         // From the cell's first corner to its last.
         let window: &[T; 74] = voxels.get(self.voxel()..)?.first_chunk()?;
         Some([window[0], window[1], window[8], window[9], window[64], window[65], window[72], window[73]])
+    }
+}
+
+impl Point {
+    /// The point at the end of an edge.
+    #[inline(always)]
+    pub fn plus(self, edge: Self) -> Self {
+        Self { block: self.block | edge.block, voxel: self.voxel.wrapping_add(edge.voxel) }
+    }
+
+    /// Which of the blocks it is in, below 8.
+    #[inline(always)]
+    pub fn block(self) -> usize {
+        self.block as usize & 7
+    }
+
+    /// The voxel in its block.
+    #[inline(always)]
+    pub fn voxel(self) -> usize {
+        self.voxel as usize & (BLOCK_VOXELS - 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_and_their_corners_are_where_their_coordinates_say() {
+        for (x, y, z) in (0..8).flat_map(|z| (0..8).flat_map(move |y| (0..8).map(move |x| (x, y, z)))) {
+            let cell = CellIndex::new([x + 8, y - 16, z]);
+            assert_eq!([0, 1, 2].map(|axis| cell.coordinate(axis) as i32), [x, y, z]);
+            assert_eq!((cell.voxel() as i32, cell.bit()), (x + 8 * y + 64 * z, (z as usize, (x + 8 * y) as u32)));
+            assert_eq!(cell.is_inner(), x < 7 && y < 7 && z < 7);
+            for (corner, point) in (0..).zip(cell.corners()) {
+                let [x, y, z] = [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)];
+                assert_eq!(point.block() as i32, x / 8 + 2 * (y / 8) + 4 * (z / 8));
+                assert_eq!(point.voxel() as i32, x % 8 + 8 * (y % 8) + 64 * (z % 8));
+            }
+        }
+        assert_eq!([0, 1, 2].map(stride), [1, BLOCK_SIDE as u32, (BLOCK_SIDE * BLOCK_SIDE) as u32]);
     }
 }

@@ -1,20 +1,22 @@
 //! The colour at a point of a cell.
 
-/// Red, green and blue, 20 bits each, so that sums of them are one: counts of 256 in all make each below 2^16. All 0 is no colour.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Colour(u64);
+use crate::geometry::scalar::floored_i32;
 
-impl Colour {
-    #[inline(always)]
-    pub fn new([red, green, blue]: [u8; 3]) -> Self {
-        Self(u64::from(red) | u64::from(green) << 20 | u64::from(blue) << 40)
-    }
+/// The colours at the corners of a cell: two words each, red and blue, green and whether there is a colour. Sixteen bits apart, so that
+/// sums of what 256 counts in all make of them stay apart too. All 0 is no colour.
+pub(super) type Colours = [u32; 16];
+
+/// One corner's words.
+#[inline(always)]
+pub(super) fn words([red, green, blue]: [u8; 3]) -> [u32; 2] {
+    let is_coloured = u32::from((red | green | blue) != 0);
+    [u32::from(red) | u32::from(blue) << 16, u32::from(green) | is_coloured << 16]
 }
 
 /// What each corner of a cell counts at a point in it, in 256ths.
 #[inline(always)]
-fn counts(point: [f32; 3]) -> [u32; 8] {
-    let [x, y, z] = [(point[0] * 256.0) as i32 as u32, (point[1] * 256.0) as i32 as u32, (point[2] * 256.0) as i32 as u32];
+fn counts([x, y, z]: [f32; 3]) -> [u32; 8] {
+    let [x, y, z] = [floored_i32(x * 256.0) as u32, floored_i32(y * 256.0) as u32, floored_i32(z * 256.0) as u32];
     let (nx, ny, nz) = (256 - x, 256 - y, 256 - z);
     let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
     let count = |area: u32, height: u32| (area * height) >> 16;
@@ -23,14 +25,17 @@ fn counts(point: [f32; 3]) -> [u32; 8] {
 
 /// The mean of the coloured corners of a cell at a point in it, by nearness in 256ths.
 #[inline(always)]
-pub(super) fn mean(colours: &[Colour; 8], point: [f32; 3]) -> [u8; 3] {
-    let (mut sum, mut total) = (0, 0);
-    for (&Colour(colour), count) in colours.iter().zip(counts(point)) {
-        sum += colour * u64::from(count);
-        total += if colour == 0 { 0 } else { count };
+#[expect(clippy::indexing_slicing, reason = "corners are below 8")]
+pub(super) fn mean(colours: &Colours, point: [f32; 3]) -> [i32; 3] {
+    let counts = counts(point);
+    let (mut red_blue, mut green_total) = (0, 0);
+    for corner in 0..8 {
+        red_blue += colours[2 * corner] * counts[corner];
+        green_total += colours[2 * corner + 1] * counts[corner];
     }
+    let total = (green_total >> 16) as i32;
     // Sums are so small that a float's division rounds as an integer's.
     let scale = if total > 0 { 1.0 / total as f32 } else { 0.0 };
-    let channel = |shift: u32| ((sum >> shift & 0xF_FFFF) as i32 as f32 * scale + 0.5) as i32 as u8;
-    [channel(0), channel(20), channel(40)]
+    let channel = |sum: u32| floored_i32(sum as i32 as f32 * scale + 0.5);
+    [channel(red_blue & 0xFFFF), channel(green_total & 0xFFFF), channel(red_blue >> 16)]
 }

@@ -22,6 +22,7 @@ mod cell;
 mod cell_index;
 mod colour;
 mod config;
+mod hits;
 mod march;
 mod ranges;
 mod ray_camera;
@@ -29,6 +30,7 @@ mod signs;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod traversal;
 
 pub use config::RaycastConfig;
 pub(crate) use signs::of_block as signs_of_block;
@@ -37,11 +39,13 @@ use crate::{
     geometry::{Transform, scalar::min_f32},
     image::View,
     memory::{Capacity, Carver, Footprint, region_bytes},
-    parallel::{Executor, each},
+    parallel::{Executor, Vectors, each},
+    part::part_mut,
     volume::{Slot, Viewpoint, Volume},
 };
 use core::fmt;
-use march::{Marcher, SeenCell};
+use hits::{Hit, Hits};
+use march::Marcher;
 use ranges::Ranges;
 use ray_camera::RayCamera;
 use surface::Surface;
@@ -121,15 +125,6 @@ pub struct Raycaster<'s> {
     peak_blocks: usize,
 }
 
-/// Which map is looked at.
-#[derive(Clone, Copy)]
-enum Layer {
-    /// The first of a picture: every pixel is set.
-    Ground,
-    /// One more: only pixels that show it nearer than what is there are set, to this number.
-    Over(u8),
-}
-
 /// Some rows of the picture, which one worker fills.
 struct Band<'b> {
     first_row: usize,
@@ -198,7 +193,14 @@ impl<'s> Raycaster<'s> {
         if pixels == 0 || pixels > self.depth_m.len() || !self.ranges.fit(view.width, view.height) {
             return Err(RaycastError::ImageSize);
         }
-        self.draw(volume, view, Layer::Ground, executor)
+        let ray_camera = ray_camera(volume, view)?;
+        (self.width, self.height) = (view.width, view.height);
+        part_mut(self.depth_m, ..pixels).fill(0.0);
+        part_mut(self.normal, ..pixels).fill([0; 3]);
+        part_mut(self.colour, ..pixels).fill([0; 3]);
+        part_mut(self.weight, ..pixels).fill(0);
+        part_mut(self.layer, ..pixels).fill(0);
+        Ok(self.draw(volume, &ray_camera, 0, executor))
     }
 
     /// Adds another map to the picture, of the same size and seen with the same rig; `view` is the camera's place in that map's own frame.
@@ -214,33 +216,20 @@ impl<'s> Raycaster<'s> {
         if [view.width, view.height] != [self.width, self.height] || self.width == 0 {
             return Err(RaycastError::ImageSize);
         }
-        self.draw(volume, view, Layer::Over(layer), executor)
+        Ok(self.draw(volume, &ray_camera(volume, view)?, layer, executor))
     }
 
-    /// Draws a map into a picture that fits.
-    fn draw<E: Executor>(
-        &mut self,
-        volume: &Volume<'_>,
-        view: &Viewpoint,
-        layer: Layer,
-        executor: &E,
-    ) -> Result<RaycastReport, RaycastError> {
-        let ray_camera = RayCamera::new(view, volume.config().voxel_size_m).ok_or(RaycastError::Viewpoint)?;
+    /// Draws a map over a picture of the camera's size.
+    fn draw<E: Executor>(&mut self, volume: &Volume<'_>, ray_camera: &RayCamera, layer: u8, executor: &E) -> RaycastReport {
         let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
         let near_m = self.config.near_m;
-        let in_view = self.surface.find(volume, &ray_camera, [near_m, self.config.far_m], min_weight, executor);
+        let in_view = self.surface.find(volume, ray_camera, [near_m, self.config.far_m], min_weight, executor);
         let limits_m = [near_m, min_f32(in_view.far_m, self.config.far_m)];
-        self.ranges.find(&self.surface, &ray_camera, limits_m);
-        (self.width, self.height) = (view.width, view.height);
+        self.ranges.find(&self.surface, ray_camera, limits_m);
         if self.surface.len() > self.peak_blocks {
             self.peak_blocks = self.surface.len();
         }
-        let marcher = Marcher {
-            surface: &self.surface,
-            blocks: volume.blocks(),
-            ray_camera: &ray_camera,
-            min_weight,
-        };
+        let marcher = Marcher { surface: &self.surface, blocks: volume.blocks(), ray_camera, min_weight };
         let ranges = &self.ranges;
         let picture = Band {
             first_row: 0,
@@ -250,19 +239,19 @@ impl<'s> Raycaster<'s> {
             weight: self.weight,
             layer: self.layer,
         }
-        .split(view.height, view.width)
+        .split(ray_camera.height, ray_camera.width)
         .0;
-        let rows = view.height.div_ceil(4);
-        let (high, low) = picture.split(2 * rows, view.width);
-        let ((a, b), (c, d)) = (high.split(rows, view.width), low.split(rows, view.width));
+        let rows = ray_camera.height.div_ceil(4);
+        let (high, low) = picture.split(2 * rows, ray_camera.width);
+        let ((a, b), (c, d)) = (high.split(rows, ray_camera.width), low.split(rows, ray_camera.width));
         // Sky and road go together, so that two threads have about the same to do.
-        let hits = each(executor, [a, d, b, c], |rows| band(&marcher, ranges, layer, rows));
-        Ok(RaycastReport {
+        let hits = each(executor, [a, d, b, c], |rows| band(&marcher, ranges, layer, rows, executor.vectors()));
+        RaycastReport {
             pixels: hits.iter().sum(),
             blocks_in_view: in_view.blocks,
             blocks_left_out: in_view.blocks.saturating_sub(self.surface.len() as u32),
             far_m: limits_m[1],
-        })
+        }
     }
 
     /// Depth along the camera's z, m; 0 where there is no surface. `None` before the first picture, as for the other images.
@@ -300,8 +289,13 @@ impl<'s> Raycaster<'s> {
     }
 }
 
+/// The camera's rays and boxes, in the map's lattice.
+fn ray_camera(volume: &Volume<'_>, view: &Viewpoint) -> Result<RayCamera, RaycastError> {
+    RayCamera::new(view, volume.config().voxel_size_m).ok_or(RaycastError::Viewpoint)
+}
+
 /// Fills a band and counts the pixels that show the map.
-fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: Layer, band: Band<'_>) -> u32 {
+fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: u8, band: Band<'_>, vectors: Vectors) -> u32 {
     let width = marcher.ray_camera.width.max(1);
     let images = band
         .depth_m
@@ -309,28 +303,57 @@ fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: Layer, band: Band
         .zip(band.normal.chunks_mut(width))
         .zip(band.colour.chunks_mut(width).zip(band.weight.chunks_mut(width)))
         .zip(band.layer.chunks_mut(width));
-    let (mut hits, mut seen) = (0, SeenCell::none());
+    let (mut count, mut hits) = (0, Hits::none());
     for (v, (((depth_m, normal), (colour, weight)), layers)) in (band.first_row..).zip(images) {
+        let mut row = Row { depth_m, normal, colour, weight, layers };
+        let mut show = |hits: &mut Hits<'_>, row: &mut Row<'_>| {
+            hits.take(marcher.blocks, &marcher.ray_camera.rotation, vectors, |u, hit| count += u32::from(row.show(u, &hit, layer)));
+        };
         let ranges = ranges.row(v);
-        let pixels = depth_m.iter_mut().zip(normal).zip(colour.iter_mut().zip(weight)).zip(layers).enumerate();
-        for (u, (((depth_m, normal), (colour, weight)), shown)) in pixels {
-            let nearer = |than_m: f32| matches!(layer, Layer::Ground) || *depth_m == 0.0 || than_m < *depth_m;
+        for u in 0..width {
             // A ray meets nothing before its range begins.
-            let range = ranges.get(u >> ranges::TILE_SHIFT).filter(|range| range[0] <= range[1] && nearer(range[0]));
-            let hit = range.and_then(|&range| marcher.cast(u, v, range, &mut seen)).filter(|hit| nearer(hit.depth_m));
-            match (hit, layer) {
-                (Some(hit), _) => {
-                    *depth_m = hit.depth_m;
-                    *normal = hit.normal.map(|c| (c * NORMAL_ONE) as i8);
-                    *colour = hit.colour;
-                    *weight = hit.weight;
-                    *shown = if let Layer::Over(number) = layer { number } else { 0 };
-                    hits += 1;
-                }
-                (None, Layer::Ground) => (*depth_m, *normal, *colour, *weight, *shown) = (0.0, [0; 3], [0; 3], 0, 0),
-                (None, Layer::Over(_)) => {}
+            if let Some(&range) = ranges.get(u >> ranges::TILE_SHIFT)
+                && range[0] <= range[1]
+                && row.is_nearer(u, range[0])
+            {
+                marcher.cast(u, v, range, &mut hits);
+            }
+            if hits.is_full() {
+                show(&mut hits, &mut row);
             }
         }
+        show(&mut hits, &mut row);
     }
-    hits
+    count
+}
+
+/// A row of the picture.
+struct Row<'r> {
+    depth_m: &'r mut [f32],
+    normal: &'r mut [[i8; 3]],
+    colour: &'r mut [[u8; 3]],
+    weight: &'r mut [u8],
+    layers: &'r mut [u8],
+}
+
+impl Row<'_> {
+    /// Whether a depth is nearer than what a pixel shows.
+    #[inline(always)]
+    fn is_nearer(&self, u: usize, depth_m: f32) -> bool {
+        self.depth_m.get(u).is_some_and(|&shown_m| shown_m == 0.0 || depth_m < shown_m)
+    }
+
+    /// Shows what a ray met, if it is nearer than what the pixel shows.
+    #[inline(always)]
+    fn show(&mut self, u: usize, hit: &Hit, layer: u8) -> bool {
+        let is_nearer = self.is_nearer(u, hit.depth_m);
+        if is_nearer
+            && let (Some(depth_m), Some(normal), Some(colour), Some(weight), Some(shown)) =
+                (self.depth_m.get_mut(u), self.normal.get_mut(u), self.colour.get_mut(u), self.weight.get_mut(u), self.layers.get_mut(u))
+        {
+            let unit = hit.normal.map(|c| (c * NORMAL_ONE) as i8);
+            (*depth_m, *normal, *colour, *weight, *shown) = (hit.depth_m, unit, hit.colour, hit.weight, layer);
+        }
+        is_nearer
+    }
 }

@@ -184,6 +184,12 @@ impl Ray {
         self.zero[axis] + i64::from(plane) * self.per_plane[axis]
     }
 
+    /// Whether the ray runs towards larger coordinates of an axis, so that it leaves a cell by the upper face.
+    #[inline(always)]
+    pub fn is_ahead(&self, axis: usize) -> bool {
+        self.ahead.get(axis).is_some_and(|&ahead| ahead != 0)
+    }
+
     /// Depth from plane to plane, positive.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
@@ -199,28 +205,27 @@ impl Ray {
         [x - (block[0] * side) as f32, y - (block[1] * side) as f32, z - (block[2] * side) as f32]
     }
 
-    /// The cell in which the ray is just after `depth`: all planes crossed up to there are behind it.
+    /// The cell in which the ray is just after `depth`, so that all planes crossed up to there are behind it, and the depths at which the ray
+    /// leaves that cell along each axis.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn cell_at(&self, depth: Depth) -> [i32; 3] {
+    pub fn cell_and_exits(&self, depth: Depth) -> ([i32; 3], [Depth; 3]) {
         let depth_m = depth_in_m(depth);
-        let mut cell = [0; 3];
+        let (mut cell, mut exits) = ([0; 3], [0; 3]);
         for axis in AXES {
             let guess = floor_i32(self.origin[axis] + self.slope[axis] * depth_m);
-            let ahead = self.ahead[axis];
-            let late = i32::from(self.crossing(axis, guess + ahead) <= depth);
-            let early = i32::from(self.crossing(axis, guess + 1 - ahead) > depth);
-            cell[axis] = guess + (late - early) * (2 * ahead - 1);
+            let (ahead, stride) = (self.ahead[axis], self.stride(axis));
+            let exit = self.crossing(axis, guess + ahead);
+            // Rounding seldom takes the guess a cell too far, or not far enough: a branch, which need not wait for it.
+            (cell[axis], exits[axis]) = if exit <= depth {
+                (guess + 2 * ahead - 1, exit + stride)
+            } else if exit - stride > depth {
+                (guess - 2 * ahead + 1, exit - stride)
+            } else {
+                (guess, exit)
+            };
         }
-        cell
-    }
-
-    /// The depths at which the ray leaves a cell along each axis.
-    #[inline]
-    #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-    pub fn exits(&self, cell: [i32; 3]) -> [Depth; 3] {
-        let exit = |axis: usize| self.crossing(axis, cell[axis] + self.ahead[axis]);
-        [exit(0), exit(1), exit(2)]
+        (cell, exits)
     }
 
     /// Where the ray leaves a block, and across which axis.

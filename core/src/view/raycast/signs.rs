@@ -33,20 +33,20 @@ pub(crate) fn of_block(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS], m
     signs
 }
 
-/// For each cell, its corners combined by `join` (or, and), given the points of the block (0) and of those after it in x (1), y (2), z (4).
-#[inline(always)]
+/// For each cell, whether it has a corner among points, given those of the block (0) and of those after it in x (1), y (2), z (4).
+#[inline(never)]
 #[expect(clippy::indexing_slicing, reason = "n is 0 or 4, z below 8")]
-fn joined(points: [Layers; 8], join: impl Fn(u64, u64) -> u64) -> Layers {
-    let along_x = |own: u64, next: u64| join(own, (own >> 1 & BUT_LAST_COLUMN) | (next & FIRST_COLUMN) << 7);
+fn with_a_corner(points: &[Layers; 8]) -> Layers {
+    let along_x = |own: u64, next: u64| own | (own >> 1 & BUT_LAST_COLUMN) | (next & FIRST_COLUMN) << 7;
     let layer = |n: usize, z: usize| {
         let own = along_x(points[n][z], points[n + 1][z]);
-        join(own, own >> 8 | along_x(points[n + 2][z], points[n + 3][z]) << 56)
+        own | own >> 8 | along_x(points[n + 2][z], points[n + 3][z]) << 56
     };
     let mut cells = [0; BLOCK_SIDE];
     let mut above = layer(4, 0);
     for (z, cells) in cells.iter_mut().enumerate().rev() {
         let here = layer(0, z);
-        *cells = join(here, above);
+        *cells = here | above;
         above = here;
     }
     cells
@@ -67,17 +67,15 @@ pub(super) type Cells = [CellLayer; BLOCK_SIDE];
 
 /// The cells of a block, given the signs of its points (0) and of those after it in x (1), y (2), z (4).
 pub(super) fn cells(signs: [&[Layers; 2]; 8]) -> Cells {
-    let [mut before, mut behind, mut observed] = [[[0; BLOCK_SIDE]; 8]; 3];
-    for (signs, ((before, behind), observed)) in signs.iter().zip(before.iter_mut().zip(&mut behind).zip(&mut observed)) {
+    let [mut before, mut behind, mut unseen] = [[[0; BLOCK_SIDE]; 8]; 3];
+    for (signs, ((before, behind), unseen)) in signs.iter().zip(before.iter_mut().zip(&mut behind).zip(&mut unseen)) {
         [*before, *behind] = **signs;
-        observed.iter_mut().zip(before.iter().zip(behind.iter())).for_each(|(observed, (before, behind))| *observed = before | behind);
+        unseen.iter_mut().zip(before.iter().zip(behind.iter())).for_each(|(unseen, (before, behind))| *unseen = !(before | behind));
     }
-    let before = joined(before, |a, b| a | b);
-    let behind = joined(behind, |a, b| a | b);
-    let fully_observed = joined(observed, |a, b| a & b);
+    let [before, behind, unseen] = [with_a_corner(&before), with_a_corner(&behind), with_a_corner(&unseen)];
     let mut cells = [CellLayer::default(); BLOCK_SIDE];
-    for (cells, ((before, behind), fully_observed)) in cells.iter_mut().zip(before.into_iter().zip(behind).zip(fully_observed)) {
-        *cells = CellLayer { crossed: before & behind, fully_observed };
+    for (cells, ((before, behind), unseen)) in cells.iter_mut().zip(before.into_iter().zip(behind).zip(unseen)) {
+        *cells = CellLayer { crossed: before & behind, fully_observed: !unseen };
     }
     cells
 }

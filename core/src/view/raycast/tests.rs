@@ -13,7 +13,7 @@ use crate::{
         tests::analytic::{cuboid, empty, fill},
     },
 };
-use cell::{Corners, Field, NO_AXIS, RaySegment, mean, within};
+use cell::{Corners, Field, NO_AXIS, along, mean, position, within};
 use nalgebra::{Point3, Vector3};
 use ray_camera::{AXES, depth_from_m, depth_in_m};
 use scenes::{Ball, Plane, Scene, filled, rough, seen_from_origin, true_distances};
