@@ -50,6 +50,17 @@ impl Runs<'_> {
         run
     }
 
+    /// The size of a run's segment, asked of one run after the other, from the first on.
+    #[inline(always)]
+    fn size_of_next(&mut self, run: usize) -> u32 {
+        // Parents are earlier runs: they know their root by now, so that no loop, which no processor foresees, leads to it.
+        let entry = self.get(run);
+        let parent = usize::try_from(entry).unwrap_or(run);
+        let root = usize::try_from(self.get(parent)).unwrap_or(parent);
+        self.set(run, if entry < 0 { entry } else { root as i32 });
+        self.get(root).unsigned_abs()
+    }
+
     /// The earlier root wins: no rank is needed, and the result does not depend on order.
     #[inline(always)]
     fn unite(&mut self, a: usize, b: usize) {
@@ -98,11 +109,10 @@ impl Work for RemoveSpeckles<'_> {
         for (row, ends) in disparity.chunks_exact_mut(width).zip(ends.chunks_exact(width)) {
             let mut start = 0;
             for &end in ends {
-                let root = runs.root(run);
+                let is_small = runs.size_of_next(run) < smallest;
                 run += 1;
                 if let Some(pixels) = row.get_mut(start..usize::from(end))
-                    && runs.0.get(root).is_some_and(|&size| size.unsigned_abs() < smallest)
-                    && pixels.first().is_some_and(|&d| d != NONE)
+                    && is_small & pixels.first().is_some_and(|&d| d != NONE)
                 {
                     let filled = pixels.iter().filter(|&&d| d & FILLED != 0).count() as u32;
                     blanked.filled += filled;
