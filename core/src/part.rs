@@ -43,6 +43,16 @@ fn padded_at_border<T: Copy, const N: usize>(row: &[T], start: usize, skip: usiz
     entries
 }
 
+/// Writes entries of `row` from `start` on, those within it.
+#[inline(always)]
+pub(crate) fn store<T: Copy, const N: usize>(row: &mut [T], start: usize, entries: [T; N]) {
+    let rest = row.get_mut(start..).unwrap_or_default();
+    match rest.first_chunk_mut() {
+        Some(all) => *all = entries,
+        None => rest.iter_mut().zip(entries).for_each(|(to, from)| *to = from),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,6 +73,15 @@ mod tests {
         assert_eq!(padded(&row, 0, 2, 9), [9, 9, 1]);
         assert_eq!(padded(&row, 4, 1, 0), [0, 5, 0]);
         assert_eq!((padded(&row, 5, 0, 7), padded(&row, 8, 0, 7)), ([7; 3], [7; 3]));
+    }
+
+    #[test]
+    fn what_lies_beyond_a_row_is_not_stored() {
+        let mut row = [1, 2, 3, 4, 5];
+        store(&mut row, 1, [8, 9]);
+        store(&mut row, 4, [7, 6]);
+        store(&mut row, 6, [0, 0]);
+        assert_eq!(row, [1, 8, 9, 4, 7]);
     }
 
     #[test]

@@ -143,16 +143,6 @@ fn load(row: &[i16], u: usize) -> Eight<i16> {
     padded(row, u, 0, NO_PLANE)
 }
 
-/// Writes eight pixels, those within the row.
-#[inline(always)]
-fn store(row: &mut [i16], u: usize, pixels: Eight<i16>) {
-    let rest = row.get_mut(u..).unwrap_or_default();
-    match rest.first_chunk_mut() {
-        Some(all) => *all = pixels,
-        None => rest.iter_mut().zip(pixels).for_each(|(to, from)| *to = from),
-    }
-}
-
 /// Takes from the left row what the right row contradicts; both in px, [`NO_PLANE`] where there is no disparity. Returns how many matches
 /// there were and how many of them went. The right row is used up.
 #[inline(always)]

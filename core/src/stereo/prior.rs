@@ -4,7 +4,7 @@
 //! Planes are rasterised, triangle by triangle, into the image that will receive the disparities: no memory of their own. The grid prior is a
 //! set of 256 bits per cell.
 
-use crate::{parallel::Work, sad::LANES};
+use crate::{parallel::Work, part::store, sad::LANES};
 
 use super::{
     StereoConfig,
@@ -128,16 +128,13 @@ impl Plane {
         let slope = self.slope_u as i32;
         // Within a triangle all fits; a pixel beyond the edge of a very steep one may wrap, and its plane is not preferred anyway.
         // Spans are short: eight pixels at a time, in the end as many of them as there are.
-        for (i, out) in span.chunks_mut(LANES).enumerate() {
+        for first in (0..span.len()).step_by(LANES) {
             let mut pixels = [0; LANES];
-            for (lane, pixel) in pixels.iter_mut().enumerate() {
-                let disparity = start.wrapping_add(slope.wrapping_mul((i * LANES + lane) as i32)) >> SHIFT;
+            for (i, pixel) in (first..).zip(&mut pixels) {
+                let disparity = start.wrapping_add(slope.wrapping_mul(i as i32)) >> SHIFT;
                 *pixel = held(disparity) + mark;
             }
-            match out.first_chunk_mut() {
-                Some(all) => *all = pixels,
-                None => out.iter_mut().zip(pixels).for_each(|(to, from)| *to = from),
-            }
+            store(span, first, pixels);
         }
     }
 }

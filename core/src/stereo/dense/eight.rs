@@ -4,9 +4,9 @@
 //! candidate's key has the energy above and the disparity below, so that the least key is the least energy and, of equal ones, the smallest
 //! disparity. Borders, where not all eight can have the same candidates, go another and slower way.
 
-use super::{load, store};
+use super::load;
 use crate::{
-    part::part,
+    part::{part, store},
     sad::{Eight, KEY_SCALE_BITS, Kernels, LANES},
     stereo::{
         StereoConfig,

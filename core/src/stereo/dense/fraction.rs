@@ -1,8 +1,9 @@
 //! Fractions of a pixel: where between the disparities beside it the distance has its least value, if it falls and rises with the same
 //! slope.
 
-use super::{NONE, WORKING_ONE_PX, load, store};
+use super::{NONE, WORKING_ONE_PX, load};
 use crate::{
+    part::store,
     sad::{Eight, Kernels, LANES},
     stereo::{
         StereoConfig,
