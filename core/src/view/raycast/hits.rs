@@ -128,6 +128,9 @@ impl<'a> Hits<'a> {
 
     /// Hands all that are within reach to `show`, each with its column.
     pub fn take(&mut self, blocks: &Blocks<'_>, rotation: &[[f32; 3]; 3], vectors: Vectors, mut show: impl FnMut(usize, Hit)) {
+        if self.len == 0 {
+            return;
+        }
         let met = vectors.run(Meet { crossings: &self.crossings, rotation });
         let lanes = self.cells.iter().flatten().zip(self.columns.iter().zip(&self.far_m)).take(self.len).enumerate();
         for (lane, (cell, (&column, &far_m))) in lanes {
