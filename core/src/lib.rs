@@ -16,6 +16,7 @@ extern crate std;
 mod audit;
 pub mod digest;
 pub mod egomotion;
+mod flags;
 pub mod geometry;
 pub mod image;
 pub mod mapper;

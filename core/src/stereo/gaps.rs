@@ -6,9 +6,9 @@
 use super::{
     GapEnds, MAX_IMAGE_SIZE,
     dense::{FILLED, NONE},
-    flags::for_each_set,
 };
 use crate::{
+    flags::for_each_set,
     parallel::Work,
     part::{part, part_mut},
 };

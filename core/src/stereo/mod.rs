@@ -54,7 +54,6 @@ mod delaunay;
 mod dense;
 mod descriptor;
 mod filter_support;
-mod flags;
 mod gaps;
 mod gradient;
 mod invalid;

@@ -4,11 +4,11 @@
 //! the sizes. Where runs end is remembered, so that a second walk over runs, not pixels, blanks the small ones. Memory: six bytes a pixel
 //! (in the worst case each is a run) and three a column. Time: one walk over the image in bytes side by side, and one over its runs.
 
-use super::{
-    dense::{FILLED, NONE},
+use super::dense::{FILLED, NONE};
+use crate::{
     flags::{for_each_set, word},
+    parallel::Work,
 };
-use crate::parallel::Work;
 
 /// Working memory.
 pub(super) struct Scratch<'a> {

@@ -76,18 +76,6 @@ pub(super) fn colour_layer_mut(colour: &mut Colour, z: usize) -> Option<[&mut La
     Some([red?, green?, blue?])
 }
 
-/// 64 bytes of 0 or 1 as bits, the first lowest.
-#[inline]
-pub fn packed(flags: &Layer<u8>) -> u64 {
-    let mut bits = 0;
-    for (row, flags) in (0u32..).zip(flags.as_chunks::<BLOCK_SIDE>().0) {
-        // The factor moves byte i to bit 56 + i; no two products meet in one bit, so nothing carries.
-        let byte = u64::from_le_bytes(*flags).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-        bits |= byte << (8 * row);
-    }
-    bits
-}
-
 /// Red, green and blue planes of a block; all three 0 is no colour yet.
 pub(crate) type Colour = [[u8; BLOCK_VOXELS]; 3];
 

@@ -2,9 +2,9 @@
 //!
 //! A layer (one z) of a block is a 64-bit word: bit `x + 8 y`.
 
-use crate::volume::{
-    BLOCK_SIDE, BLOCK_VOXELS,
-    block::{LAYER_VOXELS, packed},
+use crate::{
+    flags::bits,
+    volume::{BLOCK_SIDE, BLOCK_VOXELS, block::LAYER_VOXELS},
 };
 use bytemuck::{Pod, Zeroable};
 
@@ -26,8 +26,8 @@ pub(crate) fn of_block(sdf: &[i16; BLOCK_VOXELS], weight: &[u8; BLOCK_VOXELS], m
             *is_observed = u8::from(weight >= min_weight);
             *is_before = u8::from(sdf > 0);
         }
-        let observed = packed(&is_observed);
-        *before = observed & packed(&is_before);
+        let observed = bits(&is_observed);
+        *before = observed & bits(&is_before);
         *behind = observed & !*before;
     }
     signs

@@ -4,9 +4,12 @@ use super::{
     Fusion,
     layer::{Scratch, averaged, share_of_one},
 };
-use crate::volume::{
-    block::{LAYER_VOXELS, Layer, packed},
-    observed::is_spoiled,
+use crate::{
+    flags::bits,
+    volume::{
+        block::{LAYER_VOXELS, Layer},
+        observed::is_spoiled,
+    },
 };
 
 /// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
@@ -25,7 +28,7 @@ impl Fusion<'_> {
         if near.iter().fold(0, |any, near| any | near) == 0 {
             return;
         }
-        let bits = packed(&near);
+        let bits = bits(&near);
         let (mut reds, mut greens, mut blues) = ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
         match self.seen.colour {
             Some(image) => scratch.pixels_at(bits, image, |i, pixel| [reds[i], greens[i], blues[i]] = pixel),

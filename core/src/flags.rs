@@ -1,8 +1,8 @@
-//! Flags of a row, a byte each. Few are set: many are looked at at once.
+//! Flags of a row or of a layer of voxels, a byte each: many are looked at at once.
 
 /// Eight flags, each 0 or 1, or as many as there are.
 #[inline(always)]
-pub(super) fn word(flags: &[u8]) -> u64 {
+pub(crate) fn word(flags: &[u8]) -> u64 {
     match flags.first_chunk() {
         Some(eight) => u64::from_le_bytes(*eight),
         None => last_word(flags),
@@ -18,19 +18,26 @@ fn last_word(flags: &[u8]) -> u64 {
 
 /// Eight flags as bits, the first lowest.
 #[inline(always)]
-fn bits(word: u64) -> u64 {
+fn bits_of_word(word: u64) -> u64 {
     // The factor moves byte i to bit 56 + i; no two products meet in one bit, so nothing carries.
     word.wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
+/// 64 flags as bits, the first lowest.
+#[inline]
+pub(crate) fn bits(flags: &[u8; 64]) -> u64 {
+    let words = (0u32..).zip(flags.as_chunks().0);
+    words.fold(0, |bits, (i, &eight)| bits | bits_of_word(u64::from_le_bytes(eight)) << (8 * i))
+}
+
 /// Calls `each` with the position of every flag that is set, in ascending order.
 #[inline(always)]
-pub(super) fn for_each_set(flags: &[u8], mut each: impl FnMut(usize)) {
+pub(crate) fn for_each_set(flags: &[u8], mut each: impl FnMut(usize)) {
     // How many are set no processor foresees: it errs once in 64 flags.
     for (i, flags) in flags.chunks(64).enumerate() {
         let mut rest = 0;
         for (i, eight) in flags.chunks(8).enumerate() {
-            rest |= bits(word(eight)) << (8 * i);
+            rest |= bits_of_word(word(eight)) << (8 * i);
         }
         while rest != 0 {
             each(64 * i + rest.trailing_zeros() as usize);
