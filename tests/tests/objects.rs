@@ -2,7 +2,6 @@
 
 use dynvox::evaluate::surfaces::{SeenSide, TrueView};
 use dynvox::input::TrueObject;
-use dynvox::observe::weighed_triangles;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::{
     Capacity, Config, Mapper, Report, Serial, StereoFrame,
@@ -309,7 +308,7 @@ fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_
         }
         for (summary, object) in mapper.objects() {
             let mut triangles = Vec::new();
-            weighed_triangles(object.volume(), &MeshConfig::default(), |_| true, &mut |corners| triangles.push(corners));
+            object.volume().triangles(&MeshConfig::default(), &mut |triangle| triangles.push(triangle));
             let Some(figures) = sides.get(&summary.id).and_then(|side| side.compare(&triangles, 0.05)) else { continue };
             println!("object {}, {}: {figures:?}", summary.id, summary.state.name());
             // One seen more seldom, or from farther away, is not done yet.

@@ -2,6 +2,7 @@
 
 use dynvox::run::store::{BlockFile, PoolAndFile, mesh};
 use dynvox_core::objects::NoSink;
+use dynvox_core::view::Triangle;
 use dynvox_core::volume::{BlockStore, NoStore};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, Severity};
 use dynvox_tests::{Clip, HeapSlab};
@@ -66,16 +67,19 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let (mut cube, mut in_place) = (HeapSlab::of(&Capacity::TINY), Vec::new());
     let (how, memory) = ((&config.volume, &config.mesh), (cube.bytes(), false));
     let mut source = PoolAndFile::new(mapper.background(), &mut store);
-    let count = mesh::triangles(&mut source, how, memory, &hashbrown::HashSet::new(), &mut |triangle| {
-        in_place.push(bits(triangle.map(|corner| (corner.position_m, corner.colour))));
+    let count = mesh::triangles(&mut source, how, memory, &hashbrown::HashSet::new(), &mut |triangle: Triangle| {
+        in_place.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour))));
     });
     assert_eq!(count.ok(), Some(in_place.len() as u64));
     mapper.stream_out(&mut store);
     drop(mapper);
-    let count =
-        mesh::triangles(&mut store, (&config.volume, &config.mesh), (slab.bytes(), false), &hashbrown::HashSet::new(), &mut |triangle| {
-            streamed.push(bits(triangle.map(|corner| (corner.position_m, corner.colour))))
-        });
+    let count = mesh::triangles(
+        &mut store,
+        (&config.volume, &config.mesh),
+        (slab.bytes(), false),
+        &hashbrown::HashSet::new(),
+        &mut |triangle: Triangle| streamed.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour)))),
+    );
     assert_eq!(count.ok(), Some(streamed.len() as u64));
     assert!(unbounded.len() > 50_000, "{} triangles", unbounded.len());
     assert!(in_place == streamed, "the pool's blocks where they are, and stored first, in one order");

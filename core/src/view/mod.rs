@@ -5,6 +5,6 @@
 mod mesh;
 mod raycast;
 
-pub use mesh::{MeshConfig, Triangle, Vertex};
+pub use mesh::{MeshConfig, MeshSink, Triangle, Vertex};
 pub(crate) use raycast::signs_of_block;
 pub use raycast::{NORMAL_ONE, RaycastConfig, RaycastError, RaycastReport, RaycastView, Raycaster};

@@ -1,9 +1,8 @@
 //! What a mapper hands out: new arrays.
 
-use dynvox::formats::MeshVertex;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
-use dynvox_core::view::{Raycaster, Triangle};
+use dynvox_core::view::{Raycaster, Triangle, Vertex};
 use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -32,11 +31,7 @@ pub struct Triangles {
 
 impl Triangles {
     pub fn add(&mut self, triangle: Triangle) {
-        self.add_corners(triangle.vertices.map(|vertex| (vertex.position_m, vertex.colour).into()));
-    }
-
-    pub fn add_corners(&mut self, corners: [MeshVertex; 3]) {
-        for MeshVertex { position_m, colour, weight: _ } in corners {
+        for Vertex { position_m, colour, weight: _ } in triangle.vertices {
             self.positions_m.push(position_m);
             self.colours.push(colour);
         }

@@ -13,7 +13,7 @@ use dynvox::cli::{MapperPlan, check_options};
 use dynvox::run::store;
 use dynvox::slab::HostSlab;
 use dynvox_core::tracking::TrackReport;
-use dynvox_core::view::RaycastView;
+use dynvox_core::view::{RaycastView, Triangle};
 use dynvox_core::{Report, StereoFrame};
 use hashbrown::HashSet;
 use numpy::{PyArray2, PyArray3};
@@ -232,7 +232,7 @@ fn map_triangles(running: &mut Running) -> PyResult<Triangles> {
         let (config, colour) = (&running.plan.config, running.plan.capacity.colour);
         let mut slab = HostSlab::map(MESH_BYTES).ok_or_else(|| refuse("there is no memory for the triangles. Free some"))?;
         let how = (&config.volume, &config.mesh);
-        store::mesh::triangles(file, how, (slab.bytes_mut(), colour), &in_memory, &mut |corners| triangles.add_corners(corners))
+        store::mesh::triangles(file, how, (slab.bytes_mut(), colour), &in_memory, &mut |triangle: Triangle| triangles.add(triangle))
             .map_err(|error| raise(anyhow::anyhow!("{error}")))?;
     }
     Ok(triangles)

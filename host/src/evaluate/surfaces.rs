@@ -6,10 +6,10 @@
 //! true object's frame by where the object was in the frame in which the true object was nearest, and most of it is made: drift of the object's pose
 //! shows as distance.
 
-use crate::formats::MeshVertex;
 use crate::input::TrueObject;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::View;
+use dynvox_core::view::Triangle;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -101,7 +101,7 @@ impl SeenSide {
     }
 
     /// Compares a mesh, in the object's own frame, with it; `None` where nothing was seen or there is no mesh.
-    pub fn compare(&self, triangles: &[[MeshVertex; 3]], voxel_size_m: f64) -> Option<SurfaceFigures> {
+    pub fn compare(&self, triangles: &[Triangle], voxel_size_m: f64) -> Option<SurfaceFigures> {
         let (nearest_m, t_truth_object) = self.nearest?;
         let reach_m = REACH_VOXELS * voxel_size_m;
         let mut samples: Vec<([i32; 3], Point3<f64>)> =
@@ -112,7 +112,7 @@ impl SeenSide {
         let middles: Vec<Point3<f64>> = triangles
             .iter()
             .map(|triangle| {
-                let [a, b, c] = triangle.map(|vertex| of(vertex.position_m).coords);
+                let [a, b, c] = triangle.vertices.map(|vertex| of(vertex.position_m).coords);
                 Point3::from((a + b + c) / 3.0)
             })
             .collect();
@@ -165,6 +165,7 @@ impl<'p> PointGrid<'p> {
 mod tests {
     use super::*;
     use dynvox_core::masks::PixelBox;
+    use dynvox_core::view::Vertex;
 
     const RIG: StereoRig = StereoRig { focal_px: 200.0, center_u_px: 50.0, center_v_px: 40.0, baseline_m: 0.5 };
     const SIZE: (usize, usize) = (100, 80);
@@ -194,10 +195,10 @@ mod tests {
     }
 
     /// A square patch of small triangles at a depth, from `left` to `right`.
-    fn patch(depth_m: f32, left: f32, right: f32) -> Vec<[MeshVertex; 3]> {
+    fn patch(depth_m: f32, left: f32, right: f32) -> Vec<Triangle> {
         let steps = |from: f32, to: f32| (0..((to - from) / 0.04) as usize).map(move |n| from + 0.04 * n as f32);
-        let corner = |x: f32, y: f32| MeshVertex::from(([x, y, depth_m], [9; 3]));
-        let at = |x: f32, y: f32| [corner(x, y), corner(x + 0.04, y), corner(x, y + 0.04)];
+        let corner = |x: f32, y: f32| Vertex { position_m: [x, y, depth_m], ..Vertex::default() };
+        let at = |x: f32, y: f32| Triangle { vertices: [corner(x, y), corner(x + 0.04, y), corner(x, y + 0.04)] };
         steps(left, right).flat_map(|x| steps(-0.5, 0.95).map(move |y| at(x, y))).collect()
     }
 

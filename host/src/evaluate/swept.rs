@@ -75,7 +75,7 @@ impl Swept {
     /// # Errors
     /// The file is no mesh of this program.
     pub fn triangles(&self, ply: &Path) -> io::Result<u64> {
-        let inside = |corner: &PlyVertex| corner.object == 0 && self.contains(&Point3::from(corner.position_m.map(f64::from)));
+        let inside = |corner: &PlyVertex| corner.object == 0 && self.contains(&Point3::from(corner.vertex.position_m.map(f64::from)));
         let mut count = 0;
         PlyMesh::open(ply).map_err(io::Error::other)?.triangles(|triangle| count += u64::from(triangle.iter().all(inside)))?;
         Ok(count)
@@ -87,6 +87,7 @@ mod tests {
     use super::*;
     use crate::formats::PlyWriter;
     use dynvox_core::masks::PixelBox;
+    use dynvox_core::view::Vertex;
 
     #[test]
     fn counts_what_stands_where_a_car_drove_and_not_the_road_below_it() {
@@ -105,7 +106,9 @@ mod tests {
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("map.ply");
         let mut ply = PlyWriter::begin(&path).unwrap();
-        let mut patch = |x: f32, y: f32, z: f32| ply.triangle([0.0, 0.05, 0.1].map(|d| ([x + d, y, z + d * d], [9; 3])));
+        let mut patch = |x: f32, y: f32, z: f32| {
+            ply.triangle([0.0, 0.05, 0.1].map(|d| Vertex { position_m: [x + d, y, z + d * d], ..Vertex::default() }))
+        };
         let patches = [(3.0, 1.0, 9.0), (3.0, 1.0, 15.5), (3.0, 1.6, 12.0), (5.0, 1.0, 12.0), (3.0, 1.0, 30.0), (3.0, -0.5, 12.0)];
         patches.iter().for_each(|&(x, y, z)| patch(x, y, z));
         ply.finish().unwrap();

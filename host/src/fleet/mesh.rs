@@ -25,7 +25,7 @@ pub fn write_mesh(map: &mut Averages, out: &Path, min_weight: u8, axes: Axes) ->
     let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
     let mut ply = PlyWriter::begin_in(out, "the world", axes).map_err(FleetError::io(out))?;
     let (store, colour) = (&mut map.store, map.lattice.colour);
-    let meshed = triangles(store, how, (&mut slab, colour), &HashSet::new(), &mut |corners| ply.triangle(corners));
+    let meshed = triangles(store, how, (&mut slab, colour), &HashSet::new(), &mut ply);
     meshed.map_err(|error| FleetError::content(out, format!("cannot be made: {error}")))?;
     ply.finish().map_err(FleetError::io(out))
 }

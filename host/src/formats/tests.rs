@@ -2,6 +2,7 @@
 
 use super::*;
 use dynvox_core::geometry::Transform;
+use dynvox_core::view::Vertex;
 use nalgebra::Vector3;
 use std::fs;
 use tempfile::TempDir;
@@ -44,7 +45,7 @@ fn a_mesh_shares_recent_vertices_and_its_header_counts_are_true() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("map.ply");
     let mut ply = PlyWriter::begin(&path).unwrap();
-    let corner = |x: f32, y: f32| MeshVertex { position_m: [x, y, 2.0], colour: [10, 20, 30], weight: 40 + x as u8 };
+    let corner = |x: f32, y: f32| Vertex { position_m: [x, y, 2.0], colour: [10, 20, 30], weight: 40 + x as u8 };
     ply.triangle([corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)]);
     ply.triangle([corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
     assert_eq!(ply.finish().unwrap(), Mesh { vertices: 4, triangles: 2, object_triangles: 0 });

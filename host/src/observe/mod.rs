@@ -26,7 +26,6 @@ mod thumbnail;
 mod tracks;
 mod trajectory;
 mod volume_copy;
-mod weights;
 mod written_file;
 
 pub use block_history::BlockHistoryObserver;
@@ -51,7 +50,6 @@ pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, 
 pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
 pub use trajectory::{ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first};
 pub use volume_copy::VolumeCopy;
-pub use weights::weighed_triangles;
 pub use written_file::WrittenFile;
 
 use crate::formats::{Axes, Mesh};

@@ -6,11 +6,12 @@ use super::{EndContext, Finished, FrameContext, ObserveError, Observer, RetiredV
 use crate::evaluate::objects::true_object;
 use crate::evaluate::surfaces::{SeenSide, SurfaceFigures, TrueView};
 use crate::evaluate::swept::Swept;
-use crate::formats::{Axes, Mesh, MeshVertex, PlyWriter, tum_line, write_numbered};
+use crate::formats::{Axes, Mesh, PlyWriter, tum_line, write_numbered};
 use crate::scene::OBJECTS_FOLDER;
 use dynvox_core::geometry::Transform;
 use dynvox_core::objects::ObjectSummary;
 use dynvox_core::tracking::{Class, MotionState, TrackReport};
+use dynvox_core::view::{Triangle, Vertex};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -201,7 +202,7 @@ impl ObjectsObserver {
         let side = self.sides.remove(&(summary.id, summary.segment_id));
         let folder = setup.folder.join(OBJECTS_FOLDER);
         let mut triangles = Vec::new();
-        let meshed = volume.triangles(&setup.config.mesh, &mut |corners| triangles.push(corners));
+        let meshed = volume.triangles(&setup.config.mesh, &mut |triangle: Triangle| triangles.push(triangle));
         meshed.map_err(|source| ObserveError::Write { path: folder.clone(), source })?;
         if triangles.is_empty() {
             return Ok(());
@@ -244,7 +245,7 @@ fn files(name: &str) -> [String; 4] {
 fn write_files(
     folder: &Path,
     (id, name): (u32, &str),
-    (triangles, axes): (&[[MeshVertex; 3]], Axes),
+    (triangles, axes): (&[Triangle], Axes),
     poses: &[PosedAt],
 ) -> Result<(), ObserveError> {
     let [mesh, world_mesh, kitti, tum] = files(name).map(|file| folder.join(file));
@@ -265,10 +266,12 @@ fn write_files(
 }
 
 /// Writes a mesh that a pose carries to the frame of reference of that name.
-fn write_mesh(path: &Path, id: u32, (frame, axes): (&str, Axes), triangles: &[[MeshVertex; 3]], pose: &Transform) -> std::io::Result<Mesh> {
+fn write_mesh(path: &Path, id: u32, (frame, axes): (&str, Axes), triangles: &[Triangle], pose: &Transform) -> std::io::Result<Mesh> {
     let moved = |position_m: [f32; 3]| pose.transform_point(position_m.map(f64::from)).map(|metres| metres as f32);
     let mut ply = PlyWriter::begin_in(path, frame, axes)?;
     ply.begin_object(id);
-    triangles.iter().for_each(|corners| ply.triangle(corners.map(|corner| MeshVertex { position_m: moved(corner.position_m), ..corner })));
+    for Triangle { vertices } in triangles {
+        ply.triangle(vertices.map(|vertex| Vertex { position_m: moved(vertex.position_m), ..vertex }));
+    }
     ply.finish()
 }

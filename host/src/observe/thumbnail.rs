@@ -1,7 +1,7 @@
 //! An object's mesh on three pictures, orthographic: from the camera that saw it first, from its left side, from above.
 
 use super::pictures;
-use crate::formats::MeshVertex;
+use dynvox_core::view::Triangle;
 use image::RgbImage;
 use nalgebra::Vector3;
 
@@ -12,7 +12,7 @@ const STRAY: f64 = 0.005;
 const EMPTY: [u8; 3] = [24, 26, 30];
 
 /// The pictures side by side as a JPEG file; empty when there is nothing to show.
-pub fn thumbnail(triangles: &[[MeshVertex; 3]]) -> Vec<u8> {
+pub fn thumbnail(triangles: &[Triangle]) -> Vec<u8> {
     if triangles.is_empty() {
         return Vec::new();
     }
@@ -25,10 +25,10 @@ pub fn thumbnail(triangles: &[[MeshVertex; 3]]) -> Vec<u8> {
     RgbImage::from_raw(size.0, size.1, pixels).map(|picture| pictures::jpeg(&picture)).unwrap_or_default()
 }
 
-fn view(triangles: &[[MeshVertex; 3]], axes: [Vector3<f32>; 3]) -> Vec<[u8; 3]> {
+fn view(triangles: &[Triangle], axes: [Vector3<f32>; 3]) -> Vec<[u8; 3]> {
     let turned = |position_m: [f32; 3]| axes.map(|axis| axis.dot(&Vector3::from(position_m)));
     let range = |axis: usize| {
-        let mut values: Vec<f32> = triangles.iter().map(|one| turned(one[0].position_m)[axis]).collect();
+        let mut values: Vec<f32> = triangles.iter().map(|one| turned(one.vertices[0].position_m)[axis]).collect();
         values.sort_by(f32::total_cmp);
         let stray = (values.len() as f64 * STRAY) as usize;
         (values[stray], values[values.len() - 1 - stray])
@@ -39,16 +39,16 @@ fn view(triangles: &[[MeshVertex; 3]], axes: [Vector3<f32>; 3]) -> Vec<[u8; 3]> 
     let middle = [0.5 * (left + right), 0.5 * (top + bottom)];
     let mut pixels = vec![EMPTY; VIEW_PX.0 * VIEW_PX.1];
     let mut nearest = vec![f32::MAX; pixels.len()];
-    for triangle in triangles {
-        let corners = triangle.map(|vertex| {
+    for Triangle { vertices } in triangles {
+        let corners = vertices.map(|vertex| {
             let [u, v, depth] = turned(vertex.position_m);
             [0.5 * width + (u - middle[0]) * scale, 0.5 * height + (v - middle[1]) * scale, depth]
         });
-        let shade = shade(&triangle.map(|vertex| turned(vertex.position_m)));
+        let shade = shade(&vertices.map(|vertex| turned(vertex.position_m)));
         fill(&corners, |at, [a, b, c], depth| {
             if depth < nearest[at] {
                 nearest[at] = depth;
-                let [p, q, r] = triangle.map(|vertex| if vertex.colour == [0; 3] { [200; 3] } else { vertex.colour });
+                let [p, q, r] = vertices.map(|vertex| if vertex.colour == [0; 3] { [200; 3] } else { vertex.colour });
                 pixels[at] = [0, 1, 2].map(|i| (shade * (a * f32::from(p[i]) + b * f32::from(q[i]) + c * f32::from(r[i]))) as u8);
             }
         });

@@ -1,11 +1,9 @@
 //! A copy of a volume's blocks, meshed after the step so that the mapper need not wait.
 
-use super::weighed_triangles;
-use crate::formats::MeshVertex;
 use crate::slab::HostSlab;
 use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
-use dynvox_core::view::MeshConfig;
+use dynvox_core::view::{MeshConfig, MeshSink};
 use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock, Volume, VolumeConfig};
 use std::io::{Error, ErrorKind};
 
@@ -49,12 +47,12 @@ impl VolumeCopy {
         self.blocks.len()
     }
 
-    /// Hands out the triangles that the volume would have, in the same order.
+    /// Hands out the mesh that the volume would have, in the same order.
     ///
     /// # Errors
     ///
     /// No memory for a volume of as many blocks.
-    pub fn triangles(&self, mesh: &MeshConfig, sink: &mut impl FnMut([MeshVertex; 3])) -> std::io::Result<u64> {
+    pub fn triangles(&self, mesh: &MeshConfig, sink: &mut impl MeshSink) -> std::io::Result<u64> {
         let capacity = Capacity {
             blocks: self.blocks.len(),
             visible_blocks: 1,
@@ -71,7 +69,7 @@ impl VolumeCopy {
         for block in &self.blocks {
             volume.load(block.coord, &mut One(block));
         }
-        Ok(weighed_triangles(&volume, mesh, |_| true, sink))
+        Ok(volume.mesh(mesh, |_| true, sink))
     }
 }
 
@@ -98,6 +96,7 @@ mod tests {
     use dynvox_core::Serial;
     use dynvox_core::geometry::{StereoRig, Transform};
     use dynvox_core::image::View;
+    use dynvox_core::view::Triangle;
     use dynvox_core::volume::{NoStore, Observation, Viewpoint};
 
     const WIDTH: usize = 96;
@@ -137,16 +136,14 @@ mod tests {
             with_volume(colour, |volume| {
                 let (mut own, mut copied) = (Vec::new(), Vec::new());
                 let mesh = MeshConfig::default();
-                volume.triangles(&mesh, &mut |triangle| own.push(triangle.vertices.map(|corner| (corner.position_m, corner.colour))));
+                volume.triangles(&mesh, &mut |triangle| own.push(triangle));
                 let copy = VolumeCopy::of(volume);
-                let count = copy.triangles(&mesh, &mut |corners| copied.push(corners)).unwrap();
-                let weights: Vec<u8> = copied.iter().flatten().map(|corner| corner.weight).collect();
-                let copied: Vec<_> = copied.into_iter().map(|corners| corners.map(|corner| (corner.position_m, corner.colour))).collect();
+                let count = copy.triangles(&mesh, &mut |triangle: Triangle| copied.push(triangle)).unwrap();
                 assert!(own == copied && count == own.len() as u64, "{} and {}", own.len(), copied.len());
                 assert!(own.len() > 100 && copy.blocks() == volume.pool().len());
                 // Two frames were fused, and what was seen in one of them alone is pruned.
-                assert!(weights.iter().all(|&weight| weight == 2), "{weights:?}");
-                assert_eq!(own.iter().any(|one| one[0].1 != [0; 3]), colour);
+                assert!(own.iter().flat_map(|one| one.vertices).all(|vertex| vertex.weight == 2));
+                assert_eq!(own.iter().any(|one| one.vertices[0].colour != [0; 3]), colour);
             });
         }
     }

@@ -3,8 +3,8 @@
 use super::map_objects::{MapObjects, add_objects};
 use super::store::{self, BlockFile, PoolAndFile, Position, StoreError};
 use super::{FolderError, RunFolder};
-use crate::formats::{Axes, MAP_FILE, Mesh, MeshVertex, PlyWriter};
-use crate::observe::{StoreStats, weighed_triangles};
+use crate::formats::{Axes, MAP_FILE, Mesh, PlyWriter};
+use crate::observe::StoreStats;
 use crate::slab::HostSlab;
 use dynvox_core::memory::SlabError;
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
@@ -114,11 +114,13 @@ impl MeshOutput {
         match store.file.as_mut().filter(|file| (file.records() > 0 || keeps_file) && file.failure().is_none()) {
             None => {
                 let volume = mapper.background();
-                weighed_triangles(volume, &mapper.config().mesh, |_| true, &mut |corners| add(&mut ply, corners));
+                if let Ok(ply) = &mut ply {
+                    volume.mesh(&mapper.config().mesh, |_| true, ply);
+                }
                 meshed.extend(volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)));
             }
             Some(file) if !keeps_file => {
-                failed = pool_and_file(mapper, (file, colour), &mut ply).err();
+                failed = ply.as_mut().map_or(Ok(()), |ply| pool_and_file(mapper, (file, colour), ply)).err();
                 file_is_due = false;
             }
             Some(_) => report = mapper.stream_out(&mut store),
@@ -136,11 +138,11 @@ impl MeshOutput {
         let mut stats = StoreStats { end: self.report, failure: self.store.failure(), ..StoreStats::default() };
         let mut failed = self.failed;
         if let Some(file) = self.store.file.as_mut() {
-            let ply = &mut self.ply;
-            let (how, memory) = ((&config.volume, &config.mesh), (slab, capacity.colour));
-            if self.file_is_due {
-                let meshed = store::mesh::triangles(file, how, memory, &self.meshed, &mut |corners| add(ply, corners));
-                failed = meshed.err().map(too_small);
+            if self.file_is_due
+                && let Ok(ply) = &mut self.ply
+            {
+                let (how, memory) = ((&config.volume, &config.mesh), (slab, capacity.colour));
+                failed = store::mesh::triangles(file, how, memory, &self.meshed, ply).err().map(too_small);
             }
             (stats.records, stats.bytes, stats.unreadable) = (file.records(), file.bytes(), file.unreadable());
         }
@@ -160,23 +162,13 @@ impl MeshOutput {
 }
 
 /// Adds the mesh of a mapper's pool and of the blocks that were evicted from it.
-fn pool_and_file(
-    mapper: &Mapper<'_>,
-    (file, colour): (&mut BlockFile<File>, bool),
-    ply: &mut std::io::Result<PlyWriter>,
-) -> std::io::Result<()> {
+fn pool_and_file(mapper: &Mapper<'_>, (file, colour): (&mut BlockFile<File>, bool), ply: &mut PlyWriter) -> std::io::Result<()> {
     let mut slab = HostSlab::map(store::mesh::slab_bytes(colour)).ok_or(std::io::ErrorKind::OutOfMemory)?;
     let (how, memory) = ((&mapper.config().volume, &mapper.config().mesh), (slab.bytes_mut(), colour));
     let mut source = PoolAndFile::new(mapper.background(), file);
-    let meshed = store::mesh::triangles(&mut source, how, memory, &HashSet::new(), &mut |corners| add(ply, corners));
-    meshed.map(drop).map_err(too_small)
+    store::mesh::triangles(&mut source, how, memory, &HashSet::new(), ply).map(drop).map_err(too_small)
 }
 
 fn too_small(error: SlabError) -> std::io::Error {
     std::io::Error::other(format!("the slab is too small for a piece of the map: {error:?}"))
-}
-
-fn add(ply: &mut std::io::Result<PlyWriter>, corners: [MeshVertex; 3]) {
-    let Ok(ply) = ply else { return };
-    ply.triangle(corners);
 }

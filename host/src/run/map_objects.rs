@@ -1,8 +1,9 @@
 //! Objects in `map.ply`, next to the static map.
 
-use crate::formats::{Axes, MeshVertex, PlyMesh, PlyVertex, PlyWriter, read_numbered};
+use crate::formats::{Axes, PlyMesh, PlyVertex, PlyWriter, read_numbered};
 use crate::scene::{OBJECTS_FOLDER, object_files};
 use dynvox_core::geometry::Transform;
+use dynvox_core::view::Vertex;
 use std::io;
 use std::path::Path;
 
@@ -45,11 +46,9 @@ pub(super) fn add_objects(ply: &mut PlyWriter, run: &Path, which: MapObjects) ->
             ply.begin_object(id);
             let mesh = PlyMesh::open(&folder.join(format!("{name}.ply"))).map_err(io::Error::other)?;
             mesh.triangles(|corners| {
-                ply.triangle(corners.map(|PlyVertex { position_m, colour, weight, .. }| MeshVertex {
-                    position_m: moved(t_world_object, position_m),
-                    colour,
-                    weight,
-                }));
+                ply.triangle(
+                    corners.map(|PlyVertex { vertex, .. }| Vertex { position_m: moved(t_world_object, vertex.position_m), ..vertex }),
+                );
             })?;
         }
     }
@@ -70,7 +69,7 @@ mod tests {
         let folder = tempfile::TempDir::new().unwrap();
         let objects = folder.path().join(OBJECTS_FOLDER);
         std::fs::create_dir(&objects).unwrap();
-        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|at| (at, [9; 3]));
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|position_m| Vertex { position_m, ..Vertex::default() });
         let mut ply = PlyWriter::begin(&objects.join("7-2.ply")).unwrap();
         ply.triangle(corners);
         ply.finish().unwrap();
@@ -82,7 +81,7 @@ mod tests {
             ply.triangle(corners);
             add_objects(&mut ply, folder.path(), which).unwrap();
             let (mesh, mut found) = (ply.finish().unwrap(), Vec::new());
-            PlyMesh::open(&path).unwrap().triangles(|[first, ..]| found.push((first.object, first.position_m))).unwrap();
+            PlyMesh::open(&path).unwrap().triangles(|[first, ..]| found.push((first.object, first.vertex.position_m))).unwrap();
             assert_eq!((mesh.triangles, mesh.object_triangles), (found.len() as u64, found.len() as u64 - 1));
             found
         };

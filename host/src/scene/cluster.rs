@@ -5,7 +5,7 @@
 //! within [`RECENT`] numbers of vertices; one that returns later counts again.
 
 use super::IndexedMesh;
-use crate::formats::MeshVertex;
+use dynvox_core::view::Vertex;
 use hashbrown::{HashMap, HashSet};
 
 /// Side of the first cells, m.
@@ -40,7 +40,7 @@ struct Cluster {
 }
 
 impl Cluster {
-    fn of(MeshVertex { position_m, colour, weight }: MeshVertex) -> Self {
+    fn of(Vertex { position_m, colour, weight }: Vertex) -> Self {
         let coloured = if colour == [0; 3] { 0.0 } else { 1.0 };
         Self {
             position_sum_m: position_m.map(f64::from),
@@ -105,7 +105,7 @@ impl VertexClustering {
     }
 
     /// Adds a triangle: its vertices and their numbers in the mesh that comes in.
-    pub fn add(&mut self, corners: [(u32, MeshVertex); 3]) {
+    pub fn add(&mut self, corners: [(u32, Vertex); 3]) {
         if corners.iter().flat_map(|(_, vertex)| vertex.position_m).any(|metres| !metres.is_finite()) {
             return;
         }
@@ -117,7 +117,7 @@ impl VertexClustering {
     }
 
     /// The number of the cell that a vertex is in; it counts there unless it has just done so.
-    fn cluster_of(&mut self, vertex: u32, at: MeshVertex) -> u32 {
+    fn cluster_of(&mut self, vertex: u32, at: Vertex) -> u32 {
         let slot = vertex as usize % RECENT;
         let known = self.recent[slot];
         if known.vertex == vertex && known.cluster != Recent::NONE.cluster {
@@ -187,7 +187,10 @@ mod tests {
     /// A square of `side` x `side` squares of 5 cm, two triangles each, that lies at a depth of 2 m.
     fn plane(side: u32, most_triangles: usize) -> IndexedMesh {
         let mut clustering = VertexClustering::new(most_triangles, u64::from(2 * side * side));
-        let corner = |x: u32, y: u32| (x + y * (side + 1), ([0.05 * x as f32, 0.05 * y as f32, 2.0], [200, x as u8, 0]).into());
+        let corner = |x: u32, y: u32| {
+            let position_m = [0.05 * x as f32, 0.05 * y as f32, 2.0];
+            (x + y * (side + 1), Vertex { position_m, colour: [200, x as u8, 0], weight: 0 })
+        };
         for (x, y) in (0..side * side).map(|at| (at % side, at / side)) {
             clustering.add([corner(x, y), corner(x + 1, y), corner(x, y + 1)]);
             clustering.add([corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)]);
@@ -217,7 +220,7 @@ mod tests {
     #[test]
     fn the_two_sides_of_a_sheet_become_one_and_nonsense_is_left_out() {
         let mut clustering = VertexClustering::new(10, 3);
-        let corner = |number: u32, at: [f32; 3]| (number, (at, [0; 3]).into());
+        let corner = |number: u32, position_m: [f32; 3]| (number, Vertex { position_m, ..Vertex::default() });
         let corners = [corner(0, [0.0, 0.0, 1.0]), corner(1, [1.0, 0.0, 1.0]), corner(2, [0.0, 1.0, 1.0])];
         clustering.add(corners);
         clustering.add([corners[0], corners[2], corners[1]]);
@@ -227,7 +230,7 @@ mod tests {
 
     #[test]
     fn a_vertex_counts_once_however_many_triangles_share_it() {
-        let corner = |number: u32, x: f32, y: f32| (number, ([x, y, 1.0], [9; 3]).into());
+        let corner = |number: u32, x: f32, y: f32| (number, Vertex { position_m: [x, y, 1.0], ..Vertex::default() });
         // A fan: its centre, and a vertex of one triangle in the same cell.
         let (centre, beside) = (corner(0, 0.01, 0.0), corner(1, 0.02, 0.0));
         let rim = [(0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)];

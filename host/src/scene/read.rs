@@ -6,8 +6,8 @@ use super::{
     SceneObject, SurfaceErrorMap, VertexClustering,
 };
 use crate::formats::{
-    FRAMES_FILE, FormatError, MAP_FILE, MeshVertex, PlyMesh, PlyVertex, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE, read_numbered,
-    read_poses, read_text,
+    FRAMES_FILE, FormatError, MAP_FILE, PlyMesh, PlyVertex, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE, read_numbered, read_poses,
+    read_text,
 };
 use dynvox_core::geometry::Transform;
 use std::collections::BTreeMap;
@@ -56,10 +56,7 @@ fn simplified(path: &Path, static_only: bool, most_triangles: usize) -> Result<(
     let add = |corners: [PlyVertex; 3]| {
         if corners[0].object == 0 || !static_only {
             triangles += 1;
-            clustering.add(corners.map(|corner| {
-                let PlyVertex { number, position_m, colour, weight, .. } = corner;
-                (number, MeshVertex { position_m, colour, weight })
-            }));
+            clustering.add(corners.map(|corner| (corner.number, corner.vertex)));
         }
     };
     ply.triangles(add).map_err(FormatError::read(path))?;

@@ -40,8 +40,8 @@ fn triangles(path: &Path) -> (BTreeMap<u32, u64>, [[f32; 3]; 2]) {
         .triangles(|corners| {
             *counts.entry(corners[0].object).or_default() += 1;
             for (corner, axis) in corners.iter().flat_map(|corner| (0..3).map(move |axis| (corner, axis))) {
-                bounds[0][axis] = bounds[0][axis].min(corner.position_m[axis]);
-                bounds[1][axis] = bounds[1][axis].max(corner.position_m[axis]);
+                bounds[0][axis] = bounds[0][axis].min(corner.vertex.position_m[axis]);
+                bounds[1][axis] = bounds[1][axis].max(corner.vertex.position_m[axis]);
             }
         })
         .unwrap();
@@ -97,7 +97,7 @@ fn ply_objects(path: &Path) -> ObjectCells {
     let mut cells = ObjectCells::new();
     let add = |corners: [dynvox::formats::PlyVertex; 3]| {
         for corner in corners.iter().filter(|corner| corner.object > 0) {
-            cells.entry(corner.object).or_default().insert(cell(corner.position_m.map(f64::from)));
+            cells.entry(corner.object).or_default().insert(cell(corner.vertex.position_m.map(f64::from)));
         }
     };
     PlyMesh::open(path).unwrap().triangles(add).unwrap();

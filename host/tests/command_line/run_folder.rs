@@ -1,7 +1,8 @@
 //! Run folders as `dynvox run` writes them, of any size, without a run.
 
-use dynvox::formats::{MeshVertex, PlyWriter};
+use dynvox::formats::PlyWriter;
 use dynvox_core::geometry::Transform;
+use dynvox_core::view::Vertex;
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 use std::fmt::Write;
 use std::fs;
@@ -61,7 +62,7 @@ impl FakeRun {
         let mut ply = PlyWriter::begin(path).unwrap();
         let corner = |x: usize, z: usize| {
             let at = [SIDE_M * (x as f32 - 0.5 * self.squares as f32), 1.6, SIDE_M * z as f32];
-            MeshVertex {
+            Vertex {
                 position_m: at,
                 colour: [60 + (x % 4 * 40) as u8, 90, 60 + (z % 4 * 40) as u8],
                 weight: 1 + (z % 50) as u8,
@@ -97,7 +98,10 @@ impl FakeRun {
     fn write_object(&self, folder: &Path, id: usize) {
         fs::create_dir_all(folder).unwrap();
         let mut ply = PlyWriter::begin(&folder.join(format!("{id}.ply"))).unwrap();
-        let corner = |bits: usize| ([0, 1, 2].map(|axis| (bits >> axis & 1) as f32), [200, 200, 40]);
+        let corner = |bits: usize| {
+            let position_m = [0, 1, 2].map(|axis| (bits >> axis & 1) as f32);
+            Vertex { position_m, colour: [200, 200, 40], weight: 0 }
+        };
         for side in [[0, 2, 1, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 6, 3, 7], [0, 4, 2, 6], [1, 3, 5, 7]] {
             let [a, b, c, d] = side.map(corner);
             ply.triangle([a, b, c]);

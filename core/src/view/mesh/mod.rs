@@ -6,54 +6,43 @@
 //! that all cells and blocks around an edge give the same bits. Triangles with two equal corners, as distances of exactly 0 make them, are
 //! left out: their other two sides coincide, so no crack opens.
 //!
-//! Memory: none of the slab; about 2 KiB of stack. Time: linear in live blocks; triangles cost extra. Order: blocks by slot, cells by
-//! z, y, x, triangles by table.
+//! Memory: none of the slab; about 3 KiB of stack, and 512 names of the sink. Time: linear in live blocks; triangles cost extra. Order:
+//! blocks by slot, cells by z, y, x, triangles by table, vertices by the first triangle that has them.
 
 mod cases;
 mod config;
+mod names;
+mod sink;
 #[cfg(test)]
 mod tests;
 
 pub use config::MeshConfig;
+pub use sink::{MeshSink, Triangle, Vertex};
 
 use crate::volume::{BLOCK_SIDE, BlockCoord, Blocks, Slot, Volume};
-use cases::{CASES, EDGE_START, edge_axis};
+use cases::CASES;
+use names::{CellEdge, VertexNames};
 
 /// Lattice points along a block's side, with those of the next block that its last cells need.
 const SIDE: usize = BLOCK_SIDE + 1;
 /// Marks a lattice point that was not seen often enough. Fusion keeps within ±32,767.
 const UNSEEN: i16 = i16::MIN;
 
-/// A corner of a triangle.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Vertex {
-    /// Place in the map's frame, m.
-    pub position_m: [f32; 3],
-    /// Red, green, blue; all 0 where neither lattice point beside it has a colour.
-    pub colour: [u8; 3],
-}
-
-/// A piece of the surface, its corners counter-clockwise seen from free space.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Triangle {
-    /// The corners.
-    pub vertices: [Vertex; 3],
-}
-
 impl Volume<'_> {
     /// Hands every triangle of the map to `sink` and returns how many there were.
     pub fn triangles(&self, config: &MeshConfig, sink: &mut impl FnMut(Triangle)) -> u64 {
-        self.triangles_of(config, |_| true, sink)
+        self.mesh(config, |_| true, sink)
     }
 
-    /// As [`Volume::triangles`], of the blocks that `is_selected` picks alone; the others only lend their points. So a map can be drawn piece by
-    /// piece: a block's triangles need the blocks after it on each axis, and no more.
-    pub fn triangles_of(&self, config: &MeshConfig, is_selected: impl Fn(BlockCoord) -> bool, sink: &mut impl FnMut(Triangle)) -> u64 {
-        let mut count = 0;
+    /// Hands the surface in the blocks that `is_selected` picks to `sink` and returns how many triangles it has; the other blocks only lend their
+    /// points. So a map can be drawn piece by piece: a block's triangles need the blocks after it on each axis, and no more.
+    pub fn mesh(&self, config: &MeshConfig, is_selected: impl Fn(BlockCoord) -> bool, sink: &mut impl MeshSink) -> u64 {
+        let (mut count, mut names) = (0, VertexNames::new());
         for slot in self.pool().live() {
             if let Some(coord) = self.blocks().coord(slot).filter(|&coord| is_selected(coord)) {
                 let patch = Patch::load(self, slot, coord, config.min_weight);
-                patch.cells(|cell, inside| count += patch.polygonise(cell, inside, sink));
+                names.clear();
+                patch.cells(|cell, inside| count += patch.polygonise(cell, inside, &mut names, sink));
             }
         }
         count
@@ -69,6 +58,14 @@ struct Patch<'v, 's> {
     voxel_size_m: f32,
     /// Distances by `x + 9 y + 81 z`.
     sdf: [i16; SIDE * SIDE * SIDE],
+}
+
+/// What is known of a lattice point.
+struct LatticePoint {
+    sdf: f32,
+    weight: u8,
+    /// If it has one.
+    colour: Option<[u8; 3]>,
 }
 
 impl<'v, 's> Patch<'v, 's> {
@@ -141,7 +138,7 @@ impl<'v, 's> Patch<'v, 's> {
 
     /// Hands the triangles of a cell to `sink` and returns their number.
     #[expect(clippy::indexing_slicing, reason = "masks keep edges below 16 and cases below 256")]
-    fn polygonise(&self, cell: [usize; 3], inside: usize, sink: &mut impl FnMut(Triangle)) -> u64 {
+    fn polygonise<S: MeshSink>(&self, cell: [usize; 3], inside: usize, names: &mut VertexNames<S::Name>, sink: &mut S) -> u64 {
         let case = &CASES[inside & 0xFF];
         // As many as an edge's four bits can say.
         let mut vertices = [Vertex::default(); 16];
@@ -149,55 +146,70 @@ impl<'v, 's> Patch<'v, 's> {
         while left != 0 {
             let edge = left.trailing_zeros() as usize;
             left &= left - 1;
-            vertices[edge & 15] = self.vertex(cell, edge);
+            vertices[edge & 15] = self.vertex(CellEdge::new(cell, edge));
         }
         let mut count = 0;
-        for edges in case.triangles.iter().take(case.count.into()) {
-            let triangle = Triangle { vertices: edges.map(|edge| vertices[usize::from(edge) & 15]) };
+        for edges in case.triangles.iter().take(case.count.into()).map(|edges| edges.map(usize::from)) {
+            let triangle = Triangle { vertices: edges.map(|edge| vertices[edge & 15]) };
             let [a, b, c] = triangle.vertices.map(|vertex| vertex.position_m);
             if a != b && b != c && c != a {
-                sink(triangle);
+                let names = edges.map(|edge| {
+                    let (vertex, edge) = (&vertices[edge & 15], CellEdge::new(cell, edge));
+                    names.name(edge, || sink.vertex(vertex, edge.is_at_border() || self.is_on_point(edge)))
+                });
+                sink.triangle(&triangle, names);
                 count += 1;
             }
         }
         count
     }
 
-    /// The vertex on an edge of a cell.
-    fn vertex(&self, cell: [usize; 3], edge: usize) -> Vertex {
-        let axis = edge_axis(edge);
-        let start = EDGE_START.get(edge).copied().unwrap_or(0);
-        let low = [cell[0] + (start & 1), cell[1] + (start >> 1 & 1), cell[2] + (start >> 2)];
-        let mut high = low;
-        if let Some(along) = high.get_mut(axis) {
-            *along += 1;
-        }
-        // Cells lie below 8, so their corners within the 9 points a side.
-        let sdf = |[x, y, z]: [usize; 3]| self.sdf.get(x + SIDE * (y + SIDE * z)).copied().map_or(0.0, f32::from);
-        let [at_low, at_high] = [low, high].map(sdf);
+    /// The vertex on an edge.
+    fn vertex(&self, edge: CellEdge) -> Vertex {
+        let [low, high] = edge.ends().map(|point| self.point(point));
         // One is above 0 and the other is not, so they differ.
-        let share = at_low / (at_low - at_high);
+        let share = low.sdf / (low.sdf - high.sdf);
         let mut position = [0.0; 3];
-        for ((position, origin), low) in position.iter_mut().zip(self.origin).zip(low) {
+        for ((position, origin), low) in position.iter_mut().zip(self.origin).zip(edge.low) {
             *position = (origin + low as i32) as f32;
         }
-        if let Some(along) = position.get_mut(axis) {
+        if let Some(along) = position.get_mut(edge.axis) {
             *along += share;
         }
         Vertex {
             position_m: position.map(|c| self.voxel_size_m * c),
-            colour: mix(self.colour(low), self.colour(high), share),
+            colour: mix(low.colour, high.colour, share),
+            weight: if share < 0.5 { low.weight } else { high.weight },
         }
     }
 
-    /// The colour of a point of the patch, if it has one.
+    /// Whether the surface meets an edge at one of its ends, where other edges have the same vertex.
+    fn is_on_point(&self, edge: CellEdge) -> bool {
+        edge.ends().iter().any(|point| self.sdf(*point) == 0)
+    }
+
+    /// The distance at a point of the patch.
+    fn sdf(&self, [x, y, z]: [usize; 3]) -> i16 {
+        // Cells lie below 8, so their corners within the 9 points a side.
+        self.sdf.get(x + SIDE * (y + SIDE * z)).copied().unwrap_or(0)
+    }
+
+    /// What is known of a point of the patch.
+    #[inline(never)]
     #[expect(clippy::indexing_slicing, reason = "voxels are below 512")]
-    fn colour(&self, [x, y, z]: [usize; 3]) -> Option<[u8; 3]> {
-        let slot = self.slots.get(x / BLOCK_SIDE + 2 * (y / BLOCK_SIDE) + 4 * (z / BLOCK_SIDE)).copied()??;
-        let planes = self.blocks.colour(slot)?;
-        let voxel = x % BLOCK_SIDE + BLOCK_SIDE * (y % BLOCK_SIDE) + BLOCK_SIDE * BLOCK_SIDE * (z % BLOCK_SIDE);
-        let colour = [planes[0][voxel], planes[1][voxel], planes[2][voxel]];
-        (colour != [0; 3]).then_some(colour)
+    fn point(&self, at: [usize; 3]) -> LatticePoint {
+        let sdf = self.sdf(at).into();
+        let [x, y, z] = at.map(|along| along / BLOCK_SIDE);
+        let Some(slot) = self.slots.get(x + 2 * y + 4 * z).copied().flatten() else {
+            return LatticePoint { sdf, weight: 0, colour: None };
+        };
+        let [x, y, z] = at.map(|along| along % BLOCK_SIDE);
+        let voxel = x + BLOCK_SIDE * (y + BLOCK_SIDE * z);
+        LatticePoint {
+            sdf,
+            weight: self.blocks.weight(slot).map_or(0, |weight| weight[voxel]),
+            colour: self.blocks.colour(slot).map(|planes| planes.each_ref().map(|plane| plane[voxel])).filter(|colour| *colour != [0; 3]),
+        }
     }
 }
 

@@ -177,3 +177,57 @@ fn order_follows_slots_and_two_blocks_agree_on_their_border() {
     let first = there.iter().filter(|t| t.vertices.iter().all(|v| v.position_m[0] <= 8.0 * VOXEL_M)).count();
     assert_eq!([&there[first..], &there[..first]].concat(), back, "the same triangles, the second block's first");
 }
+
+/// Keeps the vertices in the order of their names.
+#[derive(Default)]
+struct Named {
+    vertices: Vec<(Vertex, bool)>,
+    triangles: Vec<(Triangle, [usize; 3])>,
+}
+
+impl MeshSink for Named {
+    type Name = usize;
+
+    fn vertex(&mut self, vertex: &Vertex, may_recur: bool) -> usize {
+        self.vertices.push((*vertex, may_recur));
+        self.vertices.len() - 1
+    }
+
+    fn triangle(&mut self, triangle: &Triangle, names: [usize; 3]) {
+        self.triangles.push((*triangle, names));
+    }
+}
+
+#[test]
+fn vertices_come_once_in_a_block_and_again_only_where_it_is_said() {
+    for (seed, zeros) in (0..10).flat_map(|seed| [(seed, 0), (seed, 30)]) {
+        let (volume, mut named) = (noise(seed, zeros), Named::default());
+        let count = volume.mesh(&MeshConfig::default(), |_| true, &mut named);
+        let Named { vertices, triangles } = named;
+        let own: Vec<Triangle> = triangles.iter().map(|(triangle, _)| *triangle).collect();
+        assert!(own == mesh(&volume) && count == own.len() as u64);
+        for (triangle, names) in &triangles {
+            assert_eq!(triangle.vertices, names.map(|name| vertices[name].0));
+        }
+        let first_uses: Vec<usize> = triangles.iter().flat_map(|(_, names)| names).copied().fold(Vec::new(), |mut first, name| {
+            first.extend((name == first.len()).then_some(name));
+            first
+        });
+        assert_eq!(first_uses.len(), vertices.len(), "each is named by the first triangle that has it");
+        let mut times: BTreeMap<Key, usize> = BTreeMap::new();
+        vertices.iter().for_each(|(vertex, _)| *times.entry(key(vertex)).or_default() += 1);
+        assert!(vertices.iter().all(|(vertex, may_recur)| *may_recur || times[&key(vertex)] == 1));
+        let within = vertices.iter().filter(|(_, may_recur)| !may_recur).count();
+        assert!(3 * within > vertices.len(), "{within} of {} are within a block", vertices.len());
+    }
+}
+
+#[test]
+fn a_vertex_has_the_weight_of_the_nearer_point() {
+    let weight = |p: [i32; 3]| if p[2] <= 3 { 10 } else { 20 };
+    for (depth, expected) in [(3.25, 10), (3.75, 20)] {
+        let volume = filled([0; 3], [1, 1, 0], |p| Some(((p[2] as f32 - depth) * VOXEL_M, weight(p), [9; 3])));
+        let triangles = mesh(&volume);
+        assert!(triangles.len() > 100 && triangles.iter().flat_map(|t| t.vertices).all(|vertex| vertex.weight == expected));
+    }
+}

@@ -7,4 +7,4 @@ mod write;
 
 pub use axes::Axes;
 pub use read::{PlyMesh, PlyVertex};
-pub use write::{Mesh, MeshVertex, PlyWriter};
+pub use write::{Mesh, PlyWriter};

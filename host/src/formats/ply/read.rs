@@ -3,6 +3,7 @@
 use super::Axes;
 use super::records::Records;
 use crate::formats::FormatError;
+use dynvox_core::view::Vertex;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -17,14 +18,10 @@ const FACES: usize = 4_096;
 pub struct PlyVertex {
     /// Its number in the file.
     pub number: u32,
-    /// Position, m, in the camera's axes.
-    pub position_m: [f32; 3],
-    /// Red, green, blue.
-    pub colour: [u8; 3],
     /// Number of its object; 0 for the static map.
     pub object: u32,
-    /// Observations; 0 where unknown.
-    pub weight: u8,
+    /// Where it is, in the camera's axes, and what is known of it.
+    pub vertex: Vertex,
 }
 
 /// Where a vertex's properties lie.
@@ -67,7 +64,7 @@ impl VertexLayout {
         let object = self.object.and_then(word).map(u32::from_le_bytes).unwrap_or_default();
         let weight = self.weight.and_then(|at| bytes.get(at).copied()).unwrap_or_default();
         let position_m = self.axes.to_camera([metres(at)?, metres(at + 4)?, metres(at + 8)?]);
-        Some(PlyVertex { number, position_m, colour, object, weight })
+        Some(PlyVertex { number, object, vertex: Vertex { position_m, colour, weight } })
     }
 }
 
@@ -174,13 +171,14 @@ mod tests {
         let path = folder.path().join("map.ply");
         let mut ply = PlyWriter::begin_in(&path, "a test", Axes::Enu).unwrap();
         // More vertices than a chunk, and than all chunks share a slot.
-        let corners = |at: u32| [0.0, 0.1, 0.2].map(|d| ([at as f32, d, d * d], [at as u8, 7, 9]));
+        let corners =
+            |at: u32| [0.0, 0.1, 0.2].map(|d| Vertex { position_m: [at as f32, d, d * d], colour: [at as u8, 7, 9], weight: d as u8 });
         (0..9_000).for_each(|at| ply.triangle(corners(at)));
         ply.finish().unwrap();
         let mut read = Vec::new();
         let mesh = PlyMesh::open(&path).unwrap();
         assert_eq!((mesh.vertices, mesh.triangles), (27_000, 9_000));
-        mesh.triangles(|triangle| read.push(triangle.map(|corner| (corner.position_m, corner.colour)))).unwrap();
+        mesh.triangles(|triangle| read.push(triangle.map(|corner| corner.vertex))).unwrap();
         assert!(read == (0..9_000).map(corners).collect::<Vec<_>>());
         let whole = std::fs::read(&path).unwrap();
         std::fs::write(&path, &whole[..whole.len() - 5]).unwrap();

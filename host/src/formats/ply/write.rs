@@ -1,11 +1,12 @@
 //! The map as a binary PLY, streamed: triangles go to disk as they come, and the header's counts are filled in at the end.
 //!
 //! A vertex has position, normal (the mean over its triangles by area), colour, weight and the number of the object it belongs to. Memory: a window of
-//! [`WINDOW`] recent vertices, so that triangles share them, and those near them, whose normals grow. The mesh itself is never in memory.
-//! Vertices that fall out of the window are written again when they return, which costs bytes, not correctness.
+//! [`WINDOW`] recent vertices that may come again, so that triangles share them, and the records of those written last, whose normals grow. The
+//! mesh itself is never in memory. Vertices that fall out of the window are written again when they return, which costs bytes, not correctness.
 
 use super::Axes;
 use super::records::Records;
+use dynvox_core::view::{MeshSink, Triangle, Vertex};
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -25,23 +26,6 @@ const NORMAL: usize = 12;
 const PROPERTIES: &[u8] =
     b"property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n\
     property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar weight\nproperty int object\n";
-
-/// A corner of a triangle.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MeshVertex {
-    /// Position, m.
-    pub position_m: [f32; 3],
-    /// Red, green, blue.
-    pub colour: [u8; 3],
-    /// Observations; 0 where unknown.
-    pub weight: u8,
-}
-
-impl From<([f32; 3], [u8; 3])> for MeshVertex {
-    fn from((position_m, colour): ([f32; 3], [u8; 3])) -> Self {
-        Self { position_m, colour, weight: 0 }
-    }
-}
 
 /// What was written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -134,22 +118,16 @@ impl PlyWriter {
         self.others = self.vertices.len().try_into().unwrap_or(u32::MAX);
     }
 
-    /// Adds a triangle. [`PlyWriter::finish`] returns a failure, so that callbacks need no error path.
-    pub fn triangle(&mut self, corners: [impl Into<MeshVertex>; 3]) {
-        if self.failed.is_none() {
-            self.failed = self.try_triangle(corners.map(|corner| self.in_axes(corner.into()))).err();
-        }
+    /// Adds a triangle whose vertices any other may have. [`PlyWriter::finish`] returns a failure, so that callbacks need no error path.
+    pub fn triangle(&mut self, vertices: [Vertex; 3]) {
+        let names = vertices.map(|vertex| self.vertex(&vertex, true));
+        MeshSink::triangle(self, &Triangle { vertices }, names);
     }
 
-    fn in_axes(&self, vertex: MeshVertex) -> MeshVertex {
-        MeshVertex { position_m: self.axes.of_camera(vertex.position_m), ..vertex }
-    }
-
-    fn try_triangle(&mut self, corners: [MeshVertex; 3]) -> io::Result<()> {
-        let normal = area_normal(corners.map(|corner| corner.position_m));
+    fn try_triangle(&mut self, vertices: [Vertex; 3], indices: [u32; 3]) -> io::Result<()> {
+        let normal = area_normal(vertices.map(|vertex| self.axes.of_camera(vertex.position_m)));
         let mut face = [3u8; 13];
-        for (bytes, corner) in face[1..].chunks_exact_mut(4).zip(corners) {
-            let index = self.index_of(corner)?;
+        for (bytes, index) in face[1..].chunks_exact_mut(4).zip(indices) {
             bytes.copy_from_slice(&index.to_le_bytes());
             self.vertices.change(u64::from(index), |vertex| add_normal(vertex, normal))?;
         }
@@ -159,9 +137,10 @@ impl PlyWriter {
     }
 
     /// The position of a vertex in the file; it is written if it is not among the recent ones.
-    fn index_of(&mut self, vertex: MeshVertex) -> io::Result<u32> {
-        let MeshVertex { position_m: [x, y, z], colour: [red, green, blue], weight } = vertex;
-        let bits = [x.to_bits(), y.to_bits(), z.to_bits(), u32::from_le_bytes([red, green, blue, weight])];
+    fn index_of(&mut self, vertex: &Vertex) -> io::Result<u32> {
+        let [x, y, z] = vertex.position_m.map(f32::to_bits);
+        let [red, green, blue] = vertex.colour;
+        let bits = [x, y, z, u32::from_le_bytes([red, green, blue, vertex.weight])];
         let key = bits[..3].iter().fold(0u32, |key, bits| (key ^ bits).wrapping_mul(0x9E37_79B1).rotate_left(13)) as usize;
         let known = |[x, y, z, rest, next]: Recent| ([x, y, z, rest] == bits && next > self.others).then(|| next.wrapping_sub(1));
         let latest = &mut self.latest[key % LATEST];
@@ -173,20 +152,28 @@ impl PlyWriter {
             *latest = *slot;
             return Ok(index);
         }
-        let next = u32::try_from(self.vertices.len() + 1).map_err(|_| io::Error::other("a PLY holds at most 2^32 - 1 vertices"))?;
-        *slot = [bits[0], bits[1], bits[2], bits[3], next];
-        *latest = *slot;
-        let index = next - 1;
-        let MeshVertex { position_m, colour, weight } = vertex;
+        let index = self.append(vertex)?;
+        let [x, y, z, rest] = bits;
+        self.window[key % WINDOW] = [x, y, z, rest, index + 1];
+        self.latest[key % LATEST] = [x, y, z, rest, index + 1];
+        Ok(index)
+    }
+
+    /// Writes a vertex and returns its position in the file.
+    fn append(&mut self, Vertex { position_m, colour, weight }: &Vertex) -> io::Result<u32> {
+        let index = self.vertices.len();
+        if index + 1 > u64::from(u32::MAX) {
+            return Err(io::Error::other("a PLY holds at most 2^32 - 1 vertices"));
+        }
         let mut record = [0; VERTEX_BYTES];
-        for (bytes, value) in record.chunks_exact_mut(4).zip(position_m) {
+        for (bytes, value) in record.chunks_exact_mut(4).zip(self.axes.of_camera(*position_m)) {
             bytes.copy_from_slice(&value.to_le_bytes());
         }
-        record[24..27].copy_from_slice(&colour);
-        record[27] = weight;
+        record[24..27].copy_from_slice(colour);
+        record[27] = *weight;
         record[28..].copy_from_slice(&self.object.to_le_bytes());
         self.vertices.push(&record)?;
-        Ok(index)
+        Ok(index as u32)
     }
 
     /// Appends the faces and fills in the counts. After a failure the file of faces is removed, and what is at the path is not a PLY.
@@ -220,6 +207,28 @@ impl PlyWriter {
         }
         file.flush()?;
         Ok(self.mesh)
+    }
+}
+
+impl MeshSink for PlyWriter {
+    /// Its position in the file.
+    type Name = u32;
+
+    fn vertex(&mut self, vertex: &Vertex, may_recur: bool) -> u32 {
+        if self.failed.is_some() {
+            return 0;
+        }
+        let index = if may_recur { self.index_of(vertex) } else { self.append(vertex) };
+        index.unwrap_or_else(|error| {
+            self.failed = Some(error);
+            0
+        })
+    }
+
+    fn triangle(&mut self, triangle: &Triangle, names: [u32; 3]) {
+        if self.failed.is_none() {
+            self.failed = self.try_triangle(triangle.vertices, names).err();
+        }
     }
 }
 

@@ -1,11 +1,9 @@
 //! A map outside a pool as triangles, cube by cube: in memory at once are a cube of 8 blocks a side and the layer behind it.
 
 use super::{BlockFile, Tile};
-use crate::formats::MeshVertex;
-use crate::observe::weighed_triangles;
 use dynvox_core::Capacity;
 use dynvox_core::memory::{Carver, SlabError};
-use dynvox_core::view::MeshConfig;
+use dynvox_core::view::{MeshConfig, MeshSink};
 use dynvox_core::volume::{BlockCoord, BlockStore, NoStore, Volume, VolumeConfig};
 use hashbrown::HashSet;
 use std::io::{Read, Seek, Write};
@@ -63,7 +61,7 @@ pub fn triangles(
     (volume, mesh): (&VolumeConfig, &MeshConfig),
     (slab, colour): (&mut [u8], bool),
     without: &HashSet<BlockCoord>,
-    sink: &mut impl FnMut([MeshVertex; 3]),
+    sink: &mut impl MeshSink,
 ) -> Result<u64, SlabError> {
     let capacity = cube_capacity(colour);
     let mut carver = Carver::new(slab, Volume::bytes(&capacity))?;
@@ -82,7 +80,7 @@ pub fn triangles(
             for coord in behind(cube) {
                 volume.load(coord, store);
             }
-            count += weighed_triangles(&volume, mesh, |coord| cube_of(&coord) == cube && !without.contains(&coord), sink);
+            count += volume.mesh(mesh, |coord| cube_of(&coord) == cube && !without.contains(&coord), sink);
             // Empties the volume: its blocks are still in the store.
             volume.stream_out(&mut NoStore);
         }
