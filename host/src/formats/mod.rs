@@ -34,7 +34,7 @@ pub use pfm::read_pfm;
 pub use picture::{
     Decoded, ENDINGS as PICTURE_ENDINGS, Picture, SAMPLE_BITS, decode_picture, picture_size, read_picture, significant_bits,
 };
-pub use ply::{Axes, Mesh, PlyMesh, PlyVertex, PlyWriter};
+pub use ply::{Axes, Mesh, PlyMesh, PlyVertex, PlyVertices, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};
 pub use poses::{Trajectory, kitti_line, read_numbered, read_poses, tum_line, write_numbered};
 pub use rows::{parse_seconds, read_stamped_names, read_times};

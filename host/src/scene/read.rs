@@ -53,13 +53,15 @@ fn simplified(path: &Path, static_only: bool, most_triangles: usize) -> Result<(
     let ply = PlyMesh::open(path)?;
     let mut clustering = VertexClustering::new(most_triangles, ply.triangles);
     let mut triangles = 0;
-    let add = |corners: [PlyVertex; 3]| {
-        if corners[0].object == 0 || !static_only {
-            triangles += 1;
-            clustering.add(corners.map(|corner| (corner.number, corner.vertex)));
-        }
-    };
-    ply.triangles(add).map_err(FormatError::read(path))?;
+    let read = ply.faces(|corners, vertices| {
+        let is_added = clustering.add(corners, |number| {
+            let PlyVertex { object, vertex, .. } = vertices.get(number)?;
+            Ok((object == 0 || !static_only).then_some(vertex))
+        })?;
+        triangles += u64::from(is_added);
+        Ok(())
+    });
+    read.map_err(FormatError::read(path))?;
     Ok((clustering.finish(), triangles))
 }
 

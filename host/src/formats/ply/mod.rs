@@ -6,5 +6,5 @@ mod records;
 mod write;
 
 pub use axes::Axes;
-pub use read::{PlyMesh, PlyVertex};
+pub use read::{PlyMesh, PlyVertex, PlyVertices};
 pub use write::{Mesh, PlyWriter};

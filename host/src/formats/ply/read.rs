@@ -75,9 +75,26 @@ pub struct PlyMesh {
     pub vertices: u64,
     /// Triangles in the file.
     pub triangles: u64,
+    corners: PlyVertices,
+    faces: File,
+}
+
+/// The vertices of a mesh file, read where they are asked for.
+#[derive(Debug)]
+pub struct PlyVertices {
     layout: VertexLayout,
     records: Records,
-    faces: File,
+}
+
+impl PlyVertices {
+    /// A vertex by its number.
+    ///
+    /// # Errors
+    /// The file ends early, or there is no such vertex.
+    pub fn get(&mut self, number: u32) -> io::Result<PlyVertex> {
+        let record = self.records.get(u64::from(number))?.ok_or_else(damaged)?;
+        self.layout.vertex(number, record).ok_or_else(damaged)
+    }
 }
 
 impl PlyMesh {
@@ -126,14 +143,30 @@ impl PlyMesh {
         let open =
             |at: u64| File::open(path).and_then(|mut file| file.seek(SeekFrom::Start(at)).map(|_| file)).map_err(FormatError::read(path));
         let records = Records::new(open(0)?, vertices_at, vertices, layout.bytes);
-        Ok(Self { vertices, triangles, layout, records, faces: open(faces_at)? })
+        Ok(Self {
+            vertices,
+            triangles,
+            corners: PlyVertices { layout, records },
+            faces: open(faces_at)?,
+        })
     }
 
     /// Hands every triangle to `sink`, once: corners in the file's order.
     ///
     /// # Errors
     /// The file ends early, a face is not a triangle, or names a vertex that is not there.
-    pub fn triangles(mut self, mut sink: impl FnMut([PlyVertex; 3])) -> io::Result<()> {
+    pub fn triangles(self, mut sink: impl FnMut([PlyVertex; 3])) -> io::Result<()> {
+        self.faces(|[a, b, c], vertices| {
+            sink([vertices.get(a)?, vertices.get(b)?, vertices.get(c)?]);
+            Ok(())
+        })
+    }
+
+    /// As [`PlyMesh::triangles`], by the numbers of their corners: `sink` reads those that it does not know.
+    ///
+    /// # Errors
+    /// The file ends early, a face is not a triangle, or `sink` fails.
+    pub fn faces(mut self, mut sink: impl FnMut([u32; 3], &mut PlyVertices) -> io::Result<()>) -> io::Result<()> {
         let mut bytes = vec![0; FACES * FACE_BYTES];
         let mut left = self.triangles;
         while left > 0 {
@@ -143,16 +176,11 @@ impl PlyMesh {
             for face in bytes.as_chunks::<FACE_BYTES>().0 {
                 let [3, indices @ ..] = face else { return Err(damaged()) };
                 let [a, b, c] = [0, 4, 8].map(|at| u32::from_le_bytes([indices[at], indices[at + 1], indices[at + 2], indices[at + 3]]));
-                sink([self.vertex(a)?, self.vertex(b)?, self.vertex(c)?]);
+                sink([a, b, c], &mut self.corners)?;
             }
             left -= faces;
         }
         Ok(())
-    }
-
-    fn vertex(&mut self, number: u32) -> io::Result<PlyVertex> {
-        let record = self.records.get(u64::from(number))?.ok_or_else(damaged)?;
-        self.layout.vertex(number, record).ok_or_else(damaged)
     }
 }
 
