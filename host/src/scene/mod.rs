@@ -7,6 +7,7 @@ mod mesh;
 mod pictures;
 mod planning;
 mod read;
+mod simplify;
 mod surface_errors;
 mod tables;
 

@@ -1,13 +1,13 @@
 //! A run folder read as a scene.
 
+use super::simplify::simplified;
 use super::tables::{FrameColumns, TrackColumns, read_rows};
 use super::{
     BlockHistory, IndexedMesh, OBJECTS_FOLDER, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PlanningWindow, Scene, SceneFrame,
-    SceneObject, SurfaceErrorMap, VertexClustering,
+    SceneObject, SurfaceErrorMap,
 };
 use crate::formats::{
-    FRAMES_FILE, FormatError, MAP_FILE, PlyMesh, PlyVertex, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE, read_numbered, read_poses,
-    read_text,
+    FRAMES_FILE, FormatError, MAP_FILE, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE, read_numbered, read_poses, read_text,
 };
 use dynvox_core::geometry::Transform;
 use std::collections::BTreeMap;
@@ -46,23 +46,6 @@ impl Scene {
             pictures: pictures(folder)?,
         })
     }
-}
-
-/// The triangles of a mesh, of the static map alone where that is asked for, so many at most; and their number on disk.
-fn simplified(path: &Path, static_only: bool, most_triangles: usize) -> Result<(IndexedMesh, u64), FormatError> {
-    let ply = PlyMesh::open(path)?;
-    let mut clustering = VertexClustering::new(most_triangles, ply.triangles);
-    let mut triangles = 0;
-    let read = ply.faces(|corners, vertices| {
-        let is_added = clustering.add(corners, |number| {
-            let PlyVertex { object, vertex, .. } = vertices.get(number)?;
-            Ok((object == 0 || !static_only).then_some(vertex))
-        })?;
-        triangles += u64::from(is_added);
-        Ok(())
-    });
-    read.map_err(FormatError::read(path))?;
-    Ok((clustering.finish(), triangles))
 }
 
 /// Track and name of the objects in a folder, in this order.

@@ -6,6 +6,7 @@ use crate::formats::FormatError;
 use dynvox_core::view::Vertex;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Bytes of a face: the number of its corners, and three of them.
@@ -77,6 +78,8 @@ pub struct PlyMesh {
     pub triangles: u64,
     corners: PlyVertices,
     faces: File,
+    /// Where the first face begins.
+    faces_at: u64,
 }
 
 /// The vertices of a mesh file, read where they are asked for.
@@ -148,37 +151,49 @@ impl PlyMesh {
             triangles,
             corners: PlyVertices { layout, records },
             faces: open(faces_at)?,
+            faces_at,
         })
+    }
+
+    /// Pieces that are read one after the other.
+    pub fn pieces(&self) -> u64 {
+        self.triangles.div_ceil(FACES as u64)
     }
 
     /// Hands every triangle to `sink`, once: corners in the file's order.
     ///
     /// # Errors
     /// The file ends early, a face is not a triangle, or names a vertex that is not there.
-    pub fn triangles(self, mut sink: impl FnMut([PlyVertex; 3])) -> io::Result<()> {
-        self.faces(|[a, b, c], vertices| {
+    pub fn triangles(mut self, mut sink: impl FnMut([PlyVertex; 3])) -> io::Result<()> {
+        self.faces(1, |[a, b, c], vertices| {
             sink([vertices.get(a)?, vertices.get(b)?, vertices.get(c)?]);
-            Ok(())
+            Ok(ControlFlow::Continue(()))
         })
     }
 
-    /// As [`PlyMesh::triangles`], by the numbers of their corners: `sink` reads those that it does not know.
+    /// Hands the numbers of corners to `sink` until it breaks off: those in the first of every so many pieces. It reads the vertices that it does not
+    /// know.
     ///
     /// # Errors
     /// The file ends early, a face is not a triangle, or `sink` fails.
-    pub fn faces(mut self, mut sink: impl FnMut([u32; 3], &mut PlyVertices) -> io::Result<()>) -> io::Result<()> {
+    pub fn faces(
+        &mut self,
+        every: usize,
+        mut sink: impl FnMut([u32; 3], &mut PlyVertices) -> io::Result<ControlFlow<()>>,
+    ) -> io::Result<()> {
         let mut bytes = vec![0; FACES * FACE_BYTES];
-        let mut left = self.triangles;
-        while left > 0 {
-            let faces = left.min(FACES as u64);
+        for first in (0..self.triangles).step_by(every.max(1) * FACES) {
+            let faces = (self.triangles - first).min(FACES as u64);
             let bytes = &mut bytes[..faces as usize * FACE_BYTES];
+            self.faces.seek(SeekFrom::Start(self.faces_at + first * FACE_BYTES as u64))?;
             self.faces.read_exact(bytes)?;
             for face in bytes.as_chunks::<FACE_BYTES>().0 {
                 let [3, indices @ ..] = face else { return Err(damaged()) };
                 let [a, b, c] = [0, 4, 8].map(|at| u32::from_le_bytes([indices[at], indices[at + 1], indices[at + 2], indices[at + 3]]));
-                sink([a, b, c], &mut self.corners)?;
+                if sink([a, b, c], &mut self.corners)?.is_break() {
+                    return Ok(());
+                }
             }
-            left -= faces;
         }
         Ok(())
     }
