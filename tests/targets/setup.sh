@@ -49,7 +49,7 @@ pack() {
   export DYNVOX_CLIP=$packed.clip DYNVOX_CONSTANTS=$packed.rs DYNVOX_DIGESTS=$fixture/digests.txt
   # The binary that the tests have built, unless sources are newer.
   dynvox=$root/target/debug/dynvox
-  [ -x "$dynvox" ] && [ -z "$(find "$root/Cargo.lock" "$root/core" "$root/host" -newer "$dynvox" \( -name '*.rs' -o -name 'Cargo.*' \) -print -quit)" ] ||
+  [ -x "$dynvox" ] && [ -z "$(find "$root/Cargo.lock" "$root/core" "$root/host/Cargo.toml" "$root/host/src" -newer "$dynvox" \( -name '*.rs' -o -name 'Cargo.*' \) -print -quit)" ] ||
     (cd "$root" && cargo build --quiet --locked -p dynvox)
   # Digests are not in it.
   [ -s "$DYNVOX_CONSTANTS" ] && [ -z "$(find "$fixture" "$root/core/src" "$dynvox" -newer "$DYNVOX_CONSTANTS" -type f ! -name '*.txt' -print -quit)" ] &&
