@@ -120,7 +120,9 @@ impl MeshOutput {
                 meshed.extend(volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)));
             }
             Some(file) if !keeps_file => {
-                failed = ply.as_mut().map_or(Ok(()), |ply| pool_and_file(mapper, (file, colour), ply)).err();
+                if let Ok(ply) = &mut ply {
+                    failed = pool_and_file(mapper, (file, colour), ply).err();
+                }
                 file_is_due = false;
             }
             Some(_) => report = mapper.stream_out(&mut store),

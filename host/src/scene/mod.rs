@@ -12,7 +12,6 @@ mod surface_errors;
 mod tables;
 
 pub use block_history::BlockHistory;
-pub use cluster::VertexClustering;
 pub use mesh::IndexedMesh;
 pub use pictures::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
 pub use planning::{FREE_GREY, OCCUPIED_GREY, PLANNING_FOLDER, PlanningCell, PlanningWindow, WindowScales};

@@ -1,6 +1,7 @@
 //! Mesh files simplified to a number of triangles.
 
-use super::{IndexedMesh, VertexClustering};
+use super::IndexedMesh;
+use super::cluster::VertexClustering;
 use crate::formats::{FormatError, PlyMesh, PlyVertex};
 use std::io;
 use std::ops::ControlFlow;
@@ -60,7 +61,7 @@ impl MeshFile {
             return Ok(LEAST_CELL_M);
         }
         let cell_m = LEAST_CELL_M * (all / most).sqrt() as f32;
-        let every = (self.ply.pieces() / COUNTED).clamp(1, COUNTED_OF);
+        let every = (self.ply.pieces() / COUNTED).min(COUNTED_OF);
         let Clustered { clustering, read, .. } = self.clustered(cell_m, most_triangles, every as usize)?;
         let will_stay = clustering.triangles() as f64 * all / read as f64;
         Ok((cell_m * growth(will_stay / most)).max(LEAST_CELL_M))

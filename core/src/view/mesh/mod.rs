@@ -195,6 +195,7 @@ impl<'v, 's> Patch<'v, 's> {
     }
 
     /// What is known of a point of the patch.
+    // Never inlined: both ends of an edge ask for it, and two copies are 256 bytes of a Cortex-M7's code.
     #[inline(never)]
     #[expect(clippy::indexing_slicing, reason = "voxels are below 512")]
     fn point(&self, at: [usize; 3]) -> LatticePoint {

@@ -17,8 +17,6 @@ const FACES: usize = 4_096;
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlyVertex {
-    /// Its number in the file.
-    pub number: u32,
     /// Number of its object; 0 for the static map.
     pub object: u32,
     /// Where it is, in the camera's axes, and what is known of it.
@@ -57,7 +55,7 @@ impl VertexLayout {
     }
 
     /// The vertex of a number in so many bytes.
-    fn vertex(&self, number: u32, bytes: &[u8]) -> Option<PlyVertex> {
+    fn vertex(&self, bytes: &[u8]) -> Option<PlyVertex> {
         let word = |at: usize| <[u8; 4]>::try_from(bytes.get(at..at + 4)?).ok();
         let metres = |at: usize| word(at).map(f32::from_le_bytes);
         let at = self.position?;
@@ -65,7 +63,7 @@ impl VertexLayout {
         let object = self.object.and_then(word).map(u32::from_le_bytes).unwrap_or_default();
         let weight = self.weight.and_then(|at| bytes.get(at).copied()).unwrap_or_default();
         let position_m = self.axes.to_camera([metres(at)?, metres(at + 4)?, metres(at + 8)?]);
-        Some(PlyVertex { number, object, vertex: Vertex { position_m, colour, weight } })
+        Some(PlyVertex { object, vertex: Vertex { position_m, colour, weight } })
     }
 }
 
@@ -96,7 +94,7 @@ impl PlyVertices {
     /// The file ends early, or there is no such vertex.
     pub fn get(&mut self, number: u32) -> io::Result<PlyVertex> {
         let record = self.records.get(u64::from(number))?.ok_or_else(damaged)?;
-        self.layout.vertex(number, record).ok_or_else(damaged)
+        self.layout.vertex(record).ok_or_else(damaged)
     }
 }
 
@@ -214,8 +212,13 @@ mod tests {
         let path = folder.path().join("map.ply");
         let mut ply = PlyWriter::begin_in(&path, "a test", Axes::Enu).unwrap();
         // More vertices than a chunk, and than all chunks share a slot.
-        let corners =
-            |at: u32| [0.0, 0.1, 0.2].map(|d| Vertex { position_m: [at as f32, d, d * d], colour: [at as u8, 7, 9], weight: d as u8 });
+        let corners = |at: u32| {
+            [0.0, 0.1, 0.2].map(|d| Vertex {
+                position_m: [at as f32, d, d * d],
+                colour: [at as u8, 7, 9],
+                weight: (at / 7) as u8,
+            })
+        };
         (0..9_000).for_each(|at| ply.triangle(corners(at)));
         ply.finish().unwrap();
         let mut read = Vec::new();

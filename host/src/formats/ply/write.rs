@@ -154,17 +154,14 @@ impl PlyWriter {
         }
         let index = self.append(vertex)?;
         let [x, y, z, rest] = bits;
-        self.window[key % WINDOW] = [x, y, z, rest, index + 1];
-        self.latest[key % LATEST] = [x, y, z, rest, index + 1];
+        let recent = [x, y, z, rest, index + 1];
+        (self.window[key % WINDOW], self.latest[key % LATEST]) = (recent, recent);
         Ok(index)
     }
 
     /// Writes a vertex and returns its position in the file.
     fn append(&mut self, Vertex { position_m, colour, weight }: &Vertex) -> io::Result<u32> {
-        let index = self.vertices.len();
-        if index + 1 > u64::from(u32::MAX) {
-            return Err(io::Error::other("a PLY holds at most 2^32 - 1 vertices"));
-        }
+        let next = u32::try_from(self.vertices.len() + 1).map_err(|_| io::Error::other("a PLY holds at most 2^32 - 1 vertices"))?;
         let mut record = [0; VERTEX_BYTES];
         for (bytes, value) in record.chunks_exact_mut(4).zip(self.axes.of_camera(*position_m)) {
             bytes.copy_from_slice(&value.to_le_bytes());
@@ -173,7 +170,7 @@ impl PlyWriter {
         record[27] = *weight;
         record[28..].copy_from_slice(&self.object.to_le_bytes());
         self.vertices.push(&record)?;
-        Ok(index as u32)
+        Ok(next - 1)
     }
 
     /// Appends the faces and fills in the counts. After a failure the file of faces is removed, and what is at the path is not a PLY.
