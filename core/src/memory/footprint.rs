@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 /// Most regions of one slab.
-const MAX_REGIONS: usize = 96;
+const MAX_REGIONS: usize = 98;
 
 /// One named region of the slab. All figures in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! One cell of the lattice as a ray meets it: the trilinear field between its corners.
+//! One cell of the lattice as a ray meets it: where the ray passes it, and the trilinear field between its corners.
 
 use super::ray_camera::{AXES, Ray};
 use crate::geometry::scalar::{max_f32, min_f32};
@@ -81,8 +81,36 @@ impl Field {
     }
 }
 
-/// In place of an axis: within a cell, not on a face.
-pub(super) const NO_AXIS: usize = 3;
+/// How far the lower (0) and the upper (1) face of a cell are from the camera along each axis, in lattice units. Cells side by side have
+/// the same figures at the face between them, so that what follows from these is the same in both.
+pub(super) type Faces = [[f32; 3]; 2];
+
+/// The depths at which a ray enters and leaves a cell, m, no nearer than `near_m`. It does not pass the cell where the second is not the
+/// larger one.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+pub(super) fn depths_m(ray: &Ray, [lower, upper]: &Faces, near_m: f32) -> [f32; 2] {
+    let (mut enters_m, mut leaves_m) = (near_m, f32::MAX);
+    for axis in AXES {
+        let [low_m, high_m] = [lower[axis] * ray.per_unit[axis], upper[axis] * ray.per_unit[axis]];
+        enters_m = max_f32(enters_m, min_f32(low_m, high_m));
+        leaves_m = min_f32(leaves_m, max_f32(low_m, high_m));
+    }
+    [enters_m, leaves_m]
+}
+
+/// Where a ray is at a depth, in a cell's coordinates: exactly 0 or 1 across a face that it passes there, and never outside.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "axes are below 3")]
+pub(super) fn position(ray: &Ray, [lower, upper]: &Faces, depth_m: f32) -> [f32; 3] {
+    let mut position = [0.0; 3];
+    for axis in AXES {
+        let between = min_f32(max_f32(ray.slope[axis] * depth_m - lower[axis], 0.0), 1.0);
+        let below_upper = if upper[axis] * ray.per_unit[axis] == depth_m { 1.0 } else { between };
+        position[axis] = if lower[axis] * ray.per_unit[axis] == depth_m { 0.0 } else { below_upper };
+    }
+    position
+}
 
 /// The point a share of a ray's way through a cell, from where it enters to where it leaves.
 #[inline(always)]
@@ -90,32 +118,14 @@ pub(super) fn along([[x, y, z], [to_x, to_y, to_z]]: [[f32; 3]; 2], share: f32) 
     [x + (to_x - x) * share, y + (to_y - y) * share, z + (to_z - z) * share]
 }
 
-/// Where a ray that begins `offset` from a cell's first corner is at a depth, in the cell's coordinates: exactly 0 or 1 along the axis of the
-/// face that it passes, lower (0) or upper (1); [`NO_AXIS`] where it passes none.
-#[inline(always)]
-#[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-pub(super) fn position(ray: &Ray, offset: [f32; 3], depth_m: f32, face: usize, upper: u32) -> [f32; 3] {
-    let mut position = [0.0; 3];
-    for axis in AXES {
-        let between = within(offset[axis], ray.slope[axis], depth_m);
-        position[axis] = if axis == face { upper as f32 } else { between };
-    }
-    position
-}
-
-/// The coordinate in a cell of a ray that begins `offset` from its first corner, held within the cell.
-#[inline(always)]
-pub(super) fn within(offset: f32, slope: f32, depth_m: f32) -> f32 {
-    min_f32(max_f32(offset + slope * depth_m, 0.0), 1.0)
-}
-
-/// The trilinear mean of the corners at a point: the field's value, for one look.
+/// The trilinear mean of the corners at a point. On a face it is that of the face's corners, to the bit: the others count 0, so that cells
+/// side by side agree at the face between them.
 #[inline(always)]
 pub(super) fn mean(corners: &[f32; 8], [x, y, z]: [f32; 3]) -> f32 {
     let [a, b, c, d, e, f, g, h] = *corners;
-    let (a, b, c, d) = (a + (e - a) * z, b + (f - b) * z, c + (g - c) * z, d + (h - d) * z);
-    let (a, b) = (a + (c - a) * y, b + (d - b) * y);
-    a + (b - a) * x
+    let between = |low: f32, high: f32, share: f32| low * (1.0 - share) + high * share;
+    let (a, b, c, d) = (between(a, e, z), between(b, f, z), between(c, g, z), between(d, h, z));
+    between(between(a, c, y), between(b, d, y), x)
 }
 
 #[cfg(test)]

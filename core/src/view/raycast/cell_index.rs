@@ -1,13 +1,13 @@
-//! Cells of a block and their corners as words, so that a step, the block it leads to and a voxel are a few integer operations.
+//! Cells of a block and their corners as words, so that a corner's block and voxel are a few integer operations.
 
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS};
 
 /// The last coordinate in a block.
 const LAST: u32 = BLOCK_SIDE as u32 - 1;
 
-/// Steps from one cell or voxel to the next along an axis.
+/// Steps from one voxel to the next along an axis.
 #[inline(always)]
-pub(super) const fn stride(axis: usize) -> u32 {
+const fn stride(axis: usize) -> u32 {
     1 << (3 * axis as u32)
 }
 
@@ -15,7 +15,7 @@ pub(super) const fn stride(axis: usize) -> u32 {
 const UNITS: u32 = 0o111;
 
 /// A cell of a block, `x + 8 y + 64 z`: the voxel of its first corner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct CellIndex(u32);
 
 /// A lattice point: which of the blocks around a block's last corner it is in, 1 the next in x, 2 in y, 4 in z, and its voxel there.
@@ -26,29 +26,22 @@ pub(super) struct Point {
 }
 
 impl CellIndex {
-    /// The cell in its block.
+    /// The cell of a voxel, its first corner.
     #[inline(always)]
-    pub fn new(cell: [i32; 3]) -> Self {
-        let [x, y, z] = cell.map(|c| c as u32 & 7);
-        Self(x | y << 3 | z << 6)
-    }
-
-    /// Some steps on, along one axis, within the block.
-    #[inline(always)]
-    pub fn plus(self, steps: u32) -> Self {
-        Self(self.0.wrapping_add(steps))
-    }
-
-    /// The coordinate along an axis, from 0 to 7.
-    #[inline(always)]
-    pub fn coordinate(self, axis: usize) -> u32 {
-        self.0 >> (3 * axis as u32) & 7
+    pub fn of_voxel(voxel: u32) -> Self {
+        Self(voxel & (BLOCK_VOXELS as u32 - 1))
     }
 
     /// The layer, below 8, and the bit of the cell in it.
     #[inline(always)]
     pub fn bit(self) -> (usize, u32) {
         ((self.0 >> 6 & 7) as usize, self.0 & 63)
+    }
+
+    /// The coordinate along an axis, from 0 to 7.
+    #[inline(always)]
+    pub fn coordinate(self, axis: usize) -> u32 {
+        self.0 >> (3 * axis as u32) & 7
     }
 
     /// The voxel of the first corner.
@@ -124,7 +117,7 @@ mod tests {
     #[test]
     fn cells_and_their_corners_are_where_their_coordinates_say() {
         for (x, y, z) in (0..8).flat_map(|z| (0..8).flat_map(move |y| (0..8).map(move |x| (x, y, z)))) {
-            let cell = CellIndex::new([x + 8, y - 16, z]);
+            let cell = CellIndex::of_voxel((x + 8 * y + 64 * z) as u32);
             assert_eq!([0, 1, 2].map(|axis| cell.coordinate(axis) as i32), [x, y, z]);
             assert_eq!((cell.voxel() as i32, cell.bit()), (x + 8 * y + 64 * z, (z as usize, (x + 8 * y) as u32)));
             assert_eq!(cell.is_inner(), x < 7 && y < 7 && z < 7);

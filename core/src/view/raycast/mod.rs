@@ -1,20 +1,21 @@
 //! The map as a camera at any pose would see it: depth, normal, colour and weight per pixel.
 //!
-//! The surface is where the trilinear field between lattice points falls from above 0, in free space that was seen, to 0 or below. It is
-//! found cell by cell, in the order in which the ray passes them (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray Tracing*,
-//! 1987), and within a cell by false position; no step is longer than a cell, so nothing thin is jumped over, and the depth carries
-//! no bias of a step length. A ray that begins behind a surface, or comes out of unseen space at its back, meets none there. Where corners
-//! of a cell were never seen, the plane through the others stands in.
+//! The surface is where the trilinear field between lattice points falls from above 0, in free space that was seen, to 0 or below. A ray
+//! is tried in every cell that it passes and that has corners on both sides, and within the first that stops it the surface is found by
+//! false position: nothing thin is jumped over, and the depth carries no bias of a step length. A ray that begins behind a surface, or
+//! comes out of unseen space at its back, meets none there. Where corners of a cell were never seen, the plane through the others stands in.
 //!
-//! Speed comes from not looking, never from looking less well: before rays start, the blocks in view are reduced to bits for the cells
-//! that have corners on both sides (`signs`, `surface`), and these to the range of depths each two pixels can meet (`ranges`). A cell
-//! without its bit cannot stop a ray, so leaving it out changes nothing; the tests compare with a walk through every cell.
+//! Cells go to the rays, not rays to the cells (docs/decisions/0050-cells-are-projected.md): the blocks in view are reduced to bits for the
+//! cells that the surface runs through (`signs`, `surface`), these are projected into the picture, from near to far, and each pixel keeps
+//! the one that its ray enters first (`visibility`); what is seen there is worked out once for each pixel (`hits`). Both try eight rays at
+//! a time, without branches. What two cells say of a ray at the face between them is equal to the bit, so that no ray slips through, but
+//! where corners were guessed. The tests compare with a walk through every cell.
 //!
 //! Several maps make one picture: [`Raycaster::cast`] begins it and [`Raycaster::cast_over`] adds what lies nearer, so that each pixel shows the
 //! nearest surface and says whose it is. Of equal depths the map added first is seen.
 //!
-//! Memory: 12 bytes a pixel for the images, 8 bytes for two pixels, 300 bytes per `visible_blocks` and 8 bytes for the next power of two
-//! of twice their number. Time: linear in blocks in view and in pixels.
+//! Memory: 12 bytes a pixel for the images, 8 bytes a pixel of 64 rows, 300 bytes per `visible_blocks` and 8 bytes for the next power of
+//! two of twice their number. Time: linear in blocks in view, in the cells that the surface runs through and in the pixels they cover.
 //!
 //! When more blocks are in view than `visible_blocks`, the picture ends nearer, and the report says where.
 
@@ -22,15 +23,15 @@ mod cell;
 mod cell_index;
 mod colour;
 mod config;
+mod crossed;
 mod hits;
-mod march;
-mod ranges;
+mod lanes;
 mod ray_camera;
 mod signs;
 mod surface;
 #[cfg(test)]
 mod tests;
-mod traversal;
+mod visibility;
 
 pub use config::RaycastConfig;
 pub(crate) use signs::of_block as signs_of_block;
@@ -39,16 +40,16 @@ use crate::{
     geometry::{Transform, scalar::min_f32},
     image::View,
     memory::{Capacity, Carver, Footprint, region_bytes},
-    parallel::{Executor, Vectors, each},
+    parallel::{Executor, Vectors, each, zip2},
     part::part_mut,
     volume::{Slot, Viewpoint, Volume},
 };
 use core::fmt;
+use crossed::{CellId, CrossedCells};
 use hits::{Hit, Hits};
-use march::Marcher;
-use ranges::Ranges;
 use ray_camera::RayCamera;
 use surface::Surface;
+use visibility::{Projection, Strip, Visibility};
 
 /// Units of a normal's components: ±127 is ±1.
 pub const NORMAL_ONE: f32 = 127.0;
@@ -114,7 +115,7 @@ pub struct RaycastReport {
 pub struct Raycaster<'s> {
     config: RaycastConfig,
     surface: Surface<'s>,
-    ranges: Ranges<'s>,
+    visibility: Visibility<'s>,
     depth_m: &'s mut [f32],
     normal: &'s mut [[i8; 3]],
     colour: &'s mut [[u8; 3]],
@@ -162,7 +163,7 @@ impl<'s> Raycaster<'s> {
     pub const fn bytes(capacity: &Capacity) -> usize {
         let pixels = capacity.pixels();
         Surface::bytes(capacity)
-            + Ranges::bytes(capacity)
+            + Visibility::bytes(capacity)
             + region_bytes::<f32>(pixels)
             + 2 * region_bytes::<[u8; 3]>(pixels)
             + 2 * region_bytes::<u8>(pixels)
@@ -174,7 +175,7 @@ impl<'s> Raycaster<'s> {
         Self {
             config: *config,
             surface: Surface::new_in(capacity, carver),
-            ranges: Ranges::new_in(capacity, carver),
+            visibility: Visibility::new_in(capacity, carver),
             depth_m: carver.alloc("raycast.depth", pixels),
             normal: carver.alloc("raycast.normal", pixels),
             colour: carver.alloc("raycast.colour", pixels),
@@ -190,7 +191,7 @@ impl<'s> Raycaster<'s> {
     pub fn cast<E: Executor>(&mut self, volume: &Volume<'_>, view: &Viewpoint, executor: &E) -> Result<RaycastReport, RaycastError> {
         (self.width, self.height) = (0, 0);
         let pixels = view.width.saturating_mul(view.height);
-        if pixels == 0 || pixels > self.depth_m.len() || !self.ranges.fit(view.width, view.height) {
+        if pixels == 0 || pixels > self.depth_m.len() || !self.visibility.fits(view.width) {
             return Err(RaycastError::ImageSize);
         }
         let ray_camera = ray_camera(volume, view)?;
@@ -225,12 +226,20 @@ impl<'s> Raycaster<'s> {
         let near_m = self.config.near_m;
         let in_view = self.surface.find(volume, ray_camera, [near_m, self.config.far_m], min_weight, executor);
         let limits_m = [near_m, min_f32(in_view.far_m, self.config.far_m)];
-        self.ranges.find(&self.surface, ray_camera, limits_m);
         if self.surface.len() > self.peak_blocks {
             self.peak_blocks = self.surface.len();
         }
-        let marcher = Marcher { surface: &self.surface, blocks: volume.blocks(), ray_camera, min_weight };
-        let ranges = &self.ranges;
+        let scene = Scene {
+            cells: CrossedCells {
+                surface: &self.surface,
+                blocks: volume.blocks(),
+                origin: ray_camera.origin,
+                min_weight,
+            },
+            ray_camera,
+            limits_m,
+            layer,
+        };
         let picture = Band {
             first_row: 0,
             depth_m: self.depth_m,
@@ -244,8 +253,9 @@ impl<'s> Raycaster<'s> {
         let rows = ray_camera.height.div_ceil(4);
         let (high, low) = picture.split(2 * rows, ray_camera.width);
         let ((a, b), (c, d)) = (high.split(rows, ray_camera.width), low.split(rows, ray_camera.width));
+        let strips = self.visibility.strips(ray_camera.width);
         // Sky and road go together, so that two threads have about the same to do.
-        let hits = each(executor, [a, d, b, c], |rows| band(&marcher, ranges, layer, rows, executor.vectors()));
+        let hits = each(executor, zip2([a, d, b, c], strips), |(band, strip)| scene.draw(band, strip, executor.vectors()));
         RaycastReport {
             pixels: hits.iter().sum(),
             blocks_in_view: in_view.blocks,
@@ -294,37 +304,65 @@ fn ray_camera(volume: &Volume<'_>, view: &Viewpoint) -> Result<RayCamera, Raycas
     RayCamera::new(view, volume.config().voxel_size_m).ok_or(RaycastError::Viewpoint)
 }
 
-/// Fills a band and counts the pixels that show the map.
-fn band(marcher: &Marcher<'_, '_>, ranges: &Ranges<'_>, layer: u8, band: Band<'_>, vectors: Vectors) -> u32 {
-    let width = marcher.ray_camera.width.max(1);
-    let images = band
-        .depth_m
-        .chunks_mut(width)
-        .zip(band.normal.chunks_mut(width))
-        .zip(band.colour.chunks_mut(width).zip(band.weight.chunks_mut(width)))
-        .zip(band.layer.chunks_mut(width));
-    let (mut count, mut hits) = (0, Hits::none());
-    for (v, (((depth_m, normal), (colour, weight)), layers)) in (band.first_row..).zip(images) {
-        let mut row = Row { depth_m, normal, colour, weight, layers };
-        let mut show = |hits: &mut Hits<'_>, row: &mut Row<'_>| {
-            hits.take(marcher.blocks, &marcher.ray_camera.rotation, vectors, |u, hit| count += u32::from(row.show(u, &hit, layer)));
-        };
-        let ranges = ranges.row(v);
-        for u in 0..width {
-            // A ray meets nothing before its range begins.
-            if let Some(&range) = ranges.get(u >> ranges::TILE_SHIFT)
-                && range[0] <= range[1]
-                && row.is_nearer(u, range[0])
-            {
-                marcher.cast(u, v, range, &mut hits);
-            }
-            if hits.is_full() {
-                show(&mut hits, &mut row);
-            }
+/// What is drawn.
+struct Scene<'a, 's> {
+    cells: CrossedCells<'a, 's>,
+    ray_camera: &'a RayCamera,
+    limits_m: [f32; 2],
+    layer: u8,
+}
+
+impl Scene<'_, '_> {
+    /// Finds the cell of each pixel of rows from a first to a last one: whether there may be any.
+    // Apart from what shows them, for the stack: neither needs the other's.
+    #[inline(never)]
+    fn project(&self, rows: [usize; 2], strip: &mut Strip<'_>, vectors: Vectors) -> bool {
+        let is_seen = self.cells.surface.blocks_in_rows(rows).next().is_some();
+        if is_seen {
+            strip.clear();
+            let Self { cells, ray_camera, limits_m, .. } = *self;
+            vectors.run(Projection { cells, ray_camera, limits_m, rows, strip });
         }
-        show(&mut hits, &mut row);
+        is_seen
     }
-    count
+
+    /// Fills a band and counts the pixels that show the map.
+    fn draw(&self, band: Band<'_>, mut strip: Strip<'_>, vectors: Vectors) -> u32 {
+        let width = self.ray_camera.width.max(1);
+        let images = band
+            .depth_m
+            .chunks_mut(width)
+            .zip(band.normal.chunks_mut(width))
+            .zip(band.colour.chunks_mut(width).zip(band.weight.chunks_mut(width)))
+            .zip(band.layer.chunks_mut(width));
+        let (mut count, mut hits, mut is_empty) = (0, Hits::none(), true);
+        let end = band.first_row + images.len();
+        for (v, (((depth_m, normal), (colour, weight)), layers)) in (band.first_row..).zip(images) {
+            let row = (v - band.first_row) % strip.rows.max(1);
+            if row == 0 {
+                let rows = [v, (v + strip.rows).min(end) - 1];
+                is_empty = !self.project(rows, &mut strip, vectors);
+            }
+            if is_empty {
+                continue;
+            }
+            let mut images = Row { depth_m, normal, colour, weight, layers };
+            let rays = self.ray_camera.row(v);
+            let mut show = |hits: &mut Hits<'_>, images: &mut Row<'_>| {
+                hits.take(&self.cells, &rays, self.limits_m, &self.ray_camera.rotation, vectors, |u, hit| {
+                    count += u32::from(images.show(u, &hit, self.layer));
+                });
+            };
+            for (u, &id) in strip.row(row).iter().take(width).enumerate().filter(|(_, id)| **id != CellId::NONE) {
+                hits.push(&self.cells, u, id);
+                if hits.is_full() {
+                    show(&mut hits, &mut images);
+                }
+            }
+            show(&mut hits, &mut images);
+        }
+        count
+    }
 }
 
 /// A row of the picture.

@@ -1,9 +1,9 @@
 //! The blocks in view and the cells of each that the surface runs through.
 //!
-//! Made anew for every picture: blocks are culled, their signs become bits, the bits of neighbours joined into crossed cells. Then a
-//! ray asks one bit per cell, and most blocks not at all: only those with crossed cells remain in the table.
+//! Made anew for every picture: blocks are culled, their signs become bits, the bits of neighbours joined into crossed cells.
 
 use super::{
+    crossed::CellId,
     ray_camera::RayCamera,
     signs::{self, Cells},
 };
@@ -15,14 +15,18 @@ use crate::{
 
 /// No block.
 pub(super) const NONE: Slot = Slot::new(u32::MAX);
+/// The rows of a block that no cell is crossed in.
+const NO_ROWS: [u16; 2] = [u16::MAX, 0];
 /// Parts of the far limit by which it is shortened when more blocks are in view than fit.
 const RANGE_STEPS: usize = 64;
 
-/// Blocks in view, by entry, in slot order.
+/// Blocks in view, by entry, from near to far.
 #[derive(Debug)]
 pub(super) struct Surface<'s> {
     /// Block coordinates relative to the camera's block.
     local: &'s mut [[i32; 3]],
+    /// First and last row of the picture that a block may be seen in.
+    rows: &'s mut [[u16; 2]],
     /// The block's own slot and those of the blocks after it in x (1), y (2), z (4); [`NONE`] where no block is.
     slots: &'s mut [[Slot; 8]],
     signs: &'s mut [[signs::Layers; 2]],
@@ -32,6 +36,16 @@ pub(super) struct Surface<'s> {
     len: usize,
     /// How far a hash is shifted down to index the part of the table in use.
     shift: u32,
+}
+
+/// One of the blocks in view.
+#[derive(Clone, Copy)]
+pub(super) struct BlockInView<'a> {
+    /// Its coordinates relative to the camera's block.
+    pub local: [i32; 3],
+    /// Its slot and those of the blocks around its last corner.
+    pub slots: &'a [Slot; 8],
+    pub cells: &'a Cells,
 }
 
 /// What was in view.
@@ -61,6 +75,7 @@ impl<'s> Surface<'s> {
     pub const fn bytes(capacity: &Capacity) -> usize {
         let entries = capacity.visible_blocks;
         region_bytes::<[i32; 3]>(entries)
+            + region_bytes::<[u16; 2]>(entries)
             + region_bytes::<[Slot; 8]>(entries)
             + region_bytes::<[signs::Layers; 2]>(entries)
             + region_bytes::<Cells>(entries)
@@ -71,6 +86,7 @@ impl<'s> Surface<'s> {
         let entries = capacity.visible_blocks;
         Self {
             local: carver.alloc("raycast.local", entries),
+            rows: carver.alloc("raycast.rows", entries),
             slots: carver.alloc("raycast.slots", entries),
             signs: carver.alloc("raycast.signs", entries),
             cells: carver.alloc("raycast.cells", entries),
@@ -90,10 +106,9 @@ impl<'s> Surface<'s> {
         executor: &E,
     ) -> InView {
         let in_view = self.cull(volume, ray_camera, limits_m);
-        self.index(|_| true);
+        self.index();
         self.read_signs(volume, min_weight, executor);
         self.join_neighbours();
-        self.index(|cells| cells.iter().any(|layer| layer.crossed != 0));
         in_view
     }
 
@@ -104,50 +119,56 @@ impl<'s> Surface<'s> {
         let blocks = volume.pool().live().filter_map(|slot| {
             let local = ray_camera.local(volume.blocks().coord(slot)?)?;
             let center = local.map(|c| (c * BLOCK_SIDE as i32) as f32 + half - 1.0);
-            Some((slot, local, ray_camera.extent(center, [half; 3], near_m, far_m)?.depth_m[0]))
+            let extent = ray_camera.extent(center, [half; 3], near_m, far_m);
+            (!extent.is_empty()).then_some((slot, local, extent.rows, extent.depth_m[0]))
         });
-        self.len = 0;
-        let mut count = 0;
-        let mut by_range = [0u32; RANGE_STEPS];
         let steps_per_m = RANGE_STEPS as f32 / far_m;
-        for (slot, local, depth_m) in blocks.clone() {
-            count += 1;
-            if let Some(step) = by_range.get_mut(((depth_m * steps_per_m) as usize).min(RANGE_STEPS - 1)) {
+        let step_of = |depth_m: f32| ((depth_m * steps_per_m) as usize).min(RANGE_STEPS - 1);
+        let mut by_range = [0usize; RANGE_STEPS];
+        for (.., depth_m) in blocks.clone() {
+            if let Some(step) = by_range.get_mut(step_of(depth_m)) {
                 *step += 1;
             }
-            self.push(slot, local);
         }
-        if count as usize <= self.local.len() {
-            return InView { blocks: count, far_m };
-        }
-        // Not all fit: see less far, rather than full of holes.
-        let mut space = self.local.len() as u32;
-        let steps = by_range.iter().take_while(|&&step| space.checked_sub(step).map(|left| space = left).is_some()).count();
-        let far_m = steps as f32 / steps_per_m;
+        // Should not all fit: see less far, rather than full of holes.
+        let space = self.local.len().min(CellId::MAX_BLOCKS);
+        let (mut steps, mut count) = (0, 0);
+        let mut starts = [0; RANGE_STEPS];
         self.len = 0;
-        blocks.filter(|(_, _, depth_m)| ((depth_m * steps_per_m) as usize) < steps).for_each(|(slot, local, _)| self.push(slot, local));
-        InView { blocks: count, far_m }
-    }
-
-    fn push(&mut self, slot: Slot, block: [i32; 3]) {
-        if let (Some(local), Some(slots)) = (self.local.get_mut(self.len), self.slots.get_mut(self.len)) {
-            *local = block;
-            *slots = [slot, NONE, NONE, NONE, NONE, NONE, NONE, NONE];
-            self.len += 1;
+        for (start, blocks) in starts.iter_mut().zip(by_range) {
+            count += blocks;
+            if count <= space {
+                (*start, self.len) = (self.len, count);
+                steps += 1;
+            }
+        }
+        // The nearest first: most of what they hide is left out before it is looked at.
+        for (slot, local, rows, depth_m) in blocks {
+            if let Some(start) = starts.get_mut(..steps).and_then(|starts| starts.get_mut(step_of(depth_m))) {
+                self.set(*start, slot, local, rows);
+                *start += 1;
+            }
+        }
+        InView {
+            blocks: count as u32,
+            far_m: if steps == RANGE_STEPS { far_m } else { steps as f32 / steps_per_m },
         }
     }
 
-    /// Fills the table with the entries whose cells are `wanted`.
-    fn index(&mut self, is_kept: impl Fn(&Cells) -> bool) {
-        let count = self.cells.iter().take(self.len).filter(|cells| is_kept(cells)).count();
-        let len = Self::table_len(count);
+    fn set(&mut self, at: usize, slot: Slot, block: [i32; 3], in_rows: [i32; 2]) {
+        if let (Some(local), Some(rows), Some(slots)) = (self.local.get_mut(at), self.rows.get_mut(at), self.slots.get_mut(at)) {
+            (*local, *rows) = (block, in_rows.map(|row| row as u16));
+            *slots = [slot, NONE, NONE, NONE, NONE, NONE, NONE, NONE];
+        }
+    }
+
+    /// Fills the table with all entries.
+    fn index(&mut self) {
+        let len = Self::table_len(self.len);
         self.shift = 64 - len.trailing_zeros();
         let Some(table) = self.table.get_mut(..len) else { return };
         table.fill(0);
-        for ((entry, local), cells) in (1u64..).zip(self.local.iter()).zip(self.cells.iter()).take(self.len) {
-            if !is_kept(cells) {
-                continue;
-            }
+        for (entry, local) in (1u64..).zip(self.local.iter()).take(self.len) {
             let key = key(*local);
             let mut at = bucket(key, self.shift);
             // At most half full: an empty place is found.
@@ -195,12 +216,17 @@ impl<'s> Surface<'s> {
                 *to = cells;
                 *all = slots;
             }
+            if let Some(rows) = self.rows.get_mut(at)
+                && cells.iter().all(|layer| layer.crossed == 0)
+            {
+                *rows = NO_ROWS;
+            }
         }
     }
 
     /// The entry of a block in the table.
     #[inline]
-    pub fn entry(&self, block: [i32; 3]) -> Option<usize> {
+    fn entry(&self, block: [i32; 3]) -> Option<usize> {
         let key = key(block);
         let mut at = bucket(key, self.shift);
         let mask = (1usize << (64 - self.shift)) - 1;
@@ -216,15 +242,21 @@ impl<'s> Surface<'s> {
         }
     }
 
-    /// The cells of an entry, and the slots around the last corner of its block.
+    /// The block of an entry.
     #[inline]
-    pub fn block(&self, entry: usize) -> Option<(&Cells, &[Slot; 8])> {
-        Some((self.cells.get(entry)?, self.slots.get(entry)?))
+    pub fn block(&self, entry: usize) -> Option<BlockInView<'_>> {
+        Some(BlockInView {
+            local: *self.local.get(entry)?,
+            slots: self.slots.get(entry)?,
+            cells: self.cells.get(entry)?,
+        })
     }
 
-    /// All blocks in view with their cells, in slot order.
-    pub fn blocks(&self) -> impl Iterator<Item = ([i32; 3], &Cells)> {
-        self.local.iter().copied().zip(self.cells.iter()).take(self.len)
+    /// The blocks that may be seen in rows of the picture from a first to a last one, and their entries, from near to far.
+    pub fn blocks_in_rows(&self, [first, last]: [usize; 2]) -> impl Iterator<Item = (usize, BlockInView<'_>)> {
+        let is_seen = move |rows: &[u16; 2]| usize::from(rows[0]) <= last && usize::from(rows[1]) >= first;
+        let entries = self.rows.iter().take(self.len).enumerate().filter(move |(_, rows)| is_seen(rows));
+        entries.filter_map(|(entry, _)| Some((entry, self.block(entry)?)))
     }
 
     /// Blocks in use.

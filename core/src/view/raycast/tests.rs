@@ -13,14 +13,23 @@ use crate::{
         tests::analytic::{cuboid, empty, fill},
     },
 };
-use cell::{Corners, Field, NO_AXIS, along, mean, position, within};
+use cell::{Corners, Field, along, depths_m, mean, position};
 use nalgebra::{Point3, Vector3};
-use ray_camera::{AXES, depth_from_m, depth_in_m};
+use ray_camera::{AXES, Ray};
 use scenes::{Ball, Plane, Scene, filled, rough, seen_from_origin, true_distances};
 use std::{boxed::Box, vec, vec::Vec};
 
 const VOXEL_M: f32 = 0.05;
 const RIG: StereoRig = StereoRig { focal_px: 120.0, center_u_px: 79.3, center_v_px: 47.6, baseline_m: 0.5 };
+
+/// One thread, some vectors.
+struct With(Vectors);
+
+impl Executor for With {
+    fn vectors(&self) -> Vectors {
+        self.0
+    }
+}
 
 fn capacity(visible_blocks: usize) -> Capacity {
     Capacity { image_width: 160, image_height: 96, visible_blocks, ..Capacity::TINY }

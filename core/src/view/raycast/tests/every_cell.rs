@@ -26,19 +26,19 @@ fn root(ends: [[f32; 3]; 2], field: &Field, first: f32, last: f32) -> f32 {
     max_f32(0.0, min_f32(share, 1.0))
 }
 
-/// One pixel, the obvious way: every cell from the nearest depth to the farthest, corners looked up in the index one by one.
+/// One pixel, the obvious way: every cell that the ray passes, each where it leaves the one before, corners looked up in the index one by
+/// one; the first in which the field falls from above 0 to 0 or below.
 fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize, v: usize) -> Option<f32> {
     let ray_camera = RayCamera::new(view, VOXEL_M).unwrap();
-    let ray = ray_camera.ray(u, v);
+    let ray = ray_camera.row(v).ray(u as f32);
     let mut sampler = volume.sampler();
-    let [mut from, far] = [config.near_m, config.far_m].map(depth_from_m);
-    let (mut cell, _) = ray.cell_and_exits(from);
-    let mut entered = None;
-    let mut last_cell = (0.0, 0);
-    while from <= far {
-        let next = AXES.map(|axis| ray.crossing(axis, cell[axis] + ray.ahead[axis]));
-        let to = *next.iter().min().unwrap();
-        let axis = next.iter().position(|&depth| depth == to).unwrap();
+    let mut cell = AXES.map(|axis| (ray_camera.origin[axis] + ray.slope[axis] * config.near_m).floor() as i32);
+    loop {
+        let faces = [0, 1].map(|upper| AXES.map(|axis| (cell[axis] + upper) as f32 - ray_camera.origin[axis]));
+        let depths = depths_m(&ray, &faces, config.near_m);
+        if depths[0] > config.far_m {
+            return None;
+        }
         let mut corners = Corners::default();
         for corner in 0..8 {
             let point = AXES.map(|axis| cell[axis] + 8 * ray_camera.base[axis] + (corner >> axis & 1) as i32);
@@ -47,45 +47,25 @@ fn plain(volume: &Volume<'_>, view: &Viewpoint, config: &RaycastConfig, u: usize
                 corners.observed |= 1 << corner;
             }
         }
-        let is_seen = |corner: usize| corners.observed >> corner & 1 == 1;
-        let any = |test: fn(f32) -> bool| (0..8).any(|corner| is_seen(corner) && test(corners.sdf[corner]));
+        let any = |test: fn(f32) -> bool| (0..8).any(|corner| corners.observed >> corner & 1 == 1 && test(corners.sdf[corner]));
         // A cell belongs to the block of its first corner and is skipped where that is not in the map.
         let own = BlockCoord::of_lattice(AXES.map(|axis| cell[axis] + 8 * ray_camera.base[axis])).and_then(|coord| volume.find(coord));
-        if own.is_some() && to > from && any(|sdf| sdf > 0.0) && any(|sdf| sdf <= 0.0) {
-            let block = ray.offset(cell.map(|c| c >> 3));
-            let offset = AXES.map(|axis| block[axis] - (cell[axis] & 7) as f32);
-            let end = |depth, face: Option<usize>, leaves: bool| {
-                let upper = face.map_or(0, |axis| u32::from(leaves == ray.is_ahead(axis)));
-                position(&ray, offset, depth_in_m(depth), face.unwrap_or(NO_AXIS), upper)
-            };
-            let ends = [end(from, entered, false), end(to, Some(axis), true)];
-            let guessed = corners.complete();
-            let value = |face: Option<(usize, usize)>, depth| {
-                if let Some((axis, upper)) = face {
-                    let [u, v] = [[1, 2], [0, 2], [0, 1]][axis];
-                    let four = [0, 1 << u, 1 << v, 1 << u | 1 << v].map(|corner| corner | upper << axis);
-                    if let Some([a, b, c, d]) = march::completed(four.map(|corner| is_seen(corner).then(|| corners.sdf[corner]))) {
-                        let [u, v] = [u, v].map(|axis| within(offset[axis], ray.slope[axis], depth_in_m(depth)));
-                        let (low, high) = (a + (b - a) * u, c + (d - c) * u);
-                        return low + (high - low) * v;
-                    }
-                }
-                guessed.map_or(0.0, |corners| mean(&corners, ends[usize::from(depth == to)]))
-            };
-            let first =
-                if last_cell.1 == from { last_cell.0 } else { value(entered.map(|axis| (axis, 1 - ray.ahead[axis] as usize)), from) };
-            let last = value(Some((axis, ray.ahead[axis] as usize)), to);
-            if let (true, true, Some(corners)) = (first > 0.0, last <= 0.0, guessed) {
-                let share = root(ends, &Field::new(&corners), first, last);
-                let [from_m, to_m] = [from, to].map(depth_in_m);
-                return Some(from_m + (to_m - from_m) * share).filter(|&depth_m| depth_m <= config.far_m);
+        if let (Some(_), Some(corners), true) =
+            (own, corners.complete(), any(|sdf| sdf > 0.0) && any(|sdf| sdf <= 0.0) && depths[0] < depths[1])
+        {
+            let ends = depths.map(|depth_m| position(&ray, &faces, depth_m));
+            let values = ends.map(|end| mean(&corners, end));
+            if values[0] > 0.0 && values[1] <= 0.0 {
+                let share = root(ends, &Field::new(&corners), values[0], values[1]);
+                return Some(depths[0] + (depths[1] - depths[0]) * share).filter(|&depth_m| depth_m <= config.far_m);
             }
-            last_cell = (last, to);
         }
-        cell[axis] += 2 * ray.ahead[axis] - 1;
-        (from, entered) = (to, Some(axis));
+        // The face that the ray leaves by.
+        let ahead = AXES.map(|axis| usize::from(ray.slope[axis] > 0.0));
+        let exits = AXES.map(|axis| faces[ahead[axis]][axis] * ray.per_unit[axis]);
+        let axis = AXES.into_iter().min_by(|&a, &b| exits[a].total_cmp(&exits[b])).unwrap();
+        cell[axis] += 2 * ahead[axis] as i32 - 1;
     }
-    None
 }
 
 #[test]
@@ -115,39 +95,45 @@ fn agrees_to_the_bit_with_a_walk_through_every_cell() {
 }
 
 #[test]
-fn rays_one_by_one_meet_what_eight_at_a_time_do() {
-    let (mut met, mut kept) = (0, 0);
-    for (seed, view) in (0..).zip([at([0.0; 3], [0.0; 3]), at([0.1, -0.4, 0.2], [0.9, -0.3, 0.2])]) {
-        let volume = rough(seed);
+fn every_level_of_vectors_shows_the_same_picture() {
+    let (volume, view) = (rough(3), at([0.1, -0.4, 0.2], [0.9, -0.3, 0.2]));
+    let mut pictures = Vectors::available().map(|vectors| {
         let mut caster = raycaster(6_000, &RaycastConfig::default());
-        caster.cast(&volume, &view, &Serial).unwrap();
-        let ray_camera = RayCamera::new(&view, VOXEL_M).unwrap();
-        let marcher = Marcher {
-            surface: &caster.surface,
-            blocks: volume.blocks(),
-            ray_camera: &ray_camera,
-            min_weight: 1,
-        };
-        let mut before = [0; 3];
-        for at in 0..160 * 96 {
-            let (u, v) = (at % 160, at / 160);
-            let range = caster.ranges.row(v)[u >> ranges::TILE_SHIFT];
-            let (mut hits, mut alone) = (Hits::none(), None);
-            if range[0] <= range[1] {
-                marcher.cast(u, v, range, &mut hits);
-            }
-            hits.take(volume.blocks(), &ray_camera.rotation, Vectors::PLAIN, |column, hit| {
-                assert_eq!(column, u);
-                alone = Some((hit.depth_m, hit.normal.map(|c| (c * NORMAL_ONE) as i8), hit.colour, hit.weight));
+        caster.cast(&volume, &view, &With(vectors)).unwrap();
+        (caster.depth_m.to_vec(), caster.normal.to_vec(), caster.colour.to_vec(), caster.weight.to_vec())
+    });
+    let plain = pictures.next().unwrap();
+    assert!(plain.0.iter().filter(|&&depth_m| depth_m > 0.0).count() > 5_000);
+    assert!(pictures.all(|picture| picture == plain));
+}
+
+#[test]
+fn cells_side_by_side_agree_at_the_face_between_them() {
+    let mut random = Random::new(11);
+    let mut share = || random.below(10_000) as f32 / 10_000.0;
+    for axis in AXES {
+        for _ in 0..1_000 {
+            let shared = [(); 4].map(|()| 60_000.0 * share() - 30_000.0);
+            // Corners on the face are the upper ones of one cell and the lower ones of the other.
+            let corners = [1, 0].map(|upper| {
+                let mut four = shared.iter();
+                let mut corner =
+                    |corner: usize| if corner >> axis & 1 == upper { *four.next().unwrap() } else { 60_000.0 * share() - 30_000.0 };
+                core::array::from_fn(&mut corner)
             });
-            let shown = (caster.depth_m[at], caster.normal[at], caster.colour[at], caster.weight[at]);
-            assert_eq!(shown, alone.unwrap_or_default(), "scene {seed}, pixel {u} {v}");
-            met += u32::from(alone.is_some());
-            let point = AXES.map(|axis| ray_camera.origin[axis] + ray_camera.ray(u, v).slope[axis] * shown.0);
-            let cell = point.map(|c| c.floor() as i32);
-            kept += u32::from(alone.is_some() && cell == before);
-            before = cell;
+            let origin = [(); 3].map(|()| 8.0 * share());
+            let cell = [(); 3].map(|()| (400.0 * share()) as i32 - 200);
+            let faces = [0, 1]
+                .map(|next| [0, 1].map(|upper| AXES.map(|a| (cell[a] + upper + if a == axis { next } else { 0 }) as f32 - origin[a])));
+            let slope = [(); 3].map(|()| 40.0 * share() - 19.999_5);
+            let inverse = 1.0 / (slope[0] * slope[1] * slope[2]);
+            let ray = Ray {
+                slope,
+                per_unit: [slope[1] * slope[2] * inverse, slope[0] * slope[2] * inverse, slope[0] * slope[1] * inverse],
+            };
+            let depth_m = faces[0][1][axis] * ray.per_unit[axis];
+            let [one, other] = [0, 1].map(|n| mean(&corners[n], position(&ray, &faces[n], depth_m)));
+            assert_eq!(one.to_bits(), other.to_bits(), "axis {axis}, {slope:?}");
         }
     }
-    assert!(met > 10_000 && kept > 1_000, "{met} {kept}");
 }

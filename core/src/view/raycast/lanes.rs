@@ -1,0 +1,26 @@
+//! Rays side by side, worked on in loops that compilers turn into vectors.
+
+/// Rays worked on at once: as many as the widest vector holds.
+pub(super) const LANES: usize = 8;
+/// One value for each of them.
+pub(super) type Eight<T> = [T; LANES];
+
+/// Sets one lane's figures.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
+pub(super) fn set<T: Copy, const N: usize>(all: &mut [Eight<T>; N], lane: usize, one: &[T; N]) {
+    for i in 0..N {
+        all[i][lane] = one[i];
+    }
+}
+
+/// One lane's figures.
+#[inline(always)]
+#[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
+pub(super) fn at_lane<T: Copy + Default, const N: usize>(all: &[Eight<T>; N], lane: usize) -> [T; N] {
+    let mut one = [T::default(); N];
+    for i in 0..N {
+        one[i] = all[i][lane];
+    }
+    one
+}

@@ -1,0 +1,305 @@
+//! Which cell each pixel's ray meets the surface in: the nearest of those it passes.
+//!
+//! Cells are projected into the picture one by one (cell projection: Wilhelms, Van Gelder, *A Coherent Projection Approach for Direct Volume
+//! Rendering*, 1991), and of all that stop a pixel's ray the one it enters first is kept: their order changes nothing but the time. What is
+//! seen there is worked out afterwards, once for each pixel (Burns, Hunt, *The Visibility Buffer*, 2013). Eight rays side by side are tried
+//! at once.
+
+use super::{
+    cell::{Faces, depths_m, mean, position},
+    cell_index::CellIndex,
+    crossed::{CellId, CrossedCell, CrossedCells},
+    lanes::{Eight, LANES, at_lane, set},
+    ray_camera::{Ray, RayCamera, RowOfRays},
+    surface::BlockInView,
+};
+use crate::{
+    memory::{Capacity, Carver, region_bytes},
+    parallel::{BANDS, Bands, Work, zip2},
+    part::part,
+    volume::BLOCK_SIDE,
+};
+
+/// Rows of the picture that cells are projected into at once, at most: few enough for a processor's cache.
+const MAX_STRIP_ROWS: usize = 16;
+
+/// The cell of each pixel, for a strip of rows of each band.
+#[derive(Debug)]
+pub(super) struct Visibility<'s> {
+    strip_rows: usize,
+    enters_m: &'s mut [f32],
+    cells: &'s mut [CellId],
+}
+
+impl<'s> Visibility<'s> {
+    /// Pixels of a strip's row in memory: eight from the last one of the picture on are there.
+    const fn stride(width: usize) -> usize {
+        width + LANES
+    }
+
+    /// Rows of a strip: no more than a band of the largest picture has.
+    const fn strip_rows(capacity: &Capacity) -> usize {
+        let band = capacity.image_height.div_ceil(BANDS);
+        if band < MAX_STRIP_ROWS { band } else { MAX_STRIP_ROWS }
+    }
+
+    const fn pixels(capacity: &Capacity) -> usize {
+        BANDS * Self::strip_rows(capacity) * Self::stride(capacity.image_width)
+    }
+
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        region_bytes::<f32>(Self::pixels(capacity)) + region_bytes::<CellId>(Self::pixels(capacity))
+    }
+
+    pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
+        Self {
+            strip_rows: Self::strip_rows(capacity),
+            enters_m: carver.alloc("raycast.enters", Self::pixels(capacity)),
+            cells: carver.alloc("raycast.nearest", Self::pixels(capacity)),
+        }
+    }
+
+    /// Whether a picture of this width fits.
+    pub fn fits(&self, width: usize) -> bool {
+        Self::stride(width).checked_mul(BANDS * self.strip_rows).is_some_and(|pixels| pixels <= self.cells.len())
+    }
+
+    /// A strip for each band.
+    pub fn strips(&mut self, width: usize) -> [Strip<'_>; BANDS] {
+        let (stride, rows) = (Self::stride(width), self.strip_rows);
+        let bands = Bands::of(BANDS);
+        let memory = zip2(bands.split_mut(self.enters_m, rows * stride), bands.split_mut(self.cells, rows * stride));
+        memory.map(|(enters_m, cells)| Strip { rows, stride, enters_m, cells })
+    }
+}
+
+/// A strip of rows.
+pub(super) struct Strip<'b> {
+    /// How many it has at most.
+    pub rows: usize,
+    stride: usize,
+    /// The depth at which each pixel's ray enters its cell, m.
+    enters_m: &'b mut [f32],
+    cells: &'b mut [CellId],
+}
+
+impl Strip<'_> {
+    /// Forgets what was there.
+    pub fn clear(&mut self) {
+        self.enters_m.fill(f32::MAX);
+        self.cells.fill(CellId::NONE);
+    }
+
+    /// The cells of the pixels of a row.
+    pub fn row(&self, row: usize) -> &[CellId] {
+        part(self.cells, row * self.stride..(row + 1) * self.stride)
+    }
+
+    /// Eight pixels of a row.
+    #[inline(always)]
+    fn eight(&mut self, row: usize, first: usize) -> Option<(&mut Eight<f32>, &mut Eight<CellId>)> {
+        let start = row * self.stride + first;
+        Some((self.enters_m.get_mut(start..)?.first_chunk_mut()?, self.cells.get_mut(start..)?.first_chunk_mut()?))
+    }
+}
+
+/// The projection of all cells into a strip.
+pub(super) struct Projection<'p, 'b, 'a, 's> {
+    pub cells: CrossedCells<'a, 's>,
+    pub ray_camera: &'p RayCamera,
+    pub limits_m: [f32; 2],
+    /// First and last row of the strip.
+    pub rows: [usize; 2],
+    pub strip: &'p mut Strip<'b>,
+}
+
+impl Work for Projection<'_, '_, '_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        let surface = self.cells.surface;
+        let (mut cells, mut rays) = (Extents::default(), Passing::default());
+        for (entry, block) in surface.blocks_in_rows(self.rows) {
+            for (z, layer) in (0u32..).zip(block.cells) {
+                let mut crossed = layer.crossed;
+                while crossed != 0 {
+                    let bit = crossed.trailing_zeros();
+                    crossed &= crossed - 1;
+                    cells.push(z << 6 | bit, layer.fully_observed >> bit & 1 == 1);
+                    if cells.len == LANES {
+                        self.project(entry, &block, &mut cells, &mut rays);
+                    }
+                }
+            }
+            self.project(entry, &block, &mut cells, &mut rays);
+        }
+    }
+}
+
+impl Projection<'_, '_, '_, '_> {
+    /// Tries the rays that may pass some cells of a block.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
+    fn project(&mut self, entry: usize, block: &BlockInView<'_>, cells: &mut Extents, passing: &mut Passing) {
+        cells.find(self.ray_camera, block.local, self.limits_m);
+        for lane in 0..cells.len.min(LANES) {
+            let [first, last] = [cells.rows[0][lane].max(self.rows[0] as i32), cells.rows[1][lane].min(self.rows[1] as i32)];
+            let [left, right] = [cells.columns[0][lane], cells.columns[1][lane]];
+            if first > last || left > right {
+                continue;
+            }
+            let cell = CrossedCell {
+                block: block.local,
+                slots: block.slots,
+                at: CellIndex::of_voxel(cells.at[lane]),
+                fully_observed: cells.fully_observed[lane],
+            };
+            let pixels = [left as usize, right as usize, first as usize, last as usize];
+            self.cover(CellId::new(entry, cell.at), &cell, cells.nearest_m[lane], pixels, passing);
+        }
+        cells.len = 0;
+    }
+
+    /// Tries the rays of pixels from a first to a last column and row that show nothing nearer than a cell.
+    #[inline(always)]
+    fn cover(&mut self, id: CellId, cell: &CrossedCell<'_>, nearest_m: f32, [left, right, first, last]: [usize; 4], passing: &mut Passing) {
+        // Of a cell that is hidden no corner is read.
+        let mut target = None;
+        for v in first..=last {
+            let rays = self.ray_camera.row(v);
+            for u in (left..=right).step_by(LANES) {
+                let Some((enters_m, cells)) = self.strip.eight(v - self.rows[0], u) else { continue };
+                if enters_m.iter().fold(0, |any, &enters_m| any | u32::from(nearest_m < enters_m)) == 0 {
+                    continue;
+                }
+                if target.is_none() {
+                    let Some(corners) = self.cells.corners(cell) else { return };
+                    target = Some(Target { id, faces: self.cells.faces(cell), corners });
+                }
+                if let Some(target) = &target {
+                    target.meet(&rays, u, self.limits_m, passing, enters_m, cells);
+                }
+            }
+        }
+    }
+}
+
+/// Some cells of a block, and which pixels each may cover.
+#[derive(Default)]
+struct Extents {
+    len: usize,
+    at: Eight<u32>,
+    fully_observed: Eight<bool>,
+    columns: [Eight<i32>; 2],
+    rows: [Eight<i32>; 2],
+    /// Below the depth at which any ray enters it, m.
+    nearest_m: Eight<f32>,
+}
+
+/// What is left of a cell's nearest depth, so that no rounding takes a ray from a cell that it enters first.
+const NEARER: f32 = 0.999;
+
+impl Extents {
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
+    fn push(&mut self, cell: u32, fully_observed: bool) {
+        let lane = self.len % LANES;
+        (self.at[lane], self.fully_observed[lane]) = (cell, fully_observed);
+        self.len += 1;
+    }
+
+    /// Finds the pixels that the cells may cover: no rows where none.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
+    fn find(&mut self, ray_camera: &RayCamera, block: [i32; 3], [near_m, far_m]: [f32; 2]) {
+        let [x, y, z] = block.map(|c| (c * BLOCK_SIDE as i32) as f32 + 0.5);
+        for lane in 0..LANES {
+            let at = self.at[lane];
+            let center = [x + (at & 7) as i32 as f32, y + (at >> 3 & 7) as i32 as f32, z + (at >> 6 & 7) as i32 as f32];
+            let extent = ray_camera.extent(center, [0.5; 3], near_m, far_m);
+            (self.columns[0][lane], self.columns[1][lane]) = (extent.columns[0], extent.columns[1]);
+            self.rows[0][lane] = if extent.depth_m[0] <= extent.depth_m[1] { extent.rows[0] } else { i32::MAX };
+            self.rows[1][lane] = extent.rows[1];
+            self.nearest_m[lane] = extent.depth_m[0] * NEARER;
+        }
+    }
+}
+
+/// Rays that may pass a cell.
+#[derive(Default)]
+struct Passing {
+    slope: [Eight<f32>; 3],
+    per_unit: [Eight<f32>; 3],
+    /// Where they enter and leave it.
+    depths_m: [Eight<f32>; 2],
+    /// All ones for those that pass it, for those of them that leave it behind the surface, and for those that meet the surface.
+    passes: Eight<u32>,
+    leaves_behind: Eight<u32>,
+    meets: Eight<u32>,
+}
+
+impl Passing {
+    /// The field where a ray passes a cell at a depth.
+    #[inline(always)]
+    fn value(&self, target: &Target, lane: usize, depth_m: f32) -> f32 {
+        let ray = Ray { slope: at_lane(&self.slope, lane), per_unit: at_lane(&self.per_unit, lane) };
+        mean(&target.corners, position(&ray, &target.faces, depth_m))
+    }
+}
+
+/// A cell as rays meet it.
+struct Target {
+    id: CellId,
+    faces: Faces,
+    corners: [f32; 8],
+}
+
+impl Target {
+    /// Takes the pixels whose rays come from free space through the surface in this cell, and enter it before the one they had.
+    #[inline(always)]
+    #[expect(
+        clippy::indexing_slicing,
+        clippy::needless_range_loop,
+        reason = "lanes are below their number; compilers make vectors of such loops"
+    )]
+    fn meet(
+        &self,
+        rays: &RowOfRays,
+        first: usize,
+        [near_m, far_m]: [f32; 2],
+        passing: &mut Passing,
+        nearest_m: &mut Eight<f32>,
+        cells: &mut Eight<CellId>,
+    ) {
+        for lane in 0..LANES {
+            let ray = rays.ray(first as f32 + lane as f32);
+            let [enters_m, leaves_m] = depths_m(&ray, &self.faces, near_m);
+            let passes = (enters_m < leaves_m) & (enters_m <= far_m) & (enters_m < nearest_m[lane]);
+            passing.passes[lane] = u32::from(passes).wrapping_neg();
+            set(&mut passing.slope, lane, &ray.slope);
+            set(&mut passing.per_unit, lane, &ray.per_unit);
+            set(&mut passing.depths_m, lane, &[enters_m, leaves_m]);
+        }
+        // Most rays that pass a cell leave it before the surface.
+        let mut any = 0;
+        for lane in 0..LANES {
+            let is_behind = u32::from(passing.value(self, lane, passing.depths_m[1][lane]) <= 0.0).wrapping_neg();
+            passing.leaves_behind[lane] = passing.passes[lane] & is_behind;
+            any |= passing.passes[lane] & is_behind;
+        }
+        if any == 0 {
+            return;
+        }
+        for lane in 0..LANES {
+            let is_before = u32::from(passing.value(self, lane, passing.depths_m[0][lane]) > 0.0).wrapping_neg();
+            passing.meets[lane] = passing.leaves_behind[lane] & is_before;
+        }
+        for ((nearest_m, enters_m), &meets) in nearest_m.iter_mut().zip(&passing.depths_m[0]).zip(&passing.meets) {
+            *nearest_m = f32::from_bits(enters_m.to_bits() & meets | nearest_m.to_bits() & !meets);
+        }
+        for (CellId(nearest), &meets) in cells.iter_mut().zip(&passing.meets) {
+            *nearest = self.id.0 & meets | *nearest & !meets;
+        }
+    }
+}
