@@ -7,8 +7,8 @@
 //!
 //! Cells go to the rays, not rays to the cells (docs/decisions/0050-cells-are-projected.md): the blocks in view are reduced to bits for the
 //! cells that the surface runs through (`signs`, `surface`), these are projected into the picture, from near to far, and each pixel keeps
-//! the one that its ray enters first (`visibility`); what is seen there is worked out once for each pixel (`hits`). Both try eight rays at
-//! a time, without branches. What two cells say of a ray at the face between them is equal to the bit, so that no ray slips through, but
+//! the one that its ray enters first (`visibility`); what is seen there is worked out once for each pixel (`hits`). Both work on eight rays at
+//! a time. What two cells say of a ray at the face between them is equal to the bit, so that no ray slips through, but
 //! where corners were guessed. The tests compare with a walk through every cell.
 //!
 //! Several maps make one picture: [`Raycaster::cast`] begins it and [`Raycaster::cast_over`] adds what lies nearer, so that each pixel shows the
@@ -293,6 +293,7 @@ impl<'s> Raycaster<'s> {
     pub(crate) fn note_use(&self, footprint: &mut Footprint) {
         let (now, peak) = (self.surface.len(), self.peak_blocks);
         footprint.set_use::<[i32; 3]>("raycast.local", now, peak);
+        footprint.set_use::<[u16; 2]>("raycast.rows", now, peak);
         footprint.set_use::<[Slot; 8]>("raycast.slots", now, peak);
         footprint.set_use::<[signs::Layers; 2]>("raycast.signs", now, peak);
         footprint.set_use::<signs::Cells>("raycast.cells", now, peak);

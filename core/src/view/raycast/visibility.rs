@@ -119,20 +119,20 @@ impl Work for Projection<'_, '_, '_, '_> {
     #[inline(always)]
     fn run(mut self) {
         let surface = self.cells.surface;
-        let (mut cells, mut rays) = (Extents::default(), Passing::default());
+        let (mut cells, mut passing) = (Extents::default(), Passing::default());
         for (entry, block) in surface.blocks_in_rows(self.rows) {
             for (z, layer) in (0u32..).zip(block.cells) {
                 let mut crossed = layer.crossed;
                 while crossed != 0 {
                     let bit = crossed.trailing_zeros();
                     crossed &= crossed - 1;
-                    cells.push(z << 6 | bit, layer.fully_observed >> bit & 1 == 1);
+                    cells.push(CellIndex::of_voxel(z << 6 | bit), layer.fully_observed >> bit & 1 == 1);
                     if cells.len == LANES {
-                        self.project(entry, &block, &mut cells, &mut rays);
+                        self.project(entry, &block, &mut cells, &mut passing);
                     }
                 }
             }
-            self.project(entry, &block, &mut cells, &mut rays);
+            self.project(entry, &block, &mut cells, &mut passing);
         }
     }
 }
@@ -145,17 +145,16 @@ impl Projection<'_, '_, '_, '_> {
         cells.find(self.ray_camera, block.local, self.limits_m);
         for lane in 0..cells.len.min(LANES) {
             let [first, last] = [cells.rows[0][lane].max(self.rows[0] as i32), cells.rows[1][lane].min(self.rows[1] as i32)];
-            let [left, right] = [cells.columns[0][lane], cells.columns[1][lane]];
-            if first > last || left > right {
+            if first > last {
                 continue;
             }
             let cell = CrossedCell {
                 block: block.local,
                 slots: block.slots,
-                at: CellIndex::of_voxel(cells.at[lane]),
+                at: cells.at[lane],
                 fully_observed: cells.fully_observed[lane],
             };
-            let pixels = [left as usize, right as usize, first as usize, last as usize];
+            let pixels = [cells.columns[0][lane], cells.columns[1][lane], first, last].map(|at| at as usize);
             self.cover(CellId::new(entry, cell.at), &cell, cells.nearest_m[lane], pixels, passing);
         }
         cells.len = 0;
@@ -189,7 +188,7 @@ impl Projection<'_, '_, '_, '_> {
 #[derive(Default)]
 struct Extents {
     len: usize,
-    at: Eight<u32>,
+    at: Eight<CellIndex>,
     fully_observed: Eight<bool>,
     columns: [Eight<i32>; 2],
     rows: [Eight<i32>; 2],
@@ -203,7 +202,7 @@ const NEARER: f32 = 0.999;
 impl Extents {
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
-    fn push(&mut self, cell: u32, fully_observed: bool) {
+    fn push(&mut self, cell: CellIndex, fully_observed: bool) {
         let lane = self.len % LANES;
         (self.at[lane], self.fully_observed[lane]) = (cell, fully_observed);
         self.len += 1;
@@ -216,10 +215,11 @@ impl Extents {
         let [x, y, z] = block.map(|c| (c * BLOCK_SIDE as i32) as f32 + 0.5);
         for lane in 0..LANES {
             let at = self.at[lane];
-            let center = [x + (at & 7) as i32 as f32, y + (at >> 3 & 7) as i32 as f32, z + (at >> 6 & 7) as i32 as f32];
+            let from_first = |axis: usize| at.coordinate(axis) as i32 as f32;
+            let center = [x + from_first(0), y + from_first(1), z + from_first(2)];
             let extent = ray_camera.extent(center, [0.5; 3], near_m, far_m);
             (self.columns[0][lane], self.columns[1][lane]) = (extent.columns[0], extent.columns[1]);
-            self.rows[0][lane] = if extent.depth_m[0] <= extent.depth_m[1] { extent.rows[0] } else { i32::MAX };
+            self.rows[0][lane] = if extent.is_empty() { i32::MAX } else { extent.rows[0] };
             self.rows[1][lane] = extent.rows[1];
             self.nearest_m[lane] = extent.depth_m[0] * NEARER;
         }
@@ -233,7 +233,8 @@ struct Passing {
     per_unit: [Eight<f32>; 3],
     /// Where they enter and leave it.
     depths_m: [Eight<f32>; 2],
-    /// All ones for those that pass it, for those of them that leave it behind the surface, and for those that meet the surface.
+    /// All ones for those that pass it, for those of them that leave it behind the surface, and for those that meet the surface. Each has
+    /// memory of its own: what is masked in place is stored in parts, for which the next load has to wait.
     passes: Eight<u32>,
     leaves_behind: Eight<u32>,
     meets: Eight<u32>,

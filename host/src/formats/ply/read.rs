@@ -54,7 +54,7 @@ impl VertexLayout {
         Some(())
     }
 
-    /// The vertex of a number in so many bytes.
+    /// The vertex in so many bytes.
     fn vertex(&self, bytes: &[u8]) -> Option<PlyVertex> {
         let word = |at: usize| <[u8; 4]>::try_from(bytes.get(at..at + 4)?).ok();
         let metres = |at: usize| word(at).map(f32::from_le_bytes);
