@@ -22,17 +22,16 @@ impl Fusion<'_> {
     /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is that after this observation.
     #[expect(clippy::indexing_slicing, reason = "masks keep voxels below LAYER_VOXELS, the length of every layer")]
     #[inline(always)]
-    pub(super) fn colour_layer(&self, scratch: &Scratch, [red, green, blue]: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
+    pub(super) fn colour_layer(&self, scratch: &mut Scratch, [red, green, blue]: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
         let near = self.near_surface(scratch);
-        // Most layers have none; bits take longer than a look.
+        // Then no pixel need be read.
         if near.iter().fold(0, |any, near| any | near) == 0 {
             return;
         }
-        let bits = bits(&near);
         let (mut reds, mut greens, mut blues) = ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
         match self.seen.colour {
-            Some(image) => scratch.pixels_at(bits, image, |i, pixel| [reds[i], greens[i], blues[i]] = pixel),
-            None => scratch.pixels_at(bits, self.seen.grey, |i, pixel| reds[i] = pixel),
+            Some(image) => scratch.pixels_at(bits(&near), image, |i, pixel| [reds[i], greens[i], blues[i]] = pixel),
+            None => scratch.pixels(self.seen.grey, &mut reds),
         }
         // In between, bytes stored one by one arrive where vectors read them.
         let share = self.colour_shares(scratch, &near, [red, green, blue], weight);

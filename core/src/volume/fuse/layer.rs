@@ -1,7 +1,7 @@
 //! The kernel: 64 voxels at a time, those of a block with one z.
 //!
-//! Each loop applies one operation to all of them and has no branches: that is what becomes
-//! vector instructions. Loops over eight voxels are unrolled before they can.
+//! Each loop goes over all of them and has no branches: that is what becomes vector instructions. Loops over eight voxels are unrolled before
+//! they can. What is 32 bits wide is done in as few loops as possible; 16 bits have their own, for twice as many fit into a vector.
 
 use super::Fusion;
 use crate::{
@@ -63,6 +63,8 @@ pub(super) struct Scratch {
     pub(super) row: Layer<i32>,
     /// The same as an index into the depth image, or [`OUTSIDE`].
     pixel: Layer<u32>,
+    /// The same in an image with padding between its rows.
+    padded: Layer<u32>,
     /// Depth observed there, m; 0 none.
     pub(super) observed_m: Layer<f32>,
     /// How far the voxel lies before what is observed, m.
@@ -88,6 +90,7 @@ impl Scratch {
             column: [0; LAYER_VOXELS],
             row: [0; LAYER_VOXELS],
             pixel: [0; LAYER_VOXELS],
+            padded: [0; LAYER_VOXELS],
             observed_m: [0.0; LAYER_VOXELS],
             distance_m: [0.0; LAYER_VOXELS],
             target: [0; LAYER_VOXELS],
@@ -98,22 +101,51 @@ impl Scratch {
         }
     }
 
-    /// What an image of the depths' size shows at the voxels of these bits; all of them fall into it.
+    /// The pixels of an image of the depths' size at all voxels. What those show that fall outside means nothing.
+    #[inline(always)]
+    pub(super) fn pixels<T: Copy + Default>(&mut self, image: View<'_, T>, shown: &mut Layer<T>) {
+        let (pixels, index) = self.indexed(image);
+        // Eight loads in a row: a loop of single ones is all jumps.
+        for (shown, index) in shown.as_chunks_mut().0.iter_mut().zip(index.as_chunks().0) {
+            *shown = loaded(pixels, index);
+        }
+    }
+
+    /// The same at the voxels of these bits alone, which fall into the image: faster where a pixel is several items.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "the mask keeps voxels below LAYER_VOXELS, the length of every layer")]
-    pub(super) fn pixels_at<T: Copy + Default>(&self, mut bits: u64, image: View<'_, T>, mut visit: impl FnMut(usize, T)) {
-        let (pixels, stride) = image.strided();
-        // For all voxels, and so by vectors. What lies outside the image is not among the bits.
-        let mut index = [0; LAYER_VOXELS];
-        for (index, (&row, &column)) in index.iter_mut().zip(self.row.iter().zip(&self.column)) {
-            *index = (row as u32).wrapping_mul(stride as u32).wrapping_add(column as u32);
-        }
+    pub(super) fn pixels_at<T: Copy + Default>(&mut self, mut bits: u64, image: View<'_, T>, mut visit: impl FnMut(usize, T)) {
+        let (pixels, index) = self.indexed(image);
         while bits != 0 {
             let i = bits.trailing_zeros() as usize & (LAYER_VOXELS - 1);
             bits &= bits - 1;
             visit(i, pixels.get(index[i] as usize).copied().unwrap_or_default());
         }
     }
+
+    /// An image of the depths' size, and where in it the voxels fall.
+    #[inline(always)]
+    fn indexed<'i, T>(&'i mut self, image: View<'i, T>) -> (&'i [T], &'i Layer<u32>) {
+        let (pixels, stride) = image.strided();
+        let padding = (stride as u32).wrapping_sub(image.width() as u32);
+        if padding == 0 {
+            return (pixels, &self.pixel);
+        }
+        for (padded, (&pixel, &row)) in self.padded.iter_mut().zip(self.pixel.iter().zip(&self.row)) {
+            *padded = pixel.wrapping_add(padding.wrapping_mul(row as u32));
+        }
+        (pixels, &self.padded)
+    }
+}
+
+/// Eight items of a slice, the default for what is beyond it.
+#[inline(always)]
+fn loaded<T: Copy + Default>(items: &[T], index: &[u32; BLOCK_SIDE]) -> [T; BLOCK_SIDE] {
+    let mut loaded = [T::default(); BLOCK_SIDE];
+    for (loaded, &index) in loaded.iter_mut().zip(index) {
+        *loaded = items.get(index as usize).copied().unwrap_or_default();
+    }
+    loaded
 }
 
 impl Fusion<'_> {
@@ -128,7 +160,8 @@ impl Fusion<'_> {
         weight: &mut Layer<u8>,
     ) -> bool {
         self.project(corner, z, scratch);
-        if !self.observe(scratch) || !self.measure(scratch) {
+        self.observe(scratch);
+        if !self.measure(scratch) {
             return false;
         }
         self.share(scratch, weight);
@@ -150,8 +183,6 @@ impl Fusion<'_> {
             let scale = self.focal_px / scratch.z_m[i];
             scratch.column[i] = rounded_i32(scratch.x_m[i] * scale + self.center_u_px);
             scratch.row[i] = rounded_i32(scratch.y_m[i] * scale + self.center_v_px);
-        }
-        for i in 0..LAYER_VOXELS {
             let (column, row) = (scratch.column[i] as u32, scratch.row[i] as u32);
             // A voxel behind the camera, or so near that its column is nonsense, is outside.
             let inside = (scratch.z_m[i] > 0.0) & (column < self.width) & (row < self.height);
@@ -160,43 +191,31 @@ impl Fusion<'_> {
         }
     }
 
-    /// Reads the depths observed. Whether there is any.
+    /// Reads the depths observed.
     #[inline(always)]
-    fn observe(&self, scratch: &mut Scratch) -> bool {
-        let depth_m = self.depth_m;
-        // Eight loads in a row, and one store: a loop of single ones is all jumps.
-        for (observed_m, pixels) in scratch.observed_m.as_chunks_mut::<BLOCK_SIDE>().0.iter_mut().zip(scratch.pixel.as_chunks().0) {
-            let mut row = [0.0; BLOCK_SIDE];
-            for (observed_m, &pixel) in row.iter_mut().zip::<&[u32; BLOCK_SIDE]>(pixels) {
-                *observed_m = depth_m.get(pixel as usize).copied().unwrap_or(0.0);
-            }
-            *observed_m = row;
+    fn observe(&self, scratch: &mut Scratch) {
+        for (observed_m, pixel) in scratch.observed_m.as_chunks_mut().0.iter_mut().zip(scratch.pixel.as_chunks().0) {
+            *observed_m = loaded(self.depth_m, pixel);
         }
-        scratch.observed_m.iter().fold(0, |any, observed_m| any | observed_m.to_bits()) != 0
     }
 
     /// Compares voxels with what is observed. Whether any is neither unobserved nor hidden.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
     fn measure(&self, scratch: &mut Scratch) -> bool {
-        let (truncation_m, scale) = (self.config.truncation_m, self.scale);
+        let (truncation_m, behind_m, scale, noted) = (self.config.truncation_m, self.behind_m, self.scale, self.seen.noted);
+        let mut any = 0;
         for i in 0..LAYER_VOXELS {
-            let along_z_m = scratch.observed_m[i] - scratch.z_m[i];
-            scratch.hit[i] = -i16::from((scratch.observed_m[i] > 0.0) & (along_z_m >= -truncation_m));
-            scratch.distance_m[i] = along_z_m;
-        }
-        if self.seen.noted {
-            for (distance_m, &observed_m) in scratch.distance_m.iter_mut().zip(&scratch.observed_m) {
-                *distance_m *= obliqueness(observed_m);
-            }
-        }
-        let behind_m = self.behind_m;
-        for i in 0..LAYER_VOXELS {
-            let distance_m = scratch.distance_m[i];
-            scratch.hit[i] &= -i16::from(distance_m >= -behind_m);
+            let observed_m = scratch.observed_m[i];
+            let along_z_m = observed_m - scratch.z_m[i];
+            let distance_m = if noted { along_z_m * obliqueness(observed_m) } else { along_z_m };
+            let hit = -i16::from((observed_m > 0.0) & (along_z_m >= -truncation_m) & (distance_m >= -behind_m));
+            scratch.hit[i] = hit;
+            scratch.distance_m[i] = distance_m;
             scratch.target[i] = rounded_i32(clamp_f32(distance_m, -truncation_m, truncation_m) * scale) as i16;
+            any |= hit;
         }
-        scratch.hit.iter().fold(0, |any, hit| any | hit) != 0
+        any != 0
     }
 
     /// What each observation weighs, and its share of the average.
@@ -240,10 +259,10 @@ impl Fusion<'_> {
     /// Counts the observations.
     #[inline(always)]
     fn count(&self, scratch: &Scratch, weight: &mut Layer<u8>) {
-        let most = i16::from(self.config.max_weight);
+        let most = self.config.max_weight;
         for (weight, (gain, hit)) in weight.iter_mut().zip(scratch.gain.iter().zip(&scratch.hit)) {
-            let sum = i16::from(*weight) + (gain & hit);
-            *weight = if sum < most { sum } else { most } as u8;
+            let sum = weight.saturating_add((gain & hit) as u8);
+            *weight = if sum < most { sum } else { most };
         }
     }
 }

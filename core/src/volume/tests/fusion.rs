@@ -140,7 +140,7 @@ fn equals_the_plain_twin_bit_for_bit() {
 fn equals_the_plain_twin(observation_weight: ObservationWeight) {
     let mut config = VolumeConfig { max_weight: 7, behind_m: 0.4, observation_weight, ..VolumeConfig::default() };
     config.class_weight[..3].copy_from_slice(&[0, 1, 3]);
-    let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i % 251) as u8).collect();
+    let grey: Vec<u8> = (0..(WIDTH + 5) * HEIGHT).map(|i| (i % 251) as u8).collect();
     let rgb: Vec<[u8; 3]> = grey.iter().map(|&grey| [grey, 255 - grey, grey / 3]).collect();
     let class: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i / 5 % 4) as u8).collect();
     with_volume(&CAPACITY, &config, |volume| {
@@ -152,8 +152,10 @@ fn equals_the_plain_twin(observation_weight: ObservationWeight) {
             let note = |(depth, at): (f32, u32)| f32::from_bits(depth.to_bits() & !31 | at.wrapping_mul(2_654_435_761) >> 27);
             let depth_m: Vec<f32> = shown_m.map(|(depth, at)| if noted && depth > 0.0 { note((depth, at)) } else { depth }).collect();
             let view = view([0.02 * f64::from(i), 0.1, -0.3], [0.1 * f64::from(i), 0.0, 0.2]);
+            let stride = WIDTH + if i % 2 == 1 { 5 } else { 0 };
             let seen = Observation {
-                colour: if i % 4 < 2 { View::new(&rgb, WIDTH, HEIGHT) } else { None },
+                grey: View::with_stride(&grey, WIDTH, HEIGHT, stride).unwrap(),
+                colour: if i % 4 < 2 { View::with_stride(&rgb, WIDTH, HEIGHT, stride) } else { None },
                 class: if i % 3 < 2 { View::new(&class, WIDTH, HEIGHT) } else { None },
                 noted,
                 ..observation(&depth_m, &grey)
