@@ -4,7 +4,11 @@
 //! Planes are rasterised, triangle by triangle, into the image that will receive the disparities: no memory of their own. The grid prior is a
 //! set of 256 bits per cell.
 
-use crate::{parallel::Work, part::store, sad::LANES};
+use crate::{
+    parallel::Work,
+    part::{padded, part_mut, store},
+    sad::LANES,
+};
 
 use super::{
     StereoConfig,
@@ -54,17 +58,14 @@ fn rasterise_planes(RasterisePlanes { mesh, slope_max, first, width, out }: Rast
         }
         corners.sort_unstable_by_key(|point| (point.v, point.u));
         let [top, middle, bottom] = corners;
-        let Some(plane) = Plane::through(corners) else { continue };
-        let mark = if plane.slope_u.abs() > slope_max || plane.slope_v.abs() > slope_max { STEEP } else { 0 };
+        let Some(plane) = Plane::through(corners, slope_max) else { continue };
         let (long, upper, lower) = (Edge::new(top, bottom), Edge::new(top, middle), Edge::new(middle, bottom));
-        let covered = out.chunks_exact_mut(width).enumerate().take(to - first).skip(from - first);
-        for (v, row) in covered.map(|(i, row)| ((first + i) as i32, row)) {
-            let (a, b) = (long.column(v), if v < i32::from(middle.v) { upper.column(v) } else { lower.column(v) });
-            let (left, right) = (a.min(b) >> SHIFT, (a.max(b) >> SHIFT) + 1);
-            let end = width.min(right as usize + 1);
-            if let Some(span) = row.get_mut(left as usize..end) {
-                plane.rasterise(left.into(), v.into(), mark, span);
-            }
+        for v in from..to {
+            let at = v as i32;
+            let (a, b) = (long.column(at), if v < usize::from(middle.v) { upper.column(at) } else { lower.column(at) });
+            let (left, right) = ((a.min(b) >> SHIFT) as usize, (a.max(b) >> SHIFT) as usize + 1);
+            let count = width.min(right + 1).saturating_sub(left);
+            plane.rasterise(left as i64, at.into(), part_mut(out, (v - first) * width + left..), count);
         }
     }
 }
@@ -105,39 +106,70 @@ struct Plane {
     origin: SupportPoint,
     slope_u: i64,
     slope_v: i64,
+    /// By how much the disparity rises to each of the pixels after one.
+    along: [i32; LANES],
+    /// Added to disparities.
+    mark: i16,
 }
 
 impl Plane {
-    fn through([a, b, c]: [SupportPoint; 3]) -> Option<Self> {
+    fn through([a, b, c]: [SupportPoint; 3], slope_max: i64) -> Option<Self> {
         let d = |x: u16, y: u16| i64::from(x) - i64::from(y);
         let (bu, bv, bd) = (d(b.u, a.u), d(b.v, a.v), d(b.disparity, a.disparity));
         let (cu, cv, cd) = (d(c.u, a.u), d(c.v, a.v), d(c.disparity, a.disparity));
         let slope = |numerator: i64| (numerator * ONE).checked_div(bu * cv - bv * cu);
+        let (slope_u, slope_v) = (slope(bd * cv - bv * cd)?, slope(bu * cd - bd * cu)?);
         Some(Self {
             origin: a,
-            slope_u: slope(bd * cv - bv * cd)?,
-            slope_v: slope(bu * cd - bd * cu)?,
+            slope_u,
+            slope_v,
+            along: core::array::from_fn(|i| (slope_u as i32).wrapping_mul(i as i32)),
+            mark: if slope_u.abs() > slope_max || slope_v.abs() > slope_max { STEEP } else { 0 },
         })
     }
 
-    /// Fills a run of row `v` from column `left`.
+    /// Fills the first `count` of the pixels from column `left` of row `v` on.
     #[inline(always)]
-    fn rasterise(&self, left: i64, v: i64, mark: i16, span: &mut [i16]) {
+    fn rasterise(&self, left: i64, v: i64, pixels: &mut [i16], count: usize) {
         let offset = self.slope_u * (left - i64::from(self.origin.u)) + self.slope_v * (v - i64::from(self.origin.v));
-        let start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
-        let slope = self.slope_u as i32;
-        // Within a triangle all fits; a pixel beyond the edge of a very steep one may wrap, and its plane is not preferred anyway.
-        // Spans are short: eight pixels at a time, in the end as many of them as there are.
-        for first in (0..span.len()).step_by(LANES) {
-            let mut pixels = [0; LANES];
-            for (i, pixel) in (first..).zip(&mut pixels) {
-                let disparity = start.wrapping_add(slope.wrapping_mul(i as i32)) >> SHIFT;
-                *pixel = held(disparity) + mark;
+        let mut start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
+        // Spans are short, and how long no processor foresees: eight pixels at a time, of which those beyond the span stay as they are.
+        for first in (0..count).step_by(LANES) {
+            let own = LANES - (count - first).min(LANES);
+            let own = OWN.get(own..).and_then(|own| own.first_chunk()).unwrap_or(&[0; LANES]);
+            match pixels.get_mut(first..).and_then(|pixels| pixels.first_chunk_mut()) {
+                Some(eight) => self.fill(eight, start, own),
+                None => self.fill_last(pixels, first, start, own),
             }
-            store(span, first, pixels);
+            start = start.wrapping_add((self.slope_u as i32).wrapping_mul(LANES as i32));
         }
     }
+
+    /// Replaces the pixels whose bits are set in `own` by the plane's, which are `start` at the first one.
+    ///
+    /// Within a triangle all fits; a pixel beyond the edge of a very steep one may wrap, and its plane is not preferred anyway.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
+    fn fill(&self, eight: &mut [i16; LANES], start: i32, own: &[i16; LANES]) {
+        for lane in 0..LANES {
+            let disparity = held(start.wrapping_add(self.along[lane]) >> SHIFT) + self.mark;
+            eight[lane] = (disparity & own[lane]) | (eight[lane] & !own[lane]);
+        }
+    }
+
+    /// The same for fewer than eight pixels, the last ones.
+    #[cold]
+    #[inline(never)]
+    fn fill_last(&self, pixels: &mut [i16], first: usize, start: i32, own: &[i16; LANES]) {
+        let mut eight = padded(pixels, first, 0, NO_PLANE);
+        self.fill(&mut eight, start, own);
+        store(pixels, first, eight);
+    }
 }
+
+/// All bits of eight pixels, and none of eight more: from the n-th on, those of the first 8 - n. Read from memory, for what is known of
+/// single pixels keeps compilers from vectors.
+static OWN: [i16; 2 * LANES] = [-1, -1, -1, -1, -1, -1, -1, -1, 0, 0, 0, 0, 0, 0, 0, 0];
 
 /// The disparities a cell's pixels may have besides those near their plane: one bit each.
 pub(super) type DisparitySet = [u64; 4];
