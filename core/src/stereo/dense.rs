@@ -1,7 +1,7 @@
 //! Dense matching of both images, row by row (Geiger et al., section 3.3), and the check that they agree.
 //!
 //! Each pixel takes the disparity of least energy among those near the plane of its triangle and those of its grid cell. Both images'
-//! rows are matched while their descriptors are at hand, so the right image's disparities are never kept. Eight pixels are matched at
+//! rows are matched while their descriptors are at hand, so the right image's disparities are never kept. Sixteen pixels are matched at
 //! a time (`eight`); fractions of a pixel are found last, for the disparities that are left (`fraction`).
 //!
 //! Energies are integers: 16 times the descriptor distance plus the cost of leaving the plane. Of equal ones the smaller disparity wins.
@@ -109,8 +109,8 @@ impl DenseMatching<'_> {
         let mut cell = 0..size;
         for set in sets {
             let listed = list_candidates(set, self.cost.elsewhere, &mut list);
-            for u in cell.clone().step_by(LANES) {
-                row.match_eight(u, cell.end - u, listed, planes, kernels);
+            for u in cell.clone().step_by(2 * LANES) {
+                row.match_sixteen(u, cell.end - u, listed, planes, kernels);
             }
             cell = cell.end..cell.end + size;
             if cell.start >= planes.len() {
@@ -121,20 +121,19 @@ impl DenseMatching<'_> {
 }
 
 /// The disparities of a set, ascending, each with the cost of leaving the plane in the bits from 8 on.
+#[expect(clippy::indexing_slicing, reason = "the mask keeps members within the list")]
 fn list_candidates<'l>(set: &DisparitySet, cost: u32, list: &'l mut [u32; 256]) -> &'l [u32] {
-    // As many members as bits, at most.
-    let mut slots = list.iter_mut();
-    for (i, &word) in (0u32..).zip(set) {
+    let mut count = 0;
+    for (first, &word) in ((cost << 8)..).step_by(64).zip(set) {
         let mut rest = word;
         while rest != 0 {
-            if let Some(slot) = slots.next() {
-                *slot = (cost << 8) + i * 64 + rest.trailing_zeros();
-            }
+            // As many members as bits, at most: the mask changes nothing.
+            list[count & 255] = first + rest.trailing_zeros();
+            count += 1;
             rest &= rest - 1;
         }
     }
-    let free = slots.len();
-    part(list, ..list.len() - free)
+    part(list, ..count)
 }
 
 /// Eight pixels of a row from column `u` on; those beyond it have no plane.

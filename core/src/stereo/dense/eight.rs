@@ -1,8 +1,9 @@
-//! Eight neighbours of a row matched at a time: one disparity after the other, for all of them.
+//! Neighbours of a row matched at a time: one disparity after the other, for all of them.
 //!
-//! Neighbours share their cell's list of disparities; about its own plane each has disparities of its own, which are as many for all. A
+//! Sixteen share their cell's list of disparities, for how long that is no processor foresees; about its own plane each of eight has
+//! disparities of its own, which are as many for all. A
 //! candidate's key has the energy above and the disparity below, so that the least key is the least energy and, of equal ones, the smallest
-//! disparity. Borders, where not all eight can have the same candidates, go another and slower way.
+//! disparity. Borders, where not all can have the same candidates, go another and slower way.
 
 use super::load;
 use crate::{
@@ -28,15 +29,19 @@ pub(super) struct Row<'a, const LEFT: bool> {
     cost: &'a PlaneCost,
     least_texture: u32,
     most: i32,
-    spare: [Eight<Descriptor>; 2],
+    spare: Eight<Descriptor>,
 }
 
-/// What the eight pixels at hand may match.
-struct Candidates {
+/// Eight pixels to be matched, and what they may match.
+struct Group {
     /// A copy, so that compilers keep it in registers.
     points: Eight<Descriptor>,
     /// Column of the first pixel.
     u: usize,
+    /// How many of the pixels are to be matched at most.
+    count: i32,
+    /// Plane of each pixel; [`NOTHING`] where it is not matched.
+    planes: Eight<i32>,
     /// Greatest disparity of each pixel: beyond it the other row has no descriptors.
     reach: Eight<i32>,
     /// Least and greatest of those.
@@ -53,76 +58,143 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
             cost,
             least_texture: u32::from(config.match_texture),
             most: i32::from(config.disparity_max),
-            spare: [UNTEXTURED; 2],
+            spare: UNTEXTURED,
         }
     }
 
-    /// Replaces the planes of a row's pixels `u..`, eight or `count`, by disparities in px, or [`NO_PLANE`] where no plane lies, the image is
-    /// without texture or no disparity can be.
+    /// Replaces the planes of a row's pixels `u..`, sixteen or `count`, by disparities in px, or [`NO_PLANE`] where no plane lies, the image
+    /// is without texture or no disparity can be.
+    #[inline(always)]
+    pub fn match_sixteen(&mut self, u: usize, count: usize, listed: &[u32], row: &mut [i16], kernels: &impl Kernels) {
+        let groups = [self.group(u, count, row, kernels), self.group(u + LANES, count.saturating_sub(LANES), row, kernels)];
+        let mut best = [[BARRED; LANES]; 2];
+        if groups.iter().any(|group| !group.is_empty()) {
+            best = consider::<LEFT, 2>(groups.each_ref(), self.other, listed, &mut self.spare, kernels);
+        }
+        for (group, mut best) in groups.iter().zip(best) {
+            if !group.is_empty() {
+                best = lesser(best, group.least_about_planes::<LEFT>(self.other, self.cost, &mut self.spare, kernels));
+            }
+            group.write(best, row);
+        }
+    }
+
+    /// The eight pixels from column `u` on, of which `count` may be matched.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
-    pub fn match_eight(&mut self, u: usize, count: usize, listed: &[u32], row: &mut [i16], kernels: &impl Kernels) {
-        let [spare, spare_other] = &mut self.spare;
-        let points = *eight(self.here, u, spare);
+    fn group(&mut self, u: usize, count: usize, row: &[i16], kernels: &impl Kernels) -> Group {
+        let points = *eight(self.here, u, &mut self.spare);
         let texture = kernels.sums(&points, &UNTEXTURED);
-        let mut planes = load(row, u);
-        let count = count.min(LANES) as i32;
-        let mut own = [NOTHING; LANES];
+        let (old, count) = (load(row, u), count.min(LANES) as i32);
+        let (mut planes, mut reach) = ([NOTHING; LANES], [0; LANES]);
         for lane in 0..LANES {
             let is_matched = (texture[lane] >= self.least_texture) & ((lane as i32) < count);
-            own[lane] = if is_matched { i32::from(planes[lane]) } else { NOTHING };
+            planes[lane] = if is_matched { i32::from(old[lane]) } else { NOTHING };
         }
-        let mut best = [BARRED; LANES];
-        if own != [NOTHING; LANES] {
-            let columns = self.here.len() as i32;
-            let mut reach = [0; LANES];
-            for (reach, at) in reach.iter_mut().zip(u as i32..) {
-                let columns = if LEFT { at - MARGIN as i32 } else { columns - MARGIN as i32 - 1 - at };
-                *reach = if columns < self.most { columns } else { self.most };
-            }
-            let (reach_min, reach_max) = if LEFT { (reach[0], reach[LANES - 1]) } else { (reach[LANES - 1], reach[0]) };
-            let candidates = Candidates { points, u, reach, reach_min, reach_max };
-            best = candidates.least_keys::<LEFT>(self.other, self.cost, listed, own, spare_other, kernels);
+        let columns = self.here.len() as i32;
+        for (reach, at) in reach.iter_mut().zip(u as i32..) {
+            let columns = if LEFT { at - MARGIN as i32 } else { columns - MARGIN as i32 - 1 - at };
+            *reach = if columns < self.most { columns } else { self.most };
         }
-        for lane in 0..LANES {
-            let is_found = (own[lane] != NOTHING) & (best[lane] < BARRED);
-            let disparity = if is_found { (best[lane] & 255) as i16 } else { NO_PLANE };
-            // Beyond them are planes of the next cell.
-            planes[lane] = if (lane as i32) < count { disparity } else { planes[lane] };
-        }
-        store(row, u, planes);
+        let (reach_min, reach_max) = if LEFT { (reach[0], reach[LANES - 1]) } else { (reach[LANES - 1], reach[0]) };
+        Group { points, u, count, planes, reach, reach_min, reach_max }
     }
 }
 
-impl Candidates {
-    /// The least key of each pixel, [`BARRED`] where it has none.
+/// The least keys of candidates, each told by what its distance is added to for its key, in ascending order of disparity: those of groups
+/// side by side. [`BARRED`] where a pixel has none.
+#[inline(always)]
+fn consider<const LEFT: bool, const N: usize>(
+    groups: [&Group; N],
+    other: &[Descriptor],
+    bases: &[u32],
+    spare: &mut Eight<Descriptor>,
+    kernels: &impl Kernels,
+) -> [Eight<u32>; N] {
+    let first = groups.iter().fold(usize::MAX, |first, group| first.min(group.u));
+    let reach_min = groups.iter().fold(i32::MAX, |least, group| least.min(group.reach_min));
+    let column = |u: usize, base: u32| {
+        let d = base as usize & 255;
+        if LEFT { u.wrapping_sub(d) } else { u + d }
+    };
+    // Away from the images' borders all pixels can have all disparities.
+    let is_whole = |base: &u32| (base & 255) as i32 <= reach_min;
+    let whole = if bases.last().is_none_or(is_whole) { bases.len() } else { bases.partition_point(is_whole) };
+    let mut keys = [[BARRED; LANES]; N];
+    let mut border = whole;
+    for (i, &base) in part(bases, ..whole).iter().enumerate() {
+        let others = other.get(column(first, base)..).and_then(|row| row.as_chunks().0.first_chunk::<N>());
+        let Some(others) = others else {
+            border = i;
+            break;
+        };
+        for ((keys, group), others) in keys.iter_mut().zip(groups).zip(others) {
+            *keys = kernels.least(*keys, [&group.points, others], base);
+        }
+    }
+    for (best, group) in keys.iter_mut().zip(groups) {
+        *best = kernels.ordered(*best);
+        for &base in part(bases, border..) {
+            let d = (base & 255) as i32;
+            if d > group.reach_max {
+                break;
+            }
+            let others = eight(other, column(group.u, base), spare);
+            let keys = kernels.ordered(kernels.least([BARRED; LANES], [&group.points, others], base));
+            for ((best, key), &reach) in best.iter_mut().zip(keys).zip(&group.reach) {
+                *best = if d > reach { *best } else { key.min(*best) };
+            }
+        }
+    }
+    keys
+}
+
+impl Group {
+    /// Whether no pixel is to be matched.
     #[inline(always)]
-    fn least_keys<const LEFT: bool>(
+    fn is_empty(&self) -> bool {
+        self.planes == [NOTHING; LANES]
+    }
+
+    /// Replaces the pixels' planes in the row by the disparities of keys.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
+    fn write(&self, keys: Eight<u32>, row: &mut [i16]) {
+        let mut pixels = load(row, self.u);
+        for lane in 0..LANES {
+            let is_found = (self.planes[lane] != NOTHING) & (keys[lane] < BARRED);
+            let disparity = if is_found { (keys[lane] & 255) as i16 } else { NO_PLANE };
+            // Beyond them are planes of the next cell.
+            pixels[lane] = if (lane as i32) < self.count { disparity } else { pixels[lane] };
+        }
+        store(row, self.u, pixels);
+    }
+
+    /// The least key about each pixel's own plane, [`BARRED`] where it has none.
+    #[inline(always)]
+    fn least_about_planes<const LEFT: bool>(
         &self,
         other: &[Descriptor],
         cost: &PlaneCost,
-        listed: &[u32],
-        planes: Eight<i32>,
         spare: &mut Eight<Descriptor>,
         kernels: &impl Kernels,
     ) -> Eight<u32> {
-        let best = self.consider::<LEFT>(other, listed, spare, kernels);
-        match self.least_about_planes::<LEFT>(other, cost, planes, kernels) {
-            Some(keys) => lesser(best, keys),
-            None => self.consider_planes::<LEFT>(other, cost, planes, best, spare, kernels),
+        match self.least_about_inner_planes::<LEFT>(other, cost, kernels) {
+            Some(keys) => keys,
+            None => self.least_about_any_planes::<LEFT>(other, cost, spare, kernels),
         }
     }
 
     /// The least keys about each pixel's own plane; `None` where some are at a border, or a pixel's least or greatest disparity.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below eight, steps below the width of a table")]
-    fn least_about_planes<const LEFT: bool>(
+    fn least_about_inner_planes<const LEFT: bool>(
         &self,
         other: &[Descriptor],
         cost: &PlaneCost,
-        planes: Eight<i32>,
         kernels: &impl Kernels,
     ) -> Option<Eight<u32>> {
+        let planes = &self.planes;
         let radius = cost.radius as i32;
         let (mut firsts, mut steep) = ([0; LANES], [0; LANES]);
         let mut outside = false;
@@ -137,11 +209,14 @@ impl Candidates {
             return None;
         }
         let last = 2 * cost.radius;
+        // Columns of the row are below 2^13. Four bytes wide, they are found side by side, and no end of a range can wrap.
+        let mut starts = [0; LANES];
+        for (start, (u, &first)) in starts.iter_mut().zip((self.u as u32..).zip(&firsts)) {
+            *start = if LEFT { u.wrapping_sub(first as u32 + last as u32) } else { u + first as u32 };
+        }
         let mut rows = [&[Descriptor::UNTEXTURED; PLANE_WIDTH]; LANES];
-        for lane in 0..LANES {
-            let first = firsts[lane] as usize;
-            let start = if LEFT { (self.u + lane).wrapping_sub(first + last) } else { self.u + lane + first };
-            rows[lane] = other.get(start..)?.first_chunk()?;
+        for (row, start) in rows.iter_mut().zip(starts.map(|start| start as usize)) {
+            *row = other.get(start..start + PLANE_WIDTH)?.first_chunk()?;
         }
         // What a candidate's distance is added to; about a steep plane, which is not preferred, all cost the same.
         let lowered = |mut best: Eight<u32>, sums: Eight<u32>, step: usize, about: u32| {
@@ -174,21 +249,20 @@ impl Candidates {
         Some(lowered(best, kernels.sums_of(&self.points, lasts), last, *cost.about_plane.get(last)?))
     }
 
-    /// The lesser of keys and of those about each pixel's own plane, wherever they are.
+    /// The same of planes wherever they are.
     #[cold]
     #[inline(never)]
-    fn consider_planes<const LEFT: bool>(
+    fn least_about_any_planes<const LEFT: bool>(
         &self,
         other: &[Descriptor],
         cost: &PlaneCost,
-        planes: Eight<i32>,
-        mut best: Eight<u32>,
         spare: &mut Eight<Descriptor>,
         kernels: &impl Kernels,
     ) -> Eight<u32> {
+        let mut best = [BARRED; LANES];
         let mut start = 0;
-        while let Some(&plane) = planes.get(start) {
-            let run = planes.iter().skip(start).take_while(|other| **other == plane).count();
+        while let Some(&plane) = self.planes.get(start) {
+            let run = self.planes.iter().skip(start).take_while(|other| **other == plane).count();
             if plane != NOTHING {
                 let first = (plane & 255) - cost.radius as i32;
                 let costs = if plane >= i32::from(STEEP) { &cost.about_steep } else { &cost.about_plane };
@@ -202,49 +276,10 @@ impl Candidates {
                     *base = (cost << 8) + d;
                     count += 1;
                 }
-                let keys = self.consider::<LEFT>(other, part(&bases, ..count), spare, kernels);
-                best.iter_mut().zip(keys).skip(start).take(run).for_each(|(best, key)| *best = key.min(*best));
+                let [keys] = consider::<LEFT, 1>([self], other, part(&bases, ..count), spare, kernels);
+                best.iter_mut().zip(keys).skip(start).take(run).for_each(|(best, key)| *best = key);
             }
             start += run;
-        }
-        best
-    }
-
-    /// The least keys of candidates, each told by what its distance is added to for its key, in ascending order of disparity.
-    #[inline(always)]
-    fn consider<const LEFT: bool>(
-        &self,
-        other: &[Descriptor],
-        bases: &[u32],
-        spare: &mut Eight<Descriptor>,
-        kernels: &impl Kernels,
-    ) -> Eight<u32> {
-        let column = |base: u32| {
-            let d = base as usize & 255;
-            if LEFT { self.u.wrapping_sub(d) } else { self.u + d }
-        };
-        // Away from the images' borders all pixels can have all disparities.
-        let is_whole = |base: &u32| (base & 255) as i32 <= self.reach_min;
-        let whole = if bases.last().is_none_or(is_whole) { bases.len() } else { bases.partition_point(is_whole) };
-        let mut keys = [BARRED; LANES];
-        let mut border = whole;
-        for (i, &base) in part(bases, ..whole).iter().enumerate() {
-            let Some(others) = other.get(column(base)..).and_then(|row| row.first_chunk()) else {
-                border = i;
-                break;
-            };
-            keys = kernels.least(keys, [&self.points, others], base);
-        }
-        let mut best = kernels.ordered(keys);
-        for &base in part(bases, border..) {
-            let d = (base & 255) as i32;
-            if d > self.reach_max {
-                break;
-            }
-            let keys = kernels.ordered(kernels.least([BARRED; LANES], [&self.points, eight(other, column(base), spare)], base));
-            for ((best, key), &reach) in best.iter_mut().zip(keys).zip(&self.reach) {
-                *best = if d > reach { *best } else { key.min(*best) };
-            }
         }
         best
     }
