@@ -21,6 +21,7 @@ use crate::{
     part::{padded, part, part_mut},
     sad::{Comparison, Eight, Kernels, LANES},
 };
+use core::cell::Cell;
 
 /// A disparity of the working images: 1/64 px.
 pub(super) const WORKING_ONE_PX: i16 = 64;
@@ -148,11 +149,9 @@ fn load(row: &[i16], u: usize) -> Eight<i16> {
 fn check_consistency(left: &mut [i16], right: &mut [i16], threshold: u16) -> [u32; 2] {
     // First what cannot be done many at a time: the right row becomes that of each pixel's partner. None is to a pixel's right, so that
     // from the end on none is gone before it is asked for.
-    for (u, disparity) in left.iter().enumerate().rev() {
-        let partner = right.get(u.wrapping_sub(usize::from(disparity.unsigned_abs()))).copied().unwrap_or(NO_PLANE);
-        if let Some(slot) = right.get_mut(u) {
-            *slot = partner;
-        }
+    let cells = Cell::from_mut(right).as_slice_of_cells();
+    for ((u, disparity), cell) in left.iter().enumerate().zip(cells).rev() {
+        cell.set(cells.get(u.wrapping_sub(usize::from(disparity.unsigned_abs()))).map_or(NO_PLANE, Cell::get));
     }
     let (mut matched, mut contradicted) = (0u16, 0u16);
     for (disparity, &back) in left.iter_mut().zip(&*right) {
