@@ -25,16 +25,18 @@ type Taps<'a> = [&'a [i16]; 2 * REACH];
 
 /// The weighted mean of each centre and its taps. Centre, taps and `to` are of one length.
 ///
-/// One tap after the other for a block of pixels, so that each loop is short and runs on vectors.
+/// For a block of pixels the sums first and then their quotients, which are twice as wide: each loop has vectors of its own.
 #[inline(always)]
 fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
     for (block, (centre, to)) in centre.chunks(BLOCK).zip(to.chunks_mut(BLOCK)).enumerate() {
-        // At most 8 x 31 x 126 = 31,248 in the numerator; the centre alone makes the denominator 63.
-        let (mut numerators, mut denominators) = ([0i16; BLOCK], [CUT >> 2; BLOCK]);
-        for tap in taps {
-            let tap = part(tap, block * BLOCK..);
-            let sums = numerators.iter_mut().zip(&mut denominators);
-            for ((numerator, denominator), (&tap, &centre)) in sums.zip(tap.iter().zip(centre)) {
+        let (mut numerators, mut denominators) = ([0; BLOCK], [0; BLOCK]);
+        let [a, b, c, d, e, f, g, h] = taps.map(|tap| part(tap, block * BLOCK..));
+        let taps = a.iter().zip(b).zip(c.iter().zip(d)).zip(e.iter().zip(f).zip(g.iter().zip(h)));
+        let sums = numerators.iter_mut().zip(&mut denominators);
+        for ((numerator, denominator), (&centre, (((a, b), (c, d)), ((e, f), (g, h))))) in sums.zip(centre.iter().zip(taps)) {
+            // At most 8 x 31 x 126 = 31,248 in the numerator; the centre alone makes the denominator 63.
+            (*numerator, *denominator) = (0i16, CUT >> 2);
+            for tap in [a, b, c, d, e, f, g, h] {
                 // Against NONE, and between what was measured and what was filled in, the difference is so large that nothing is left of the
                 // weight.
                 let difference = tap.saturating_sub(centre);
