@@ -69,7 +69,7 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
         let groups = [self.group(u, count, row, kernels), self.group(u + LANES, count.saturating_sub(LANES), row, kernels)];
         let mut best = [[BARRED; LANES]; 2];
         if groups.iter().any(|group| !group.is_empty()) {
-            best = consider::<LEFT, 2>(groups.each_ref(), self.other, listed, &mut self.spare, kernels);
+            best = consider::<LEFT>(&groups, self.other, listed, &mut self.spare, kernels);
         }
         for (group, mut best) in groups.iter().zip(best) {
             if !group.is_empty() {
@@ -101,29 +101,25 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
     }
 }
 
-/// The least keys of candidates, each told by what its distance is added to for its key, in ascending order of disparity: those of groups
-/// side by side. [`BARRED`] where a pixel has none.
+/// The least keys of candidates, each told by what its distance is added to for its key, in ascending order of disparity: those of two
+/// groups side by side. [`BARRED`] where a pixel has none.
 #[inline(always)]
-fn consider<const LEFT: bool, const N: usize>(
-    groups: [&Group; N],
+fn consider<const LEFT: bool>(
+    groups: &[Group; 2],
     other: &[Descriptor],
     bases: &[u32],
     spare: &mut Eight<Descriptor>,
     kernels: &impl Kernels,
-) -> [Eight<u32>; N] {
-    let first = groups.iter().fold(usize::MAX, |first, group| first.min(group.u));
-    let reach_min = groups.iter().fold(i32::MAX, |least, group| least.min(group.reach_min));
-    let column = |u: usize, base: u32| {
-        let d = base as usize & 255;
-        if LEFT { u.wrapping_sub(d) } else { u + d }
-    };
+) -> [Eight<u32>; 2] {
+    let [Group { u: first, reach_min, .. }, second] = groups;
+    let reach_min = *reach_min.min(&second.reach_min);
     // Away from the images' borders all pixels can have all disparities.
     let is_whole = |base: &u32| (base & 255) as i32 <= reach_min;
     let whole = if bases.last().is_none_or(is_whole) { bases.len() } else { bases.partition_point(is_whole) };
-    let mut keys = [[BARRED; LANES]; N];
+    let mut keys = [[BARRED; LANES]; 2];
     let mut border = whole;
     for (i, &base) in part(bases, ..whole).iter().enumerate() {
-        let others = other.get(column(first, base)..).and_then(|row| row.as_chunks().0.first_chunk::<N>());
+        let others = other.get(matched::<LEFT>(*first, base)..).and_then(|row| row.as_chunks().0.first_chunk::<2>());
         let Some(others) = others else {
             border = i;
             break;
@@ -132,21 +128,20 @@ fn consider<const LEFT: bool, const N: usize>(
             *keys = kernels.least(*keys, [&group.points, others], base);
         }
     }
-    for (best, group) in keys.iter_mut().zip(groups) {
-        *best = kernels.ordered(*best);
-        for &base in part(bases, border..) {
-            let d = (base & 255) as i32;
-            if d > group.reach_max {
-                break;
-            }
-            let others = eight(other, column(group.u, base), spare);
-            let keys = kernels.ordered(kernels.least([BARRED; LANES], [&group.points, others], base));
-            for ((best, key), &reach) in best.iter_mut().zip(keys).zip(&group.reach) {
-                *best = if d > reach { *best } else { key.min(*best) };
-            }
+    for (keys, group) in keys.iter_mut().zip(groups) {
+        *keys = kernels.ordered(*keys);
+        if border < bases.len() {
+            group.consider_at_border::<LEFT>(other, part(bases, border..), keys, spare, kernels);
         }
     }
     keys
+}
+
+/// Where in the other row the match of column `u` lies that a candidate stands for.
+#[inline(always)]
+fn matched<const LEFT: bool>(u: usize, base: u32) -> usize {
+    let d = base as usize & 255;
+    if LEFT { u.wrapping_sub(d) } else { u + d }
 }
 
 impl Group {
@@ -154,6 +149,30 @@ impl Group {
     #[inline(always)]
     fn is_empty(&self) -> bool {
         self.planes == [NOTHING; LANES]
+    }
+
+    /// As [`consider`], of candidates that not all pixels can have; `best` has the least keys of those before them.
+    #[cold]
+    #[inline(never)]
+    fn consider_at_border<const LEFT: bool>(
+        &self,
+        other: &[Descriptor],
+        bases: &[u32],
+        best: &mut Eight<u32>,
+        spare: &mut Eight<Descriptor>,
+        kernels: &impl Kernels,
+    ) {
+        for &base in bases {
+            let d = (base & 255) as i32;
+            if d > self.reach_max {
+                break;
+            }
+            let others = eight(other, matched::<LEFT>(self.u, base), spare);
+            let keys = kernels.ordered(kernels.least([BARRED; LANES], [&self.points, others], base));
+            for ((best, key), &reach) in best.iter_mut().zip(keys).zip(&self.reach) {
+                *best = if d > reach { *best } else { key.min(*best) };
+            }
+        }
     }
 
     /// Replaces the pixels' planes in the row by the disparities of keys.
@@ -276,7 +295,8 @@ impl Group {
                     *base = (cost << 8) + d;
                     count += 1;
                 }
-                let [keys] = consider::<LEFT, 1>([self], other, part(&bases, ..count), spare, kernels);
+                let mut keys = [BARRED; LANES];
+                self.consider_at_border::<LEFT>(other, part(&bases, ..count), &mut keys, spare, kernels);
                 best.iter_mut().zip(keys).skip(start).take(run).for_each(|(best, key)| *best = key);
             }
             start += run;
