@@ -133,7 +133,7 @@ impl Plane {
     fn rasterise(&self, left: i64, v: i64, pixels: &mut [i16], count: usize) {
         let offset = self.slope_u * (left - i64::from(self.origin.u)) + self.slope_v * (v - i64::from(self.origin.v));
         let mut start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
-        // Spans are short, and how long no processor foresees: eight pixels at a time, of which those beyond the span stay as they are.
+        // Spans are short, and how long no processor foresees: eight pixels at a time. Those beyond the span stay as they are.
         for first in (0..count).step_by(LANES) {
             let own = LANES - (count - first).min(LANES);
             let own = OWN.get(own..).and_then(|own| own.first_chunk()).unwrap_or(&[0; LANES]);

@@ -79,7 +79,7 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
         }
     }
 
-    /// The eight pixels from column `u` on, of which `count` may be matched.
+    /// The eight pixels from column `u` on. The first `count` may be matched.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
     fn group(&mut self, u: usize, count: usize, row: &[i16], kernels: &impl Kernels) -> Group {
