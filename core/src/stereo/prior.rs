@@ -135,8 +135,8 @@ impl Plane {
         let mut start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
         // Spans are short, and how long no processor foresees: eight pixels at a time. Those beyond the span stay as they are.
         for first in (0..count).step_by(LANES) {
-            let own = LANES - (count - first).min(LANES);
-            let own = OWN.get(own..).and_then(|own| own.first_chunk()).unwrap_or(&[0; LANES]);
+            let beyond = LANES - (count - first).min(LANES);
+            let own = OWN.get(beyond..).and_then(|own| own.first_chunk()).unwrap_or(&[0; LANES]);
             match pixels.get_mut(first..).and_then(|pixels| pixels.first_chunk_mut()) {
                 Some(eight) => self.fill(eight, start, own),
                 None => self.fill_last(pixels, first, start, own),

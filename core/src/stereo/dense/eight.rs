@@ -1,9 +1,9 @@
 //! Neighbours of a row matched at a time: one disparity after the other, for all of them.
 //!
 //! Sixteen share their cell's list of disparities, for how long that is no processor foresees; about its own plane each of eight has
-//! disparities of its own, which are as many for all. A
-//! candidate's key has the energy above and the disparity below, so that the least key is the least energy and, of equal ones, the smallest
-//! disparity. Borders, where not all can have the same candidates, go another and slower way.
+//! disparities of its own, which are as many for all. A candidate's key has the energy above and the disparity below, so that the least key
+//! is the least energy and, of equal ones, the smallest disparity. Borders, where not all can have the same candidates, go another and slower
+//! way.
 
 use super::load;
 use crate::{

@@ -24,7 +24,7 @@ impl Fusion<'_> {
     #[inline(always)]
     pub(super) fn colour_layer(&self, scratch: &mut Scratch, [red, green, blue]: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
         let near = self.near_surface(scratch);
-        // Then no pixel need be read.
+        // Where none is near, no pixel need be read.
         if near.iter().fold(0, |any, near| any | near) == 0 {
             return;
         }
