@@ -99,12 +99,11 @@ impl VertexClustering {
     /// # Errors
     /// Those of `vertex`.
     pub fn add(&mut self, corners: [u32; 3], mut vertex: impl FnMut(u32) -> io::Result<Option<Vertex>>) -> io::Result<bool> {
-        let mut triangle = [0; 3];
-        for (cluster, number) in triangle.iter_mut().zip(corners) {
-            let Some(known) = self.cluster_of(number, &mut vertex)? else { return Ok(false) };
-            *cluster = known;
-        }
-        self.connect(triangle);
+        let [a, b, c] = corners;
+        let Some(a) = self.cluster_of(a, &mut vertex)? else { return Ok(false) };
+        let Some(b) = self.cluster_of(b, &mut vertex)? else { return Ok(false) };
+        let Some(c) = self.cluster_of(c, &mut vertex)? else { return Ok(false) };
+        self.connect([a, b, c]);
         Ok(true)
     }
 
@@ -146,9 +145,13 @@ impl VertexClustering {
 
     /// Adds a triangle between cells, unless it is a line, a point or there already.
     fn connect(&mut self, triangle: [u32; 3]) {
+        let [a, b, c] = triangle;
+        if a == b || b == c || c == a {
+            return;
+        }
         let mut sorted = triangle;
         sorted.sort_unstable();
-        if sorted[0] < sorted[1] && sorted[1] < sorted[2] && self.known.insert(sorted) {
+        if self.known.insert(sorted) {
             self.triangles.push(triangle);
         }
     }

@@ -18,6 +18,8 @@ const AIM: f64 = 0.9;
 /// Of a large mesh one of so many pieces is counted first, and of a small one so many pieces at least.
 const COUNTED_OF: u64 = 16;
 const COUNTED: u64 = 8;
+/// How often they are counted: triangles of a rough surface fall more slowly than by the square of the cells' sides, so a count far off is not enough.
+const COUNTS: usize = 2;
 
 /// The triangles of a mesh, of the static map alone where that is asked for, so many at most; and their number on disk.
 ///
@@ -60,11 +62,14 @@ impl MeshFile {
         if all <= most {
             return Ok(LEAST_CELL_M);
         }
-        let cell_m = LEAST_CELL_M * (all / most).sqrt() as f32;
-        let every = (self.ply.pieces() / COUNTED).min(COUNTED_OF);
-        let Clustered { clustering, read, .. } = self.clustered(cell_m, most_triangles, every as usize)?;
-        let will_stay = clustering.triangles() as f64 * all / read as f64;
-        Ok((cell_m * growth(will_stay / most)).max(LEAST_CELL_M))
+        let every = (self.ply.pieces() / COUNTED).min(COUNTED_OF) as usize;
+        let mut cell_m = LEAST_CELL_M * (all / most).sqrt() as f32;
+        for _ in 0..COUNTS {
+            let Clustered { clustering, read, .. } = self.clustered(cell_m, most_triangles, every)?;
+            let will_stay = clustering.triangles() as f64 * all / read as f64;
+            cell_m *= growth(will_stay / most);
+        }
+        Ok(cell_m.max(LEAST_CELL_M))
     }
 
     /// Clusters the first of every so many pieces, until too many triangles stay.
