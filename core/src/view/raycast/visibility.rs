@@ -165,11 +165,13 @@ impl Projection<'_, '_, '_, '_> {
     fn cover(&mut self, id: CellId, cell: &CrossedCell<'_>, nearest_m: f32, [left, right, first, last]: [usize; 4], passing: &mut Passing) {
         // Of a cell that is hidden no corner is read.
         let mut target = None;
-        for v in first..=last {
-            let rays = self.ray_camera.row(v);
-            for u in (left..=right).step_by(LANES) {
+        for u in (left..right + 1).step_by(LANES) {
+            // What the pixels beyond it show is no matter of this cell.
+            let beyond = LANES - (right + 1 - u).min(LANES);
+            let own = OWN.get(beyond..).and_then(|own| own.first_chunk()).unwrap_or(&[0; LANES]);
+            for v in first..last + 1 {
                 let Some((enters_m, cells)) = self.strip.eight(v - self.rows[0], u) else { continue };
-                if enters_m.iter().fold(0, |any, &enters_m| any | u32::from(nearest_m < enters_m)) == 0 {
+                if enters_m.iter().zip(own).fold(0, |any, (&enters_m, own)| any | own & u32::from(nearest_m < enters_m)) == 0 {
                     continue;
                 }
                 if target.is_none() {
@@ -177,12 +179,15 @@ impl Projection<'_, '_, '_, '_> {
                     target = Some(Target { id, faces: self.cells.faces(cell), corners });
                 }
                 if let Some(target) = &target {
-                    target.meet(&rays, u, self.limits_m, passing, enters_m, cells);
+                    target.meet(&self.ray_camera.row(v), u, self.limits_m, passing, enters_m, cells);
                 }
             }
         }
     }
 }
+
+/// Ones for eight pixels, and none for eight more: from the n-th on, those of the first 8 - n.
+static OWN: [u32; 2 * LANES] = [1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0];
 
 /// Some cells of a block, and which pixels each may cover.
 #[derive(Default)]
