@@ -4,7 +4,7 @@ use super::bounds;
 use super::rig;
 use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time};
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
-use crate::evaluate::trajectory::TrajectoryErrors;
+use crate::evaluate::trajectory::{TrajectoryErrors, WithoutBoresight};
 use crate::observe::Sections;
 use crate::run::RunRecord;
 use dynvox_core::egomotion::SEGMENT_GAP_M;
@@ -52,13 +52,13 @@ fn ending_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
 
 fn trajectory_lines(errors: &TrajectoryErrors) -> Vec<(&'static str, String)> {
     let over_segments = errors.t_err_percent.zip(errors.r_err_deg_per_m);
+    let over_segments = over_segments.map(|(percent, deg_per_m)| format!("{percent:.3} %, {deg_per_m:.4} deg/m over segments"));
     let per_frame = format!("{:.2} cm, {:.4} deg per frame; ATE {:.3} m", 100.0 * errors.rpe_t_m, errors.rpe_r_deg, errors.ate_m);
-    match over_segments {
-        Some((percent, deg_per_m)) => {
-            vec![("trajectory error", format!("{percent:.3} %, {deg_per_m:.4} deg/m over segments")), ("", per_frame)]
-        }
-        None => vec![("trajectory error", per_frame)],
-    }
+    let without = errors.without_boresight.map(|WithoutBoresight { angle_deg, t_err_percent, rpe_t_m }| {
+        format!("{t_err_percent:.3} %, {:.2} cm without a boresight angle of {angle_deg:.2} deg", 100.0 * rpe_t_m)
+    });
+    let labels = std::iter::once("trajectory error").chain(std::iter::repeat(""));
+    labels.zip(over_segments.into_iter().chain([per_frame]).chain(without)).collect()
 }
 
 fn reference_lines(figures: &ReferenceFigures) -> Vec<(&'static str, String)> {

@@ -6,6 +6,7 @@ use crate::evaluate::masks::MovingFigures;
 use crate::evaluate::objects::{ObjectFigures, TrackErrors};
 use crate::evaluate::reference::ReferenceFigures;
 use crate::evaluate::surfaces::SurfaceFigures;
+use crate::evaluate::trajectory::WithoutBoresight;
 use crate::observe::{BlockTotals, BlocksSection, ReconstructedObject, TrackRecord, TrajectorySection, state_name};
 use crate::run::{Incomplete, RunRecord, SkippedFrames, StageStatistics};
 use serde::Serialize;
@@ -80,6 +81,8 @@ struct EgomotionSummary {
     rpe_r_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     ate_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    without_boresight: Option<WithoutBoresight>,
     held_frames: usize,
     segments: u32,
     /// `stereo`, `icp` or `file`.
@@ -247,6 +250,7 @@ impl EgomotionSummary {
             rpe_t_m: errors.map(|errors| errors.rpe_t_m),
             rpe_r_deg: errors.map(|errors| errors.rpe_r_deg),
             ate_m: errors.map(|errors| errors.ate_m),
+            without_boresight: errors.and_then(|errors| errors.without_boresight),
             held_frames: trajectory.held_frames,
             segments: trajectory.segments,
             source: trajectory.source,

@@ -1,6 +1,6 @@
 //! `dynvox evaluate trajectory`.
 
-use crate::evaluate::trajectory::{self, TrajectoryErrors, frames_of_run, matched, read_trajectory, truth_of_frames};
+use crate::evaluate::trajectory::{self, TrajectoryErrors, WithoutBoresight, frames_of_run, matched, read_trajectory, truth_of_frames};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -44,5 +44,8 @@ fn print_figures(found: &TrajectoryErrors) {
     }
     if let Some([right, down, forward]) = found.mean_error_percent {
         outln!("{:<28}{right:.3} % right, {down:.3} % down, {forward:.3} % forward", "mean error as a vector");
+    }
+    if let Some(WithoutBoresight { angle_deg, t_err_percent, rpe_t_m }) = found.without_boresight {
+        outln!("{:<28}{t_err_percent:.4} %, {rpe_t_m:.4} m; the angle: {angle_deg:.3} deg", "without a boresight angle");
     }
 }

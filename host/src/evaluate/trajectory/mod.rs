@@ -6,11 +6,14 @@
 //! 200 m would have few segments of few lengths: it is measured over 5 to 50 m from every frame on, and the result lists its lengths.
 
 mod align;
+mod boresight;
 mod files;
 
+pub use boresight::WithoutBoresight;
 pub use files::{TrajectoryError, frames_of_run, matched, read_trajectory, truth_of_frames};
 
 use align::aligned_error_m;
+use boresight::boresight;
 use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -36,6 +39,9 @@ pub struct TrajectoryErrors {
     /// forward. Noise averages out here. What does not is a camera turned against that of the truth (right, down) or a wrong scale (forward).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_error_percent: Option<[f64; 3]>,
+    /// What is left of the errors where the camera's axes are turned to those of the truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without_boresight: Option<WithoutBoresight>,
     /// Root mean square translation error from frame to frame, m.
     pub rpe_t_m: f64,
     /// Root mean square rotation error from frame to frame, degrees.
@@ -54,32 +60,44 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
     let travelled = travelled_m(truth);
     let long = travelled.last()? >= &LONG_M[1];
     let (lengths, step): (&[f64], usize) = if long { (&LONG_M, LONG_STEP) } else { (&SHORT_M, 1) };
-    let moved = |from: usize, to: usize| [estimate, truth].map(|poses| poses[from].inverse() * poses[to]);
-    let mut all = Vec::new();
-    let mut per_length = Vec::new();
+    let segment = |from: usize, to: usize, length_m: f64| {
+        let [estimated, actual] = [estimate, truth].map(|poses| poses[from].inverse() * poses[to]);
+        Segment { length_m, estimated, actual }
+    };
+    let (mut all, mut per_length) = (Vec::new(), Vec::new());
     for &length_m in lengths {
-        let segments: Vec<SegmentError> = (0..truth.len())
-            .step_by(step)
-            .map_while(|from| {
-                let to = travelled.partition_point(|&at| at < travelled[from] + length_m);
-                (to < truth.len()).then(|| SegmentError::of(&moved(from, to), length_m))
-            })
-            .collect();
+        let segments = (0..truth.len()).step_by(step).map_while(|from| {
+            let to = travelled.partition_point(|&at| at < travelled[from] + length_m);
+            (to < truth.len()).then(|| segment(from, to, length_m))
+        });
+        let segments: Vec<Segment> = segments.collect();
         if let Some(mean) = SegmentError::mean(&segments) {
             per_length.push((length_m, mean.percent, mean.deg_per_m, segments.len()));
         }
         all.extend(segments);
     }
-    let steps: Vec<Transform> = (1..truth.len()).map(|to| error(&moved(to - 1, to))).collect();
+    let steps: Vec<Segment> = (1..truth.len()).map(|to| segment(to - 1, to, 1.0)).collect();
     let overall = SegmentError::mean(&all);
     Some(TrajectoryErrors {
         t_err_percent: overall.map(|mean| mean.percent),
         r_err_deg_per_m: overall.map(|mean| mean.deg_per_m),
         mean_error_percent: overall.map(|mean| mean.vector_percent.into()),
-        rpe_t_m: rms(steps.iter().map(|error| error.distance_m())),
-        rpe_r_deg: rms(steps.iter().map(|error| error.angle_rad().to_degrees())),
+        without_boresight: without_boresight(&all, &steps),
+        rpe_t_m: rms(steps.iter().map(|step| step.error().distance_m())),
+        rpe_r_deg: rms(steps.iter().map(|step| step.error().angle_rad().to_degrees())),
         ate_m: aligned_error_m(truth, estimate),
         per_length,
+    })
+}
+
+/// Errors of the segments, and of the steps from frame to frame, where the camera's axes are turned to those of the truth.
+fn without_boresight(segments: &[Segment], steps: &[Segment]) -> Option<WithoutBoresight> {
+    let turn = boresight(segments)?;
+    let turned = |segment: &Segment| Segment { estimated: turn * segment.estimated * turn.inverse(), ..*segment };
+    Some(WithoutBoresight {
+        angle_deg: turn.angle_rad().to_degrees(),
+        t_err_percent: SegmentError::mean(&segments.iter().map(turned).collect::<Vec<_>>())?.percent,
+        rpe_t_m: rms(steps.iter().map(|step| turned(step).error().distance_m())),
     })
 }
 
@@ -94,9 +112,19 @@ pub fn travelled_m(poses: &[Transform]) -> Vec<f64> {
         .collect()
 }
 
-/// The error of an estimated motion against the true one.
-fn error([estimated, actual]: &[Transform; 2]) -> Transform {
-    estimated.inverse() * actual
+/// A motion from one frame to another.
+#[derive(Clone, Copy)]
+struct Segment {
+    length_m: f64,
+    estimated: Transform,
+    actual: Transform,
+}
+
+impl Segment {
+    /// The error of the estimate.
+    fn error(&self) -> Transform {
+        self.estimated.inverse() * self.actual
+    }
 }
 
 /// Error of a segment, or the mean of several.
@@ -109,19 +137,19 @@ struct SegmentError {
 }
 
 impl SegmentError {
-    fn of(moved: &[Transform; 2], length_m: f64) -> Self {
-        let error = error(moved);
-        let [estimated_m, actual_m] = moved.map(|moved| Vector3::from(moved.translation_m));
+    fn of(segment: &Segment) -> Self {
+        let (error, Segment { length_m, estimated, actual }) = (segment.error(), segment);
+        let [estimated_m, actual_m] = [estimated, actual].map(|moved| Vector3::from(moved.translation_m));
         Self {
             percent: error.distance_m() / length_m * 100.0,
             deg_per_m: error.angle_rad().to_degrees() / length_m,
-            vector_percent: (estimated_m - actual_m) / length_m * 100.0,
+            vector_percent: (estimated_m - actual_m) / *length_m * 100.0,
         }
     }
 
-    fn mean(segments: &[Self]) -> Option<Self> {
+    fn mean(segments: &[Segment]) -> Option<Self> {
         let count = segments.len() as f64;
-        let sum = segments.iter().fold(Self::default(), |sum, segment| Self {
+        let sum = segments.iter().map(Self::of).fold(Self::default(), |sum, segment| Self {
             percent: sum.percent + segment.percent,
             deg_per_m: sum.deg_per_m + segment.deg_per_m,
             vector_percent: sum.vector_percent + segment.vector_percent,

@@ -46,6 +46,9 @@ fn a_camera_turned_against_that_of_the_truth_and_a_wrong_scale_are_told_from_noi
     let found = errors(&truth, &estimate.collect::<Vec<_>>()).unwrap();
     let [right, down, forward] = found.mean_error_percent.unwrap();
     assert!((right + 100.0 * 0.5_f64.to_radians()).abs() < 0.05 && down.abs() < 0.01 && (forward - 1.0).abs() < 0.05, "{found:?}");
+    let left = found.without_boresight.unwrap();
+    assert!((left.angle_deg - 0.5).abs() < 0.01 && (left.t_err_percent - 1.0).abs() < 0.05, "the scale is left: {left:?}");
+    assert!(left.rpe_t_m < 0.9 * found.rpe_t_m, "{found:?}");
     let beside = |(at, pose): (usize, &Transform)| {
         let [x, y, z] = pose.translation_m;
         Transform { translation_m: [x + 0.05 * (1.3 * at as f64).sin(), y, z], ..*pose }
@@ -53,6 +56,7 @@ fn a_camera_turned_against_that_of_the_truth_and_a_wrong_scale_are_told_from_noi
     let noisy = errors(&truth, &truth.iter().enumerate().map(beside).collect::<Vec<_>>()).unwrap();
     let mean = Vector3::from(noisy.mean_error_percent.unwrap()).norm();
     assert!(mean < 0.1 * noisy.t_err_percent.unwrap(), "{noisy:?}");
+    assert!(noisy.without_boresight.unwrap().t_err_percent > 0.95 * noisy.t_err_percent.unwrap(), "noise is no rotation: {noisy:?}");
 }
 
 /// The same drive in Python gave the figures of the test below: numpy with a singular value decomposition for the alignment.
