@@ -23,11 +23,10 @@ fn bits_of_word(word: u64) -> u64 {
     word.wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
-/// 64 flags as bits, the first lowest.
-#[inline]
-pub(crate) fn bits(flags: &[u8; 64]) -> u64 {
-    let words = (0u32..).zip(flags.as_chunks().0);
-    words.fold(0, |bits, (i, &eight)| bits | bits_of_word(u64::from_le_bytes(eight)) << (8 * i))
+/// At most 64 flags as bits, the first lowest.
+#[inline(always)]
+pub(crate) fn bits(flags: &[u8]) -> u64 {
+    (0u32..8).zip(flags.chunks(8)).fold(0, |bits, (i, eight)| bits | bits_of_word(word(eight)) << (8 * i))
 }
 
 /// Calls `each` with the position of every flag that is set, in ascending order.
@@ -35,10 +34,7 @@ pub(crate) fn bits(flags: &[u8; 64]) -> u64 {
 pub(crate) fn for_each_set(flags: &[u8], mut each: impl FnMut(usize)) {
     // How many are set no processor foresees: it errs once in 64 flags.
     for (i, flags) in flags.chunks(64).enumerate() {
-        let mut rest = 0;
-        for (i, eight) in flags.chunks(8).enumerate() {
-            rest |= bits_of_word(word(eight)) << (8 * i);
-        }
+        let mut rest = bits(flags);
         while rest != 0 {
             each(64 * i + rest.trailing_zeros() as usize);
             rest &= rest - 1;

@@ -19,6 +19,7 @@ pub mod egomotion;
 mod flags;
 pub mod geometry;
 pub mod image;
+mod lanes;
 pub mod mapper;
 pub mod masks;
 pub mod memory;

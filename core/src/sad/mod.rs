@@ -3,13 +3,11 @@
 //! x86 has one instruction for such sums, which compilers find in a loop over one pair at most. Work that compares descriptors is
 //! therefore written once, over [`Eight`] pairs, and compiled for each level of instructions (docs/decisions/0023-vector-kernels.md).
 
-use crate::parallel::{Level, Vectors};
+use crate::{
+    lanes::{Eight, LANES},
+    parallel::{Level, Vectors},
+};
 use bytemuck::{Pod, Zeroable};
-
-/// Pairs compared at once: neighbours in a row.
-pub(crate) const LANES: usize = 8;
-/// One value for each of them.
-pub(crate) type Eight<T> = [T; LANES];
 
 /// Sixteen samples of an image around a pixel. Aligned, so that they are loaded as one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]

@@ -7,8 +7,9 @@
 
 use super::suppression::{CLASSES, Candidate};
 use crate::{
+    lanes::{Eight, LANES},
     memory::Capacity,
-    sad::{Descriptor, Eight, Inside, Kernels, LANES, NO_FEATURE, OFFSET_BITS},
+    sad::{Descriptor, Inside, Kernels, NO_FEATURE, OFFSET_BITS},
 };
 
 /// Columns of a cell.

@@ -18,8 +18,9 @@ use super::{
     prior::{CellGrid, DisparitySet, NO_PLANE, PlaneCost},
 };
 use crate::{
+    lanes::{Eight, LANES},
     part::{padded, part, part_mut},
-    sad::{Comparison, Eight, Kernels, LANES},
+    sad::{Comparison, Kernels},
 };
 use core::cell::Cell;
 

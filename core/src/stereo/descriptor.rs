@@ -4,8 +4,9 @@
 
 use super::gradient::FLAT;
 use crate::{
+    lanes::{Eight, LANES},
     part::part,
-    sad::{Eight, LANES, distance},
+    sad::distance,
 };
 
 pub(super) use crate::sad::Descriptor;

@@ -5,9 +5,9 @@
 //! set of 256 bits per cell.
 
 use crate::{
+    lanes::LANES,
     parallel::Work,
     part::{padded, part_mut, store},
-    sad::LANES,
 };
 
 use super::{

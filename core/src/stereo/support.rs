@@ -8,8 +8,9 @@
 //! those that pass the other tests.
 
 use crate::{
+    lanes::{Eight, LANES},
     part::{part, part_mut},
-    sad::{Comparison, Eight, Kernels, LANES},
+    sad::{Comparison, Kernels},
 };
 use core::ops::RangeInclusive;
 

@@ -7,8 +7,9 @@
 
 use super::load;
 use crate::{
+    lanes::{Eight, LANES},
     part::{part, store},
-    sad::{Eight, KEY_SCALE_BITS, Kernels, LANES},
+    sad::{KEY_SCALE_BITS, Kernels},
     stereo::{
         StereoConfig,
         config::DISPARITY_LIMIT,

@@ -3,8 +3,9 @@
 
 use super::{NONE, WORKING_ONE_PX, load};
 use crate::{
+    lanes::{Eight, LANES},
     part::store,
-    sad::{Eight, Kernels, LANES},
+    sad::Kernels,
     stereo::{
         StereoConfig,
         descriptor::{Descriptor, MARGIN, UNTEXTURED, eight},

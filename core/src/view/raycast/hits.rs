@@ -4,11 +4,11 @@ use super::{
     cell::{Faces, Field, along, depths_m, mean, position},
     colour::{self, Colours},
     crossed::{CellId, CrossedCell, CrossedCells},
-    lanes::{Eight, LANES, at_lane, set},
     ray_camera::{AXES, RowOfRays},
 };
 use crate::{
     geometry::scalar::{max_f32, min_f32},
+    lanes::{Eight, LANES, at_lane, set},
     parallel::{Vectors, Work},
 };
 

@@ -25,7 +25,6 @@ mod colour;
 mod config;
 mod crossed;
 mod hits;
-mod lanes;
 mod ray_camera;
 mod signs;
 mod surface;

@@ -9,11 +9,11 @@ use super::{
     cell::{Faces, depths_m, mean, position},
     cell_index::CellIndex,
     crossed::{CellId, CrossedCell, CrossedCells},
-    lanes::{Eight, LANES, at_lane, set},
     ray_camera::{Ray, RayCamera, RowOfRays},
     surface::BlockInView,
 };
 use crate::{
+    lanes::{Eight, LANES, at_lane, set},
     memory::{Capacity, Carver, region_bytes},
     parallel::{BANDS, Bands, Work, zip2},
     part::part,
