@@ -67,9 +67,9 @@ impl MeshFile {
         for _ in 0..COUNTS {
             let Clustered { clustering, read, .. } = self.clustered(cell_m, most_triangles, every)?;
             let will_stay = clustering.triangles() as f64 * all / read as f64;
-            cell_m *= growth(will_stay / most);
+            cell_m = (cell_m * growth(will_stay / most)).max(LEAST_CELL_M);
         }
-        Ok(cell_m.max(LEAST_CELL_M))
+        Ok(cell_m)
     }
 
     /// Clusters the first of every so many pieces, until too many triangles stay.
