@@ -5,7 +5,7 @@
 //! set of 256 bits per cell.
 
 use crate::{
-    lanes::LANES,
+    lanes::{self, LANES},
     parallel::Work,
     part::{padded, part_mut, store},
 };
@@ -135,8 +135,7 @@ impl Plane {
         let mut start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
         // Spans are short, and how long no processor foresees: eight pixels at a time. Those beyond the span stay as they are.
         for first in (0..count).step_by(LANES) {
-            let beyond = LANES - (count - first).min(LANES);
-            let own = OWN.get(beyond..).and_then(|own| own.first_chunk()).unwrap_or(&[0; LANES]);
+            let own = lanes::first(count - first);
             match pixels.get_mut(first..).and_then(|pixels| pixels.first_chunk_mut()) {
                 Some(eight) => self.fill(eight, start, own),
                 None => self.fill_last(pixels, first, start, own),
@@ -166,10 +165,6 @@ impl Plane {
         store(pixels, first, eight);
     }
 }
-
-/// All bits of eight pixels, and none of eight more: from the n-th on, those of the first 8 - n. Read from memory, for what is known of
-/// single pixels keeps compilers from vectors.
-static OWN: [i16; 2 * LANES] = [-1, -1, -1, -1, -1, -1, -1, -1, 0, 0, 0, 0, 0, 0, 0, 0];
 
 /// The disparities a cell's pixels may have besides those near their plane: one bit each.
 pub(super) type DisparitySet = [u64; 4];

@@ -13,7 +13,7 @@ use super::{
     surface::BlockInView,
 };
 use crate::{
-    lanes::{Eight, LANES, at_lane, set},
+    lanes::{self, Eight, LANES, at_lane, set},
     memory::{Capacity, Carver, region_bytes},
     parallel::{BANDS, Bands, Work, zip2},
     part::part,
@@ -167,11 +167,10 @@ impl Projection<'_, '_, '_, '_> {
         let mut target = None;
         for u in (left..right + 1).step_by(LANES) {
             // What the pixels beyond it show is no matter of this cell.
-            let beyond = LANES - (right + 1 - u).min(LANES);
-            let own = OWN.get(beyond..).and_then(|own| own.first_chunk()).unwrap_or(&[0; LANES]);
+            let own = lanes::first(right + 1 - u);
             for v in first..last + 1 {
                 let Some((enters_m, cells)) = self.strip.eight(v - self.rows[0], u) else { continue };
-                if enters_m.iter().zip(own).fold(0, |any, (&enters_m, own)| any | own & u32::from(nearest_m < enters_m)) == 0 {
+                if enters_m.iter().zip(own).fold(0, |any, (&enters_m, own)| any | own & i16::from(nearest_m < enters_m)) == 0 {
                     continue;
                 }
                 if target.is_none() {
@@ -185,9 +184,6 @@ impl Projection<'_, '_, '_, '_> {
         }
     }
 }
-
-/// Ones for eight pixels, and none for eight more: from the n-th on, those of the first 8 - n.
-static OWN: [u32; 2 * LANES] = [1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0];
 
 /// Some cells of a block, and which pixels each may cover.
 #[derive(Default)]
