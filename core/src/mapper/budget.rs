@@ -110,7 +110,7 @@ const SHORT_HISTORY_FRAMES: usize = 64;
 impl Capacity {
     /// The largest capacity of at most `bytes` for images of `width` x `height` px: `capacity.bytes() <= bytes`, always.
     ///
-    /// One pixel in 16 may be a feature and one in 40 a match, at most 16,000 of either; masks may cover 8 images of pixels; 64
+    /// One pixel in 16 may be a feature and one in 40 a match, at most 20,000 of either; masks may cover 8 images of pixels; 64
     /// detections and tracks. The pruning window is 200 frames where `bytes` is 96 MiB or more, else 64. Objects and blocks share the
     /// rest as the module says.
     ///

@@ -3,7 +3,7 @@
 use crate::problem::{Problems, require};
 
 /// Most features of an image by default: as many as the presets of [`crate::Capacity`] have memory for.
-pub(crate) const FEATURES_MAX: usize = 16_000;
+pub(crate) const FEATURES_MAX: usize = 20_000;
 
 /// Settings of the scene flow. Defaults are DynSLAM's, with sub-pixel refinement and no more features than motion gains by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,7 +11,7 @@ pub(crate) const FEATURES_MAX: usize = 16_000;
 pub struct SceneFlowConfig {
     /// Smallest filter response of a feature, grey levels times filter weights; 1..=2000. DynSLAM: 50, which finds a third more features and no better motion.
     pub response_min: u16,
-    /// Most features of an image, 100..=1,000,000; of more the strongest are used, and no more than the capacity holds. 16,000
+    /// Most features of an image, 100..=1,000,000; of more the strongest are used, and no more than the capacity holds. 20,000
     /// (docs/decisions/0048-the-strongest-of-each-cell.md); DynSLAM: all.
     pub features_max: u32,
     /// Farthest a feature moves between two frames or two cameras, px in each direction; 16..=500. DynSLAM: 200.
