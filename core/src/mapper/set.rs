@@ -130,7 +130,7 @@ choices! {
     Overlap { "mask" = Mask, "box" = Box }
     GapEnds { "surface" = Surface, "farther" = Farther }
     DistanceAlong { "ray" = Ray, "normal" = Normal }
-    ObservationWeight { "one" = One, "nearest" = Nearest, "depth" = Depth }
+    ObservationWeight { "one" = One, "nearest" = Nearest, "depth" = Depth, "band" = Band }
     WhenFull { "evict" = Evict, "refuse" = Refuse }
     SelfCalibrationMode { "apply" = Apply, "report" = Report, "off" = Off }
 }

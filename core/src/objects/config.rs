@@ -18,11 +18,11 @@ pub struct ObjectsConfig {
     /// How far from the object's median depth a pixel may lie, m: what is visible through windows and at the rim is left out; above 0; 3. A frame
     /// shows at most twice this length of a bus viewed lengthwise.
     pub extent_m: f32,
-    /// What one observation of a voxel weighs; by depth (the original: one).
+    /// What one observation of a voxel weighs; by depth, free space a quarter (the original: one).
     pub observation_weight: ObservationWeight,
     /// Weight at which the average stops forgetting less, 1 to 255; 200.
     pub max_weight: u8,
-    /// Voxels that weigh at most this are reset when the object is pruned; 0 is off; 8: what was observed once from beyond 11 m.
+    /// Voxels that weigh at most this are reset when the object is pruned; 0 is off; 6: what was observed once from beyond 14 m.
     pub prune_weight: u8,
     /// Fused frames from one pruning of the whole object to the next; 1 to 255. With 1 a voxel must weigh more than `prune_weight` in its
     /// first frame to stay.
@@ -36,9 +36,9 @@ impl Default for ObjectsConfig {
             truncation_m: 0.3,
             far_m: 20.0,
             extent_m: 3.0,
-            observation_weight: ObservationWeight::Depth,
+            observation_weight: ObservationWeight::Band,
             max_weight: 200,
-            prune_weight: 8,
+            prune_weight: 6,
             prune_frames: 4,
         }
     }

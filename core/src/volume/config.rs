@@ -17,14 +17,28 @@ pub enum ObservationWeight {
     Nearest,
     /// `100 / depth_m`, held within 1 and 10: near observations are more precise (the original's option).
     Depth,
+    /// As `Depth` within a band of four voxels before the surface, a quarter of that in the free space farther before it: what one view takes for free
+    /// does not erase a surface that another one measures.
+    Band,
 }
+
+/// Width of the band of [`ObservationWeight::Band`], voxels.
+const BAND_VOXELS: f32 = 4.0;
 
 impl ObservationWeight {
     /// The most that one observation weighs.
     pub(super) const fn most(self) -> u32 {
         match self {
             Self::One | Self::Nearest => 1,
-            Self::Depth => 10,
+            Self::Depth | Self::Band => 10,
+        }
+    }
+
+    /// Distance before the surface from which on an observation weighs a quarter, m.
+    pub(super) const fn free_m(self, voxel_size_m: f32) -> f32 {
+        match self {
+            Self::Band => BAND_VOXELS * voxel_size_m,
+            Self::One | Self::Nearest | Self::Depth => f32::MAX,
         }
     }
 
@@ -32,7 +46,7 @@ impl ObservationWeight {
     pub(super) const fn past_per_m(self) -> f32 {
         match self {
             Self::Nearest => 0.5,
-            Self::One | Self::Depth => f32::MAX,
+            Self::One | Self::Depth | Self::Band => f32::MAX,
         }
     }
 }

@@ -42,8 +42,10 @@ fn differences(one: &Config, other: &Config) -> Vec<usize> {
 }
 
 /// Names of all choices.
-const CHOICES: [&str; 15] =
-    ["stereo", "icp", "mask", "box", "surface", "farther", "ray", "normal", "one", "depth", "evict", "refuse", "apply", "report", "off"];
+const CHOICES: [&str; 16] = [
+    "stereo", "icp", "mask", "box", "surface", "farther", "ray", "normal", "one", "depth", "band", "evict", "refuse", "apply", "report",
+    "off",
+];
 
 #[test]
 fn every_setting_is_set_by_its_key_and_nothing_else_is() {
@@ -84,8 +86,8 @@ fn a_choice_takes_each_of_its_names_and_no_other() {
         ("tracking.overlap", &["mask", "box"]),
         ("stereo.gap_ends", &["surface", "farther"]),
         ("volume.distance", &["ray", "normal"]),
-        ("volume.observation_weight", &["one", "depth"]),
-        ("objects.observation_weight", &["one", "depth"]),
+        ("volume.observation_weight", &["one", "depth", "band"]),
+        ("objects.observation_weight", &["one", "depth", "band"]),
         ("volume.when_full", &["evict", "refuse"]),
         ("rig.self_calibration", &["apply", "report", "off"]),
     ] {

@@ -8,7 +8,7 @@ use crate::{
     geometry::scalar::{clamp_f32, floored_i32, min_f32, rounded_i32},
     image::View,
     volume::{
-        BLOCK_SIDE, CLASS_COUNT, ObservationWeight,
+        BLOCK_SIDE, CLASS_COUNT,
         block::{LAYER_VOXELS, Layer},
         observed::obliqueness,
     },
@@ -236,9 +236,10 @@ impl Fusion<'_> {
     /// Weights of the observations; 0 keeps one out.
     #[inline(always)]
     fn weigh(&self, scratch: &mut Scratch) {
-        let by_depth = self.config.observation_weight == ObservationWeight::Depth;
-        for (gain, &observed_m) in scratch.gain.iter_mut().zip(&scratch.observed_m) {
-            let weight = if by_depth { floored_i32(clamp_f32(100.0 / observed_m, 1.0, 10.0)) } else { 1 };
+        let by_depth = self.config.observation_weight.most() > 1;
+        for (gain, (&observed_m, &distance_m)) in scratch.gain.iter_mut().zip(scratch.observed_m.iter().zip(&scratch.distance_m)) {
+            let at_1_m = if distance_m >= self.free_m { 25.0 } else { 100.0 };
+            let weight = if by_depth { floored_i32(clamp_f32(at_1_m / observed_m, 1.0, 10.0)) } else { 1 };
             *gain = weight as i16 & -i16::from(observed_m > 0.0);
         }
         let Some(class) = self.seen.class else { return };

@@ -74,6 +74,8 @@ struct Fusion<'a> {
     plain_weights: bool,
     /// The most that the past weighs against an observation, by its depth, 1/m.
     past_per_m: f32,
+    /// Distance before the surface from which on an observation weighs a quarter, m.
+    free_m: f32,
     /// The depth image, without padding.
     depth_m: &'a [f32],
     width: u32,
@@ -107,6 +109,7 @@ impl<'a> Fusion<'a> {
             shares: Shares::new(),
             plain_weights: config.observation_weight.most() == 1 && seen.class.is_none(),
             past_per_m: config.observation_weight.past_per_m(),
+            free_m: config.observation_weight.free_m(config.voxel_size_m),
             depth_m: seen.depth_m.pixels(),
             width: seen.depth_m.width() as u32,
             height: seen.depth_m.height() as u32,

@@ -69,6 +69,18 @@ fn past(config: &VolumeConfig, weight: i32, depth_m: f32) -> i32 {
     if config.observation_weight == ObservationWeight::Nearest { weight.min(libm::rintf(0.5 * depth_m) as i32) } else { weight }
 }
 
+/// What an observation of a class at a depth weighs, so far before the surface.
+fn gain(config: &VolumeConfig, class: Option<u8>, depth_m: f32, distance_m: f32) -> i32 {
+    let is_free = distance_m >= 4.0 * config.voxel_size_m;
+    let at_1_m = match config.observation_weight {
+        ObservationWeight::One | ObservationWeight::Nearest => 0.0,
+        ObservationWeight::Band if is_free => 25.0,
+        ObservationWeight::Depth | ObservationWeight::Band => 100.0,
+    };
+    let by_class = class.map_or(1, |class| i32::from(config.class_weight[usize::from(class)]));
+    crate::geometry::scalar::clamp_f32(at_1_m / depth_m, 1.0, 10.0) as i32 * by_class
+}
+
 /// Fusion as its module states it, one voxel after the other, and as plainly.
 fn fuse_slowly(
     config: &VolumeConfig,
@@ -114,7 +126,7 @@ fn fuse_slowly(
         let observed =
             if distance < config.truncation_m { libm::rintf(distance * (32_767.0 / config.truncation_m)) as i32 } else { 32_767 };
         let w = i32::from(weight[voxel]);
-        let gain = seen.class.map_or(1, |class| i32::from(config.class_weight[usize::from(class.get(u, v).unwrap())]));
+        let gain = gain(config, seen.class.map(|class| class.get(u, v).unwrap()), depth, distance);
         if gain == 0 {
             continue;
         }
@@ -135,6 +147,8 @@ fn fuse_slowly(
 fn equals_the_plain_twin_bit_for_bit() {
     equals_the_plain_twin(ObservationWeight::Nearest);
     equals_the_plain_twin(ObservationWeight::One);
+    equals_the_plain_twin(ObservationWeight::Depth);
+    equals_the_plain_twin(ObservationWeight::Band);
 }
 
 fn equals_the_plain_twin(observation_weight: ObservationWeight) {
@@ -287,6 +301,25 @@ fn near_observations_weigh_more_when_asked_and_weight_stops_at_its_maximum() {
             assert_eq!(volume.sampler().voxel(point).unwrap().weight, 25);
         });
     }
+}
+
+#[test]
+fn what_was_taken_for_free_space_yields_to_a_surface() {
+    // A surface 5 m away, twice what lies 10 m away behind it, and the surface again.
+    let distance = |observation_weight| {
+        let config = VolumeConfig { observation_weight, ..VolumeConfig::default() };
+        let mut sdf = 0;
+        with_volume(&Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY }, &config, |volume| {
+            for depth_m in [5.0, 10.0, 10.0, 5.0] {
+                fuse_once(volume, &view([0.0; 3], [0.0; 3]), &vec![depth_m; WIDTH * HEIGHT], &vec![50; WIDTH * HEIGHT]);
+            }
+            sdf = volume.sampler().voxel([0, 0, 100]).unwrap().sdf;
+        });
+        sdf
+    };
+    // Those of 10 m weigh 20 of 40 parts, or 4 of 24.
+    assert!((i32::from(distance(ObservationWeight::Depth)) - 16_384).abs() < 4);
+    assert!((i32::from(distance(ObservationWeight::Band)) - 5_461).abs() < 4);
 }
 
 #[test]
