@@ -236,10 +236,10 @@ impl Fusion<'_> {
     /// Weights of the observations; 0 keeps one out.
     #[inline(always)]
     fn weigh(&self, scratch: &mut Scratch) {
-        let by_depth = self.config.observation_weight.most() > 1;
+        let most = self.config.observation_weight.most() as f32;
         for (gain, (&observed_m, &distance_m)) in scratch.gain.iter_mut().zip(scratch.observed_m.iter().zip(&scratch.distance_m)) {
             let at_1_m = if distance_m >= self.free_m { 25.0 } else { 100.0 };
-            let weight = if by_depth { floored_i32(clamp_f32(at_1_m / observed_m, 1.0, 10.0)) } else { 1 };
+            let weight = floored_i32(clamp_f32(at_1_m / observed_m, 1.0, most));
             *gain = weight as i16 & -i16::from(observed_m > 0.0);
         }
         let Some(class) = self.seen.class else { return };
